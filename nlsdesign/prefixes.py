@@ -47,7 +47,7 @@ def prefixed(value: float, unit: str = "N*m", *, digits: int = 3) -> str:
 
     Examples
     --------
-    >>> prefixed(3.99), prefixed(0.0123), prefixed(0.9999), prefixed(345.0, "N", digits=2)
+    >>> prefixed(3.99), prefixed(0.0123), prefixed(0.9999), prefixed(346.0, "N", digits=2)
     ('3.99 N·m', '12.3 mN·m', '1 N·m', '350 N')
     """
     factor, shown = shared_prefix([value], unit)

@@ -119,7 +119,9 @@ def test_rows_are_what_the_plan_holds() -> None:
         ("weight and cell", "0", "1", "500", "spring.stiffness 10 → 1 %"),
     ]
     head, first, second = str(made).splitlines()
-    assert head == "calibration  spring torque at rest, mN·m  running, mN·m  inertia, mN·m  spreads, best four"
+    assert (
+        head == "calibration  spring torque at rest, mN·m  running, mN·m  inertia, mN·m  spreads, best four"
+    )
     assert first.split("  ")[:4] == ["nothing", "35.4", "12.3", "500"]
     assert second.endswith("spring.stiffness 10 → 1 %")
 

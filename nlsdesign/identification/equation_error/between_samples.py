@@ -171,7 +171,14 @@ def resolving_step(block_records: Sequence[BlockRecord]) -> float:
     ----------
     block_records
         Of the records that may decide on filters.
+
+    Notes
+    -----
+    Blocks that are faster than a sample, as contact is, take short steps of their own between the samples;
+    where there is one, nothing is interpolated.
     """
+    if any(each.driven.stiff for each in block_records):
+        return math.inf
     return min(
         (each.record.step / _needed(each) for each in block_records if _averages(each)), default=math.inf
     )
