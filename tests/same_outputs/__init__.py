@@ -1,0 +1,1 @@
+"""Whether a change of the code changed an output; ``python -m tests.same_outputs``."""
