@@ -67,10 +67,11 @@ def test_what_is_missing_is_noticed(tmp_path: Path) -> None:
     assert show(before, recorded(tmp_path / "c") / "code" / "observer") == 1  # all jobs
 
 
-def test_a_job_that_did_not_end_is_noticed(tmp_path: Path) -> None:
+def test_a_job_that_did_not_end_is_noticed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before, after = recorded(tmp_path / "a"), recorded(tmp_path / "b")
     (after / "code" / "observer" / ".done").unlink()
     assert show(before, after) == 1
+    assert "code/observer/.done: only before" in capsys.readouterr().out
 
 
 def test_every_group_has_a_quick_job_and_every_job_its_own_name() -> None:
