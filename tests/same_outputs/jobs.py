@@ -11,6 +11,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parents[2]
 SHARED = Path(os.environ.get("NLSDESIGN_SHARED", "/nowhere"))
 MAIN, SOFT, FINGER = "austin2015_figure_consistent", "austin2015_soft_spring", "one_sided_cable_drive"
+NEW_FINGER = "deck new --template one-sided-finger new.toml"  # an observer serves it, FINGER has none
 # Which of the models in Python declares which deck.
 MODELS = {
     "cam_rubber_actuator": MAIN,
@@ -25,7 +26,7 @@ MODELS = {
 class Job:
     """Commands that run one after the other in a folder of their own, with the files that they read.
 
-    A command is what stands behind ``nlsdesign``; ``flat``, ``views`` and ``table`` are those of this file.
+    A command is what stands behind ``nlsdesign``; ``flat``, ``views`` and ``table`` are those of ``dumps``.
     """
 
     name: str
@@ -98,8 +99,8 @@ def _code() -> Iterator[Job]:
     for kind in ("certified", "kalman", "published"):
         yield Job(f"code/{kind}", (c(MAIN, f"--kind {kind}"),))
     yield Job("code/soft_adaptive", (c(SOFT, "--what both"),))
-    yield Job("code/finger_adaptive", (c(FINGER, "--what both"),))
-    yield Job("code/finger_cascade", (c(FINGER, "--kind cascade"),))
+    yield Job("code/one_sided_adaptive", (NEW_FINGER, c("new.toml", "--what both")))
+    yield Job("code/one_sided_cascade", (NEW_FINGER, c("new.toml", "--kind cascade --real float")))
     yield Job("code/observer_errors", (f"observer --deck {MAIN} --errors --draws 4 --json --out c",))
     wires = (
         "--wire brain.motor.angle=plant.motor_encoder.reading --order brain --order plant "
@@ -129,7 +130,8 @@ def _analysis() -> Iterator[Job]:
     for law in ("pid", "scheduled"):
         loop = f"analyse loop --deck {MAIN} --law {law} --amplitude '0.5 N*m' --json --out out"
         yield Job(f"analysis/loop_{law}", (loop,), law == "scheduled")
-    yield Job("analysis/loop_finger", (f"analyse loop --deck {FINGER} --law scheduled --json --out out",))
+    loop = "analyse loop --deck new.toml --law scheduled --json --out out"
+    yield Job("analysis/loop_one_sided", (NEW_FINGER, loop))
     proofs = {
         "certified": "--kind certified --certificate",
         "with_spread": "--kind certified --certificate --with-spread",
@@ -171,8 +173,9 @@ def _design() -> Iterator[Job]:
         f"{angle},{angle / 45 * (0.5 + angle / 90):.4f}\n" for angle in range(0, 50, 5)
     )
     finger = (
-        f"design --deck {FINGER} --target-file curve.csv --free spring.cam.contour --free spring.rubber.area "
-        "--goal 'TorqueError = {}' --starts 2 --draws 50 --workers 1 --json --out out"
+        f"design --deck {FINGER} --target-file curve.csv --free spring.cam.contour "
+        "--free spring.cable.rope.rubber.area --largest-error '3 %' --goal 'TorqueError = {}' "
+        "--starts 2 --draws 50 --workers 1 --json --out out"
     )
     yield Job("design/one_sided", (finger,), False, {"curve.csv": curve})
     stock = (
