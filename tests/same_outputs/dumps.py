@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import csv
+import datetime
 import json
+import os
 import random
+import runpy
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -64,4 +68,17 @@ def table(folder: str) -> None:
         writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
 
 
-OWN = {"flat": flat, "views": views, "table": table}
+def at_fixed_time(*words: str) -> None:
+    """Run a command at the time of ``SOURCE_DATE_EPOCH``: the name of a fitted deck depends on the day."""
+
+    class Fixed(datetime.datetime):
+        @classmethod
+        def now(cls, tz: datetime.tzinfo | None = None) -> Fixed:
+            return cls.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), tz)
+
+    datetime.datetime = Fixed  # type: ignore[misc]
+    sys.argv = ["nlsdesign", *words]
+    runpy.run_module("nlsdesign", run_name="__main__", alter_sys=True)
+
+
+OWN = {"flat": flat, "views": views, "table": table, "at_fixed_time": at_fixed_time}
