@@ -33,7 +33,11 @@ LEFT_OUT = {
     ".running": "process that holds the folder",
 }
 REPLACED = (
-    (r'"code": "[0-9a-f]{64}"', '"code": "<sources>"', "digest of the sources, which is what changed"),
+    (
+        r'("code": "|"asked": "|>code</td><td class="long">|>question, digest</td><td class="long">)[0-9a-f]{64}',
+        r"\1<sources>",
+        "a sweep holds digests of the sources, of which a question is made too",
+    ),
 )
 
 
