@@ -34,7 +34,7 @@ LEFT_OUT = {
 }
 REPLACED = (
     (
-        r'("code": "|"asked": "|>code</td><td class="long">|>question, digest</td><td class="long">)[0-9a-f]{64}',
+        r'("(?:code|asked)": "|>(?:code|question, digest)</td><td class="long">)[0-9a-f]{64}',
         r"\1<sources>",
         "a sweep holds digests of the sources, of which a question is made too",
     ),
