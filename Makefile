@@ -7,7 +7,7 @@ OUT := out/$(STUDY)
 WORKERS := 2
 # Kernels of OpenBLAS that x86-64 processors with AVX2 can run.
 KERNELS := Haswell Prescott Zen
-PLACES := nlsdesign/model nlsdesign/observer nlsdesign/discrepancy nlsdesign/export
+PLACES := nlsdesign/model nlsdesign/feedback/observer nlsdesign/bench/discrepancy nlsdesign/export
 MUTANTS := 200
 SEED := 1
 UV := uv==0.13.8

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.identification import RecordSet
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.equation_error.filter_choice import rate_span
+from nlsdesign.bench.identification.records.measurement import Record
+from nlsdesign.bench.identification.statistics.filters import derivative
 from nlsdesign.components import Assembly
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.identification import RecordSet
-from nlsdesign.identification.equation_error.evidence import Bench
-from nlsdesign.identification.equation_error.filter_choice import rate_span
-from nlsdesign.identification.records.measurement import Record
-from nlsdesign.identification.statistics.filters import derivative
 from nlsdesign.model import flatten
 
 Array = NDArray[np.float64]

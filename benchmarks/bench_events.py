@@ -24,8 +24,8 @@ from scipy.integrate import solve_ivp
 
 from nlsdesign.components import ROTATION, Backlash, CoulombFriction, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Sine, simulate
 

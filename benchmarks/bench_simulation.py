@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 

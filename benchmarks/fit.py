@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
+from nlsdesign.bench.identification import Record, Shots, Weights, fit_by_simulation, free_parameter
 from nlsdesign.components import TRANSLATION, CoulombFriction, Dashpot, Mass, Regularised, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.identification import Record, Shots, Weights, fit_by_simulation, free_parameter
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace
 

@@ -15,7 +15,7 @@ import time
 
 import numpy as np
 
-from nlsdesign.errors import NlsError
+from nlsdesign.foundation.errors import NlsError
 from nlsdesign.live import ChangeLimit, LiveDesign, LiveEdit, MovePoint, gallery_question, to_json
 
 DECKS = (

@@ -20,7 +20,7 @@ import nlsdesign as nls
 from nlsdesign import design as design_room
 from nlsdesign.design import CamDesign, DesignSettings, Limit
 from nlsdesign.design.optimisation.loosening import Freed, Give
-from nlsdesign.errors import NlsError
+from nlsdesign.foundation.errors import NlsError
 
 Floats = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ import casadi as ca
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import joined
 from nlsdesign.export import CORTEX_M4F, CORTEX_M7, Processor, TargetMeasurement, export_c, measure_on_target
+from nlsdesign.feedback.control import joined
+from nlsdesign.feedback.observer import design_observer_with_details
 from nlsdesign.model import FlatModel, Variable
-from nlsdesign.observer import design_observer_with_details
 from tests.unguarded import unguarded
 
 DECK = "austin2015_figure_consistent"

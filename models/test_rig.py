@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nlsdesign.bench.identification.records.quality import check_columns
+from nlsdesign.bench.identification.records.table_files import read_table
 from nlsdesign.components import (
     ROTATION,
     Assembly,
@@ -31,11 +33,9 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import DeckError, brief, nearest
-from nlsdesign.identification.records.quality import check_columns
-from nlsdesign.identification.records.table_files import read_table
-from nlsdesign.quantity import Quantity, quantity, significant
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import DeckError, brief, nearest
+from nlsdesign.foundation.quantity import Quantity, quantity, significant
 
 _CONTROL_VALUES = 80
 _CHANGEOVER = 2e-5  # rad; at 15 mm lever arm 0.3 µm of extension

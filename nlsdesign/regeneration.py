@@ -19,16 +19,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from .discrepancy.blocks.shown_values import shown_values
-from .errors import MeasurementError, NlsError
+from .bench.discrepancy.blocks.shown_values import shown_values
+from .bench.identification import Record, RecordSet
+from .bench.identification.estimation.least_squares import Fit
 from .export import export_c, export_fmu
-from .identification import Record, RecordSet
-from .identification.estimation.least_squares import Fit
-from .model import FlatModel
-from .model.readings import reading_of
-from .model.roles import measured_motion, series_spring
-from .model.structure import SpringNames
-from .observer import (
+from .feedback.observer import (
     AdaptiveDesign,
     FixedGrid,
     Grid,
@@ -37,9 +32,14 @@ from .observer import (
     design_observer_with_details,
     observe,
 )
-from .observer.scheduling.scheduled import whole_contour
-from .processes import parallel_map
-from .quantity import three_digits, with_unit
+from .feedback.observer.scheduling.scheduled import whole_contour
+from .foundation.errors import MeasurementError, NlsError
+from .foundation.processes import parallel_map
+from .foundation.quantity import three_digits, with_unit
+from .model import FlatModel
+from .model.readings import reading_of
+from .model.roles import measured_motion, series_spring
+from .model.structure import SpringNames
 from .simulation import Trace
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.report import FileSection, Section
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.presentation.report import FileSection, Section
 
 INSPECTED = 8  # rows of the torque table on the drawing
 DRAWINGS = {

@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.discrepancy import Verdict
-from nlsdesign.report import Chapter
+from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.presentation.report import Chapter
 
 
 def data_folder(name: str, given: Path | None) -> Path | None:

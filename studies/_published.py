@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import nlsdesign as nls
 from nlsdesign.components import CurrentSensor, ForceSensor, InextensibleCable, Through
 from nlsdesign.components.assembly.deck_writer import deck_digest
-from nlsdesign.deck import ParentDeck
+from nlsdesign.foundation.deck import ParentDeck
 
 Array = NDArray[np.float64]
 

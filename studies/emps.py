@@ -13,11 +13,10 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 import nlsdesign as nls
-from nlsdesign.discrepancy import Verdict
-from nlsdesign.identification import Shots, Weights, coloured_sigma
-from nlsdesign.report import PublishedNumber, TableSection, comparison_table, verdict_sections
-
-from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
+from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.bench.identification import Shots, Weights, coloured_sigma
+from nlsdesign.presentation.report import PublishedNumber, TableSection, comparison_table, verdict_sections
+from studies._measured import data_folder, named_effects, write_diagnosis, write_skipped
 
 MAPPING = Path(__file__).with_name("emps_records.toml")
 SHORT, LONG = 1.0, 3.1  # s; windows of prediction

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
+from nlsdesign.bench.identification import Agreement, Shots, agreement, noise_of
 from nlsdesign.components import (
     TRANSLATION,
     Driven,
@@ -28,10 +29,8 @@ from nlsdesign.components import (
     kelvin_voigt,
     maxwell,
 )
-from nlsdesign.identification import Agreement, Shots, agreement, noise_of
-from nlsdesign.report import FigureSection, TableSection
-
-from ._published import (
+from nlsdesign.presentation.report import FigureSection, TableSection
+from studies._published import (
     FIG6_SAMPLE,
     Array,
     bench_records,

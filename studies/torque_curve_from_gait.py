@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign import figures
 from nlsdesign.components import Rounded, StrainStiffening
 from nlsdesign.design import (
     CamDesign,
@@ -35,7 +34,8 @@ from nlsdesign.design import (
     scan_gear_ratio,
     walking_task,
 )
-from nlsdesign.report import (
+from nlsdesign.presentation import figures
+from nlsdesign.presentation.report import (
     Chapter,
     FigureSection,
     TableSection,
@@ -43,9 +43,8 @@ from nlsdesign.report import (
     design_sections,
     tolerance_sections,
 )
-
-from ._designed import with_machined_contour
-from ._published import declared_actuator
+from studies._designed import with_machined_contour
+from studies._published import declared_actuator
 
 BODY_MASS = nls.quantity(75.0, "kg")
 SHARE = 0.05

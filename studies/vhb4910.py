@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
+from nlsdesign.bench.discrepancy import Verdict
 from nlsdesign.components import FlowingChains, NeoHooke
-from nlsdesign.deck import Deck
-from nlsdesign.discrepancy import Verdict
-from nlsdesign.report import TableSection, verdict_sections
-
-from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
+from nlsdesign.foundation.deck import Deck
+from nlsdesign.presentation.report import TableSection, verdict_sections
+from studies._measured import data_folder, named_effects, write_diagnosis, write_skipped
 
 MAPPING = Path(__file__).with_name("vhb4910_records.toml")
 FORCE = "load_cell.reading"

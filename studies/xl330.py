@@ -18,11 +18,10 @@ from scipy.optimize import least_squares
 
 import nlsdesign as nls
 from nlsdesign.components import Assembly, LoadFriction, tie
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import FlatModel
-from nlsdesign.quantity import Quantity
-from nlsdesign.report import TableSection
-
-from ._measured import data_folder, write_skipped
+from nlsdesign.presentation.report import TableSection
+from studies._measured import data_folder, write_skipped
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nlsdesign.calibration import (
+from nlsdesign.bench.calibration import (
     CalibrationRecords,
     CalibrationTest,
     Estimate,
@@ -19,7 +19,7 @@ from nlsdesign.calibration import (
 )
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from tests.rig.calibration_bench import (
     Logger,
     Machine,

@@ -8,18 +8,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from nlsdesign import figures
-from nlsdesign.analysis import Chart
-from nlsdesign.control import (
-    CoupledStability,
-    LinearLoop,
-    LoopMargins,
-    LoopVerdict,
-    OutputImpedance,
-    SaturationLine,
-    SineResponse,
-    SlidingPlant,
-)
 from nlsdesign.design import (
     ExponentialTorque,
     FrontPoint,
@@ -32,9 +20,21 @@ from nlsdesign.design import (
     curve_for_task,
     tolerance_analysis,
 )
+from nlsdesign.feedback.analysis import Chart
+from nlsdesign.feedback.control import (
+    CoupledStability,
+    LinearLoop,
+    LoopMargins,
+    LoopVerdict,
+    OutputImpedance,
+    SaturationLine,
+    SineResponse,
+    SlidingPlant,
+)
+from nlsdesign.feedback.observer import ErrorStability
+from nlsdesign.foundation.quantity import degrees
 from nlsdesign.model import Variable
-from nlsdesign.observer import ErrorStability
-from nlsdesign.quantity import degrees
+from nlsdesign.presentation import figures
 from nlsdesign.simulation import Trace
 from tests import cam_cases
 

@@ -121,7 +121,7 @@ def test_each_claim_names_its_test(root: Path) -> None:
 
 def test_no_path_of_a_machine(root: Path) -> None:
     texts = dict(text_files(root))
-    assert {"Makefile", "pyproject.toml", ".ci/run", "nlsdesign/errors.py"} <= set(texts)
+    assert {"Makefile", "pyproject.toml", ".ci/run", "nlsdesign/foundation/errors.py"} <= set(texts)
     found = [line for name, text in texts.items() for line in machine_paths(name, text)]
     assert not found, "\n" + "\n".join(found)
 
@@ -247,7 +247,7 @@ def test_a_docstring_that_disagrees_is_caught(
 ) -> None:
     assert old in DOCUMENTED
     sample.write_text(DOCUMENTED.replace(old, new, 1), encoding="utf-8")
-    exceptions = source.exceptions_of([root / "nlsdesign" / "errors.py"])
+    exceptions = source.exceptions_of([root / "nlsdesign" / "foundation" / "errors.py"])
     caught = [line.partition(": ")[2] for line in source.mismatched(sample, exceptions)]
     assert [line[: len(complaint)] for line in caught] == [complaint] if complaint else caught == []
 

@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from . import check, listings, stage
+from docs.site import check, listings, stage
 
 ROOT = Path(__file__).resolve().parents[2]
 

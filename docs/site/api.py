@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import nlsdesign
-
-from . import markup
+from docs.site import markup
 
 _ROW = re.compile(r"^\| `nls\.(\w+)` \|", re.M)
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
+from docs.site import bibliography, markup
 from nlsdesign.components.materials import library
-
-from . import bibliography, markup
 
 
 def pages(root: Path, folder: Path) -> dict[str, str]:

@@ -16,10 +16,10 @@ from .range_remarks import check_angles, range_remarks, usual_last, warn
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..control import ClosedLoop, LimitCycleOnset, LoopMargins, SineResponse
-    from ..control.evaluation.impedance import CoupledStability, OutputImpedance
-    from ..control.evaluation.responses import HeldTorque, ZeroTorque
-    from ..control.evaluation.saturation import SaturationLine
+    from ..feedback.control import ClosedLoop, LimitCycleOnset, LoopMargins, SineResponse
+    from ..feedback.control.evaluation.impedance import CoupledStability, OutputImpedance
+    from ..feedback.control.evaluation.responses import HeldTorque, ZeroTorque
+    from ..feedback.control.evaluation.saturation import SaturationLine
 
 GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
 """Number of the controller whose onset of limit cycling is looked for, by law."""
@@ -127,7 +127,7 @@ def loop(
     if a sine moves no torque. The observer is the cascade, with the numbers of the deck for the machine
     as well.
     """
-    from ..progress import Steps
+    from ..foundation.progress import Steps
 
     fixed, moved = _loops(deck_name, _law(options), options["delay"], options["sample_time"])
     names = ("amplitudes", "last", "inertias", "load_amplitude")
@@ -151,14 +151,14 @@ def loop(
 
 def _remarks(deck_name: str, last: float) -> list[str]:
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..foundation.deck import load_deck
 
     return range_remarks(declare(load_deck(deck_name)), last=last)
 
 
 def _law(options: dict[str, Any]) -> dict[str, Any]:
     """Return what the controller is made of, as arguments of its function."""
-    from ..control import ScheduledTorque, TorqueGains
+    from ..feedback.control import ScheduledTorque, TorqueGains
 
     gains = {name: options[name] for name in _GAINS if options[name] is not None}
     if options["law"] == "scheduled":
@@ -177,12 +177,12 @@ def _loops(
     """Return the loop with the load fixed, and with the load moved; one observer and controller for both."""
     from ..components.assembly.deck_writer import declare
     from ..components.assembly.moved_load import with_moved_load
-    from ..control import encoder_loop, torque_controller
-    from ..deck import load_deck
+    from ..feedback.control import encoder_loop, torque_controller
+    from ..feedback.observer import CascadeGain, design_observer
+    from ..foundation.deck import load_deck
     from ..model import flatten
     from ..model.roles import measured_motion, series_spring
     from ..model.transform import with_outputs
-    from ..observer import CascadeGain, design_observer
 
     assembly = declare(load_deck(deck_name))
     plants = []
@@ -203,8 +203,8 @@ def _loops(
 def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluation:
     import numpy as np
 
-    from .. import control as ctl
     from ..export import quickest
+    from ..feedback import control as ctl
     from ..model.roles import motor_of
 
     translate = quickest()
@@ -248,8 +248,8 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
 
 
 def _written(result: _Evaluation, out: Path) -> list[Path]:
-    from .. import figures
-    from ..writing import make_folder, write_table
+    from ..foundation.writing import make_folder, write_table
+    from ..presentation import figures
 
     make_folder(out)
     drawn = {
@@ -357,7 +357,7 @@ def _shown(result: _Evaluation) -> None:
         for f, t, e, v in zip(moved.frequency, moved.rms, moved.energy, moved.verdicts, strict=True)
     ]
     show_table("No torque wanted, load moved", ("Hz", "mN·m rms", "mJ lost per cycle", "verdict"), zero)
-    from ..figures.loop_evaluation import passivity_words
+    from ..presentation.figures.loop_evaluation import passivity_words
 
     for angle, first in zip(result.impedance.linear.angles, result.impedance.first_active(), strict=True):
         click.echo(f"impedance at {math.degrees(angle):.3g}°: {passivity_words(float(first))}")

@@ -9,8 +9,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem, ShellComplete, get_completion_class
 
-from ..deck import deck_names
-from ..locations import folder
+from ..foundation.deck import deck_names
+from ..foundation.locations import folder
 from .output import examples, json_option, show_json
 
 INSTALL = {

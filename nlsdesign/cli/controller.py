@@ -73,7 +73,7 @@ def controller_of(
     velocity_bandwidth
         Of the velocity loop in Hz.
     """
-    from ..control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
+    from ..feedback.control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
 
     if law == "pid" and bandwidth is not None:
         raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
@@ -106,9 +106,9 @@ def export_controller(
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
     from ..components.assembly.deck_writer import declare
-    from ..control import largest_torque
-    from ..deck import load_deck
     from ..export import export_c, export_fmu
+    from ..feedback.control import largest_torque
+    from ..foundation.deck import load_deck
     from ..model import flatten
 
     declared = declare(load_deck(deck_name))

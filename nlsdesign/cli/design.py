@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import NlsError, ValueRangeError
+from ..foundation.errors import NlsError, ValueRangeError
 from .design_kinds import KINDS, show_kinds
 from .named_paths import NamedPath
 from .output import DECK_HELP, examples, json_option, show_json, show_table, spring_option
@@ -102,10 +102,10 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
         show_kinds(context.params["listed"], as_json)
         return
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
     from ..design import design_cam
-    from ..progress import Steps
-    from ..report import write_design_report
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
+    from ..presentation.report import write_design_report
 
     actuator, job = declare(load_deck(deck_name)), _job(**given)
     steps = Steps()
@@ -229,9 +229,9 @@ def _with_progress(job: DesignJob, note: Callable[[str], None]) -> Any:
 def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Target:
     """Return the target; one that follows from a task is worked out, shown and drawn first."""
     from ..design import Target, TaskTarget
-    from ..figures import curve_of_task, motor_over_task, write_figures
+    from ..foundation.writing import make_folder
     from ..model import flatten
-    from ..writing import make_folder
+    from ..presentation.figures import curve_of_task, motor_over_task, write_figures
 
     if isinstance(job.target, Target):
         return job.target
@@ -249,9 +249,15 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
     import json
 
     from ..components.assembly.deck_writer import write_deck
-    from ..figures import design_picture, limit_margins, tolerance_bars, torque_against_target, write_figures
-    from ..writing import make_folder, write_text
-    from ..written_files import discard
+    from ..foundation.writing import make_folder, write_text
+    from ..foundation.written_files import discard
+    from ..presentation.figures import (
+        design_picture,
+        limit_margins,
+        tolerance_bars,
+        torque_against_target,
+        write_figures,
+    )
 
     make_folder(out)
     for name in _FILES:
@@ -277,7 +283,7 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
 
 def _trim_remarks(designed: CamDesign) -> list[str]:
     """Return where made springs have to be set beyond a limit that holds for the nominal one."""
-    from ..quantity import parse_unit, with_unit
+    from ..foundation.quantity import parse_unit, with_unit
 
     remarks = []
     for trim in designed.tolerance.trims[:1] if designed.tolerance is not None else ():
@@ -299,7 +305,7 @@ def _drawn(designed: CamDesign, job: DesignJob, deck_name: str, out: Path, remar
     import numpy as np
 
     from ..design import machined_cam, write_drawings
-    from ..figures import InspectionRow, TitleBlock, workshop_drawing, write_figures
+    from ..presentation.figures import InspectionRow, TitleBlock, workshop_drawing, write_figures
 
     note = f"design {designed.fingerprint}"
     try:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import MeasurementError, NlsError, UnitError, ValueRangeError, nearest
-from ..quantity import parse_unit, same_dimension, typeset_unit, with_unit
-from ..written_numbers import name_and_unit
+from ..foundation.errors import MeasurementError, NlsError, UnitError, ValueRangeError, nearest
+from ..foundation.quantity import parse_unit, same_dimension, typeset_unit, with_unit
+from ..foundation.written_numbers import name_and_unit
 from .units import split_number
 
 if TYPE_CHECKING:
@@ -267,8 +267,8 @@ def read_input_file(file: Path, model: FlatModel) -> tuple[Any, dict[str, Any]]:
     """
     import numpy as np
 
-    from ..identification.records.csv_files import read_csv
-    from ..identification.records.heads import heads_with_units, times_among
+    from ..bench.identification.records.csv_files import read_csv
+    from ..bench.identification.records.heads import heads_with_units, times_among
 
     try:
         table = read_csv(file)

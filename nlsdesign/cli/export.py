@@ -79,10 +79,10 @@ def export_code(
     The observer is by default the one that is best over the spread of the deck.
     """
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
     from ..export import export_c, write_examples
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..progress import Steps
 
     declared = declare(load_deck(deck_name))
     plant = flatten(declared)
@@ -124,7 +124,7 @@ def sampled_part(
     if what == OBSERVER:
         sized = sized_observer(plant, sample_time, **others)
         return OBSERVER, sized.designed.model, sized.sentences
-    from ..control import joined
+    from ..feedback.control import joined
 
     controller = controller_of(plant, sample_time, **law)
     sized = sized_observer(plant, sample_time, part_of=lambda each: joined(each, controller), **others)

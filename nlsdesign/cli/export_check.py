@@ -35,8 +35,8 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
     Exit status 0 if all do and none was edited, 1 if not, 2 if a file cannot be read.
     """
     from ..components.assembly.deck_writer import deck_digest, declare
-    from ..deck import load_deck
-    from ..errors import ExportError
+    from ..foundation.deck import load_deck
+    from ..foundation.errors import ExportError
     from .exported_files import exported_files
 
     reference = deck_digest(declare(load_deck(deck_name))) if deck_name else ""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .controller import controller_of, law_options
 from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
@@ -53,7 +53,7 @@ class _Models:
         return controller_of(self.plant, self.sample_time, **self.law)
 
     def _both(self) -> FlatModel:
-        from ..control import joined
+        from ..feedback.control import joined
 
         return joined(self["observer"], self["controller"])
 
@@ -143,10 +143,10 @@ def export_fmus(
 ) -> None:
     """Write plant, torque observer, torque controller, and observer with controller in one, as FMUs."""
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
     from ..export import Authorship
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..progress import Steps
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
     law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from ..components.assembly.deck_writer import deck_digest, declare
-from ..deck import read_deck
-from ..errors import ExportError, NlsError
 from ..export.c.provenance import SHORT, stamp_of
 from ..export.files import BROKEN_ARCHIVE
 from ..export.fmi.fmu_origin import ORIGIN_FILE, ORIGIN_FORMAT
+from ..foundation.deck import read_deck
+from ..foundation.errors import ExportError, NlsError
 from ..model.derived_deck import digits_in_name
 
 MEGABYTE = 1 << 20

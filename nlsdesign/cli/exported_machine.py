@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .controller import controller_of
 from .observer_kinds import observer_of
 
@@ -69,8 +69,8 @@ def export_machine(
     spring, measured
         Where the structure of the plant leaves them open.
     """
-    from ..control import joined
     from ..export import export_c, export_fmu
+    from ..feedback.control import joined
 
     @cache
     def observing() -> FlatModel:

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..errors import ExportError, ValueRangeError
-from ..prefixes import prefixed
-from ..quantity import typeset_unit
+from ..foundation.errors import ExportError, ValueRangeError
+from ..foundation.prefixes import prefixed
+from ..foundation.quantity import typeset_unit
 from .observer_kinds import DesignedObserver, designed_observer
 from .units import Bytes, Number
 
 if TYPE_CHECKING:
+    from ..feedback.observer import GridByTorqueError
+    from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
     from ..model import FlatModel
-    from ..observer import GridByTorqueError
-    from ..observer.scheduling.torque_grid import TableTooLargeError
 
 ATTEMPTS = 3
 """Designs until code and table together keep a size; a coarser table changes the code a little."""
@@ -119,7 +119,7 @@ def sized_observer(
     ExportError
         If a size is asked for and no compiler is installed.
     """
-    from ..observer.scheduling.torque_grid import TableTooLargeError
+    from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
 
     each = 4 if real == "float" else 8
     grid = _grid(plant, table_error, each, None)
@@ -190,7 +190,7 @@ def _refused(flash: int, code: int, error: TableTooLargeError) -> ValueRangeErro
 
 
 def _grid(plant: FlatModel, error: float | None, each: int, most: int | None) -> GridByTorqueError:
-    from ..observer.scheduling.scheduled import whole_contour
+    from ..feedback.observer.scheduling.scheduled import whole_contour
 
     return replace(whole_contour(plant), torque_error=error, bytes_per_number=each, most_bytes=most)
 

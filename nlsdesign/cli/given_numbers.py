@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..errors import NlsError, UnitError, unknown_name
-from ..quantity import Quantity, parse_unit, quantity, typeset_unit, with_unit
+from ..foundation.errors import NlsError, UnitError, unknown_name
+from ..foundation.quantity import Quantity, parse_unit, quantity, typeset_unit, with_unit
 from .driving_signals import read_pairs, size_in
 from .units import split_number
 

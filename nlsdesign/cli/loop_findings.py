@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..control.evaluation.loop_verdict import LoopVerdict
+    from ..feedback.control.evaluation.loop_verdict import LoopVerdict
 
 
 def stretches(frequencies: Sequence[float], verdicts: Sequence[LoopVerdict]) -> Iterator[tuple[str, str]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 
 if TYPE_CHECKING:
     _Kind = click.Path[Path]

@@ -77,11 +77,11 @@ def observer(
     if deck_name is None:
         raise click.MissingParameter(ctx=context, param_type="option", param_hint="'--deck'")
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
     from ..export import export_c
+    from ..feedback.observer import certified_design
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..observer import certified_design
-    from ..progress import Steps
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ArrangementError
+from ..foundation.errors import ArrangementError
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..deck import Deck
     from ..export import CSource
+    from ..feedback.observer import AdaptiveDesign, Certificate, HeldEstimateCertificate
+    from ..feedback.observer.certificates import Proof
+    from ..feedback.observer.certificates.verification import WritesCode
+    from ..foundation.deck import Deck
     from ..model import FlatModel
-    from ..observer import AdaptiveDesign, Certificate, HeldEstimateCertificate
-    from ..observer.certificates import Proof
-    from ..observer.certificates.verification import WritesCode
     from .observer_kinds import DesignedObserver
 
 CERTIFICATE = "certificate.json"
@@ -97,7 +97,7 @@ def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProv
     ArrangementError
         If observers of that kind cannot be certified.
     """
-    from ..observer import ObserverDesign, certify, declared_assumptions
+    from ..feedback.observer import ObserverDesign, certify, declared_assumptions
 
     design = chosen.design
     if not isinstance(design, ObserverDesign):
@@ -136,13 +136,13 @@ def write_proved(proved: Certificate | HeldEstimateCertificate, out: Path, sourc
     source
         The C code.
     """
-    from ..observer import write_certificate
+    from ..feedback.observer import write_certificate
 
     return write_certificate(replace(proved, code=_hashes(source.header, source.source)), out / CERTIFICATE)
 
 
 def _hashes(*files: Path) -> dict[str, str]:
-    from ..observer.certificates.certificate import hashes_of_code
+    from ..feedback.observer.certificates.certificate import hashes_of_code
 
     (folder,) = {file.parent for file in files}
     result = hashes_of_code(folder)
@@ -175,7 +175,7 @@ def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | 
     model
         Flat model of its deck.
     """
-    from ..observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
+    from ..feedback.observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
 
     if model is None or not isinstance(proved, HeldEstimateCertificate):
         return None
@@ -206,9 +206,9 @@ def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | 
 def verify_certificate(certificate: Path, deck_name: str | None, code: Path | None, as_json: bool) -> None:
     """Check a certificate again, without the solver; exit status 1 where it does not hold."""
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck, read_deck
+    from ..feedback.observer import CodeToCompare, read_certificate, verify
+    from ..foundation.deck import load_deck, read_deck
     from ..model import flatten
-    from ..observer import CodeToCompare, read_certificate, verify
 
     proved, untouched = read_certificate(certificate)
     given = load_deck(deck_name).path.read_text(encoding="utf-8-sig") if deck_name else None

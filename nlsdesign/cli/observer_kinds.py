@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ArrangementError
+from ..foundation.errors import ArrangementError
 
 if TYPE_CHECKING:
+    from ..feedback.observer import AdaptiveDesign, GainRule, Grid, ObserverDesign
     from ..model import FlatModel
-    from ..observer import AdaptiveDesign, GainRule, Grid, ObserverDesign
 
 BEST, CASCADE, CERTIFIED = "best", "cascade", "certified"
 KINDS = (BEST, "adaptive", CASCADE, CERTIFIED, "kalman", "published")
@@ -93,7 +93,7 @@ def designed_observer(
         If the model has no spring or no driven body, the structure leaves open which is meant, or there is
         no observer of that kind.
     """
-    from .. import observer
+    from ..feedback import observer
     from ..model.roles import measured_motion, series_spring
 
     try:
@@ -132,11 +132,11 @@ def _kalman(plant: FlatModel, measured: str, sample_time: float) -> GainRule:
     """Return the rule with the noise that the deck declares, and that assumed where it declares none."""
     import numpy as np
 
-    from ..analysis import NoiseAssumptions
-    from ..analysis.noise_assumptions import declared_deviation
-    from ..analysis.rest_points import rest_points
-    from ..observer import SteadyStateKalman
-    from ..observer.scheduling.scheduled import whole_contour
+    from ..feedback.analysis import NoiseAssumptions
+    from ..feedback.analysis.noise_assumptions import declared_deviation
+    from ..feedback.analysis.rest_points import rest_points
+    from ..feedback.observer import SteadyStateKalman
+    from ..feedback.observer.scheduling.scheduled import whole_contour
 
     over = whole_contour(plant)
     points = rest_points(plant, np.linspace(over.lower, over.upper, 41), angle=measured)

@@ -14,7 +14,7 @@ from .overwriting import c_names, out_option
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..deck import Deck
+    from ..foundation.deck import Deck
     from ..model import FlatModel
 
 deck_option = click.option("--deck", "deck_name", metavar="DECK", required=True, help=DECK_HELP)
@@ -22,7 +22,7 @@ deck_option = click.option("--deck", "deck_name", metavar="DECK", required=True,
 
 def _plant(deck_name: str) -> tuple[Deck, tuple[str, str], FlatModel]:
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..foundation.deck import load_deck
     from ..model import flatten
 
     deck = load_deck(deck_name)
@@ -66,7 +66,7 @@ def certify_continuous_gain(
     **options: Any,
 ) -> None:
     """Design one gain in continuous time with the proof that every error vanishes."""
-    from ..observer import Minimal, PaperForm, certify_continuous, write_certificate
+    from ..feedback.observer import Minimal, PaperForm, certify_continuous, write_certificate
 
     _, text, plant = _plant(deck_name)
     proved = certify_continuous(
@@ -109,8 +109,8 @@ def certify_adaptive_estimate(
 ) -> None:
     """Write the adaptive observer as C, with a bound on how far its estimate can leave the deck's torque."""
     from ..export import export_c
-    from ..observer import AdaptiveSettings, Trust, certify_held_estimate, design_adaptive_observer
-    from ..observer.certificates.held_estimate import held_assumptions
+    from ..feedback.observer import AdaptiveSettings, Trust, certify_held_estimate, design_adaptive_observer
+    from ..feedback.observer.certificates.held_estimate import held_assumptions
 
     _, text, plant = _plant(deck_name)
     trust = Trust() if limit is None else Trust(limit=limit)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ArrangementError
-from ..prefixes import shared_prefix, without_power
-from ..quantity import typeset_unit
+from ..foundation.errors import ArrangementError
+from ..foundation.prefixes import shared_prefix, without_power
+from ..foundation.quantity import typeset_unit
 from .observer_kinds import CASCADE, DesignedObserver, designed_observer
 from .output import next_command, show_table
 
 if TYPE_CHECKING:
+    from ..feedback.observer import SpreadErrors
     from ..model import FlatModel
-    from ..observer import SpreadErrors
 
 CAUSES = 8
 """Rows of the table of causes."""
@@ -53,9 +53,9 @@ def spread_errors(
         If no number of the deck has a spread.
     """
     from ..export import quickest
+    from ..feedback.observer import observer_bench, observer_errors
+    from ..feedback.observer.adaptive.adaptive_observer import encoder_quantum
     from ..model.roles import measured_motion, series_spring
-    from ..observer import observer_bench, observer_errors
-    from ..observer.adaptive.adaptive_observer import encoder_quantum
 
     if not any(v.spread > 0.0 for v in plant.parameters):
         raise ArrangementError(
@@ -98,9 +98,9 @@ def write_errors(
     files
         Written before; the page lists them too.
     """
-    from .. import figures
-    from ..report import write_observer_report
-    from ..writing import write_table, write_text
+    from ..foundation.writing import write_table, write_text
+    from ..presentation import figures
+    from ..presentation.report import write_observer_report
 
     numbers = ("exact", "median", "quantile 90 %", "rms", "bound")
     heads = ["observer", "frequency [Hz]", *(f"{name} [{errors.unit}]" for name in numbers)]

@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from ..command_words import typed_command
+from ..foundation.command_words import typed_command
 from .terminal_tables import head_count, table_lines
 
 WIDE = 160

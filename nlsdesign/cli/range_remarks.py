@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import UnitError, ValueRangeError, visible
-from ..quantity import typeset_unit
+from ..foundation.errors import UnitError, ValueRangeError, visible
+from ..foundation.quantity import typeset_unit
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -39,10 +39,10 @@ def range_remarks(
     """
     import numpy as np
 
-    from ..analysis import ranges_at_rest
-    from ..errors import NlsError
+    from ..feedback.analysis import ranges_at_rest
+    from ..feedback.observer.scheduling.scheduled import whole_contour
+    from ..foundation.errors import NlsError
     from ..model import flatten
-    from ..observer.scheduling.scheduled import whole_contour
 
     try:
         model = flatten(declared)
@@ -72,7 +72,7 @@ def usual_last(model: FlatModel) -> float:
     model
         Its cams say where a contour ends.
     """
-    from ..observer.scheduling.scheduled import whole_contour
+    from ..feedback.observer.scheduling.scheduled import whole_contour
 
     return min(math.radians(50.0), whole_contour(model).upper)
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ValueRangeError, unknown_name
-from ..quantity import typeset_unit
+from ..foundation.errors import ValueRangeError, unknown_name
+from ..foundation.quantity import typeset_unit
 from .driving_signals import FORMS, check_rows, read_input_file, read_inputs
 from .given_numbers import BARE, given_start, given_words, with_given_values
 from .named_paths import NamedPath
@@ -127,9 +127,9 @@ def _check_out(out: Path, read: Path | None) -> None:
 
 def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..progress import Steps
     from ..simulation import limits_reached, measure
     from ..simulation import simulate as integrate
 
@@ -266,8 +266,8 @@ def _drawn(
     about: tuple[Path, str, Sequence[str], Mapping[str, str]],
 ) -> list[Path]:
     """Write the picture and the page beside the table."""
-    from ..figures import run_over_time, write_figures
-    from ..report import FigureSection, FileSection, TableSection, TextSection, write_report
+    from ..presentation.figures import run_over_time, write_figures
+    from ..presentation.report import FigureSection, FileSection, TableSection, TextSection, write_report
 
     out, deck_name, warnings, taken = about
     picture = run_over_time(run, shown)
@@ -337,10 +337,10 @@ def predict_record(deck_name: str, record: Path, mapping: Path | None, out: Path
     as_json
         Whether JSON is printed.
     """
+    from ..bench.discrepancy import band_errors, predict
+    from ..bench.identification import load_record
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..discrepancy import band_errors, predict
-    from ..identification import load_record
+    from ..foundation.deck import load_deck
     from ..model import flatten
 
     actuator = declare(load_deck(deck_name))

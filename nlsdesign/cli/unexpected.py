@@ -11,10 +11,10 @@ import traceback
 
 import click
 
-from ..command_words import typed_command
-from ..errors import fit_for_message
-from ..interruption import usual_temporary_folder, was_interrupted
-from ..locations import version
+from ..foundation.command_words import typed_command
+from ..foundation.errors import fit_for_message
+from ..foundation.interruption import usual_temporary_folder, was_interrupted
+from ..foundation.locations import version
 
 _ADVICE = {
     errno.ENAMETOOLONG: "give a shorter name",

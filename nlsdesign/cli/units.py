@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import NlsError, UnitError, ValueRangeError
-from ..quantity import Quantity, parse_unit, quantity, same_dimension, typeset_unit, with_unit
-from ..written_numbers import split_number as split_number
+from ..foundation.errors import NlsError, UnitError, ValueRangeError
+from ..foundation.quantity import Quantity, parse_unit, quantity, same_dimension, typeset_unit, with_unit
+from ..foundation.written_numbers import split_number as split_number
 
 if TYPE_CHECKING:
     _Kind = click.ParamType[float]

@@ -22,7 +22,7 @@ def workers_option(command: F) -> F:
 
     @functools.wraps(command)
     def shared(*words: Any, **given: Any) -> Any:
-        from ..processes import at_most
+        from ..foundation.processes import at_most
 
         with at_most(given.pop("workers")):
             return command(*words, **given)

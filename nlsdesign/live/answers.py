@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantity import parse_unit, with_unit
+from ..foundation.quantity import parse_unit, with_unit
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .access import PROTOCOL, Access, Application, gate
 from .session_process import content_of
 from .sessions import MOST, Session, Sessions

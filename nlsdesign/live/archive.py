@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import zipfile
 
-from ..errors import DeckError, ValueRangeError
 from ..export.files import BROKEN_ARCHIVE
+from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
 from .saved import SavedDesign
 

@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis import Observability
-from ..analysis.rest_points import RestPoints, rest_points
 from ..components.assembly.named_parts import Assembly
 from ..design import Contour
-from ..errors import NlsError
+from ..feedback.analysis import Observability
+from ..feedback.analysis.rest_points import RestPoints, rest_points
+from ..foundation.errors import NlsError
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.structure import CamNames
@@ -225,9 +225,9 @@ def loop_responses(
     NlsError
         If the machine has no such loop.
     """
-    from ..control import encoder_loop, torque_controller
-    from ..control.evaluation.linear_loop import linear_loop
-    from ..observer import CascadeGain, design_observer
+    from ..feedback.control import encoder_loop, torque_controller
+    from ..feedback.control.evaluation.linear_loop import linear_loop
+    from ..feedback.observer import CascadeGain, design_observer
 
     whole = flatten(machine)
     torque = series_spring(whole).effort

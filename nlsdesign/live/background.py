@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ..errors import NlsError
-from ..extensions import extended_by, extension_names, load_extension
-from ..processes import signals_held
+from ..foundation.errors import NlsError
+from ..foundation.extensions import extended_by, extension_names, load_extension
+from ..foundation.processes import signals_held
 
 _ENDED = "its process ended without an answer"
 _PATIENCE = 2.0

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
-from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
+from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
 from .limit_kinds import LIMIT_KINDS

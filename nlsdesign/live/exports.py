@@ -13,7 +13,7 @@ from typing import Any
 from ..components.assembly.deck_writer import deck_text
 from ..components.assembly.named_parts import Assembly
 from ..design import Contour, MachinedOneSidedCam, MachinedTwoSidedCam, write_drawings
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import measured_motion, series_cam, series_spring
 from ..model.transform import with_outputs
@@ -140,9 +140,9 @@ def exported_c(
     NlsError
         If the machine has no observer or controller.
     """
-    from ..control import joined, torque_controller
     from ..export import export_c
-    from ..observer import CascadeGain, design_observer
+    from ..feedback.control import joined, torque_controller
+    from ..feedback.observer import CascadeGain, design_observer
 
     whole = flatten(machine)
     plant = with_outputs(whole, [measured_motion(whole), series_spring(whole).effort])

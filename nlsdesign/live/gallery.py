@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from ..components.assembly.deck_template import load_template
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
-from ..deck import Deck, deck_names, load_deck, read_deck, template_names
 from ..design import MaximumStrain, MaximumStress, contour_of_cam
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque
-from ..errors import NlsError, ValueRangeError, unknown_name
+from ..foundation.deck import Deck, deck_names, load_deck, read_deck, template_names
+from ..foundation.errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
 from .question import ChosenMachine, LiveQuestion, TargetPoint

@@ -14,8 +14,8 @@ from ..design.optimisation.limits import (
     MinimumRadiusOfCurvature,
     PositiveStiffness,
 )
-from ..errors import ValueRangeError
-from ..quantity import parse_unit, with_unit
+from ..foundation.errors import ValueRangeError
+from ..foundation.quantity import parse_unit, with_unit
 
 
 @dataclass(frozen=True)

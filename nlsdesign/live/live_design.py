@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .answers import AngleAnswer, LiveAnswer
 from .at_angle import AngleView
 from .background import WorkState

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .answers import LiveAnswer
 from .question import LiveQuestion
 

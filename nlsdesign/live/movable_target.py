@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from ..design import TabulatedTorque
-from ..symbolic import Expression
+from ..foundation.symbolic import Expression
 
 Floats = NDArray[np.float64]
 

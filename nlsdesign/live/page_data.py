@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
 from .at_angle import AngleView
 from .limit_words import in_words

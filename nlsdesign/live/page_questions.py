@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..errors import NlsError, ValueRangeError, brief, unknown_name
+from ..foundation.errors import NlsError, ValueRangeError, brief, unknown_name
 from .edits import edit_from
 from .session_news import SessionNews
 from .work_news import TASKS

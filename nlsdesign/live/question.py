@@ -14,7 +14,7 @@ from ..components.assembly.named_parts import Assembly
 from ..design import Contour, Limit, NumberRange, TabulatedTorque, safe_limits
 from ..design.statics.declared_cam import with_contour
 from ..design.statics.smooth_cables import with_smooth_cables
-from ..errors import ValueRangeError, brief, unknown_name
+from ..foundation.errors import ValueRangeError, brief, unknown_name
 from ..model import FlatModel, flatten
 from ..model.roles import series_cam
 from ..model.structure import CamNames

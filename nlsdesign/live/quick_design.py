@@ -24,8 +24,8 @@ from ..design import (
     contour_of_cam,
 )
 from ..design.optimisation.result import DesignCurves
+from ..foundation.quantity import Quantity
 from ..model.derived_deck import derived
-from ..quantity import Quantity
 from .answers import DesignView
 from .question import LiveQuestion
 from .quick_program import QuickProgram

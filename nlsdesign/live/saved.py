@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from ..components.assembly.deck_writer import deck_text, declare
-from ..deck import read_deck
 from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_of
 from ..design.curves.numbers import plain
-from ..errors import DeckError, ValueRangeError
+from ..foundation.deck import read_deck
+from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
 from .limit_kinds import LIMIT_KINDS
 from .question import ChosenMachine, LiveQuestion, TargetPoint

@@ -8,7 +8,7 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
-from ..errors import NlsError, missing_library
+from ..foundation.errors import NlsError, missing_library
 from .access import Access, loopback
 from .application import LONGEST_MESSAGE, application
 from .session_process import SessionProcess

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .archive import archived, unarchived
 from .background import warm_up
 from .exports import ExportDesign

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..components.materials.library import materials
 from ..components.materials.material_law import missing_law
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .answers import LiveAnswer, to_json
 from .gallery import gallery_cards
 from .limit_kinds import LIMIT_KINDS

@@ -20,7 +20,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 
 Listener = Callable[[str], Awaitable[None]]
 

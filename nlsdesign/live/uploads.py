@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 
 FILE_BYTES = 64 << 20
 """Most bytes of one file of records."""
@@ -18,7 +18,7 @@ ALL_BYTES = 256 << 20
 FILES = 40
 """Most files of one session."""
 ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5", ".toml")
-"""What :func:`nlsdesign.identification.load_records` reads, and ``records.toml``."""
+"""What :func:`nlsdesign.bench.identification.load_records` reads, and ``records.toml``."""
 
 
 class TooLargeError(NlsError):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
 from ..design import Target, ToleranceResult, tolerance_analysis
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .answers import Lazy, LoopResponse
 from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
@@ -332,9 +332,9 @@ def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) ->
     NlsError
         If the records cannot be used.
     """
+    from ..bench.discrepancy import diagnose
+    from ..bench.identification import load_records
     from ..components.assembly.deck_writer import deck_text
-    from ..discrepancy import diagnose
-    from ..identification import load_records
     from ..model import flatten
 
     stage("reads the records")

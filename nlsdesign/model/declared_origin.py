@@ -8,8 +8,8 @@ from functools import cached_property
 from ..components.assembly.deck_writer import deck_digest
 from ..components.assembly.named_parts import Assembly
 from ..components.core.part import resolved
-from ..deck import ParentDeck
-from ..quantity import Quantity
+from ..foundation.deck import ParentDeck
+from ..foundation.quantity import Quantity
 from .origin import Origin
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..components.assembly.deck_writer import deck_digest
 from ..components.assembly.named_parts import Assembly
-from ..deck import ParentDeck
+from ..foundation.deck import ParentDeck
 
 DIGITS = 8
 """Digits of the digest in a name."""

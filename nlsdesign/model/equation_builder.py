@@ -12,8 +12,8 @@ from ..components.core.element import UNBOUNDED, Range
 from ..components.core.part import Part
 from ..components.core.switches import Jump, Kink, StictionConstraint
 from ..components.core.tie import Tie
-from ..errors import ArrangementError
-from ..symbolic import Expression, depends, symbol
+from ..foundation.errors import ArrangementError
+from ..foundation.symbolic import Expression, depends, symbol
 from .flat import Variable
 from .owners import number_names
 

@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
-from ..quantity import Quantity, changed_source, same_dimension, with_unit
-from ..symbolic import Expression
+from ..foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
+from ..foundation.quantity import Quantity, changed_source, same_dimension, with_unit
+from ..foundation.symbolic import Expression
 from .notebook_view import model_html
 from .origin import Origin
 from .plausibility import Plausibility

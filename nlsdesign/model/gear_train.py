@@ -17,7 +17,7 @@ from ..components.core.element import Scope
 from ..components.mechanics.bodies import Free, Motion
 from ..components.mechanics.gear import Gear, LossyGear
 from ..components.transmission.stretchy_cable import newton_root
-from ..symbolic import Expression, depends, solve_monotone, symbol
+from ..foundation.symbolic import Expression, depends, solve_monotone, symbol
 
 
 @dataclass(frozen=True)

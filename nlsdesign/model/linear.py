@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError, unknown_name
+from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from .flat import FlatModel
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Protocol
 
-from ..quantity import typeset_unit
+from ..foundation.quantity import typeset_unit
 
 LINE = 18.0
 """Height of a line in pixels."""

@@ -6,8 +6,8 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from ..deck import ParentDeck
-from ..quantity import Quantity
+from ..foundation.deck import ParentDeck
+from ..foundation.quantity import Quantity
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ..errors import ArrangementError, unknown_name
-from ..symbolic import Expression, depends
+from ..foundation.errors import ArrangementError, unknown_name
+from ..foundation.symbolic import Expression, depends
 from .flat import FlatModel, Variable
 from .roles import driven_body, series_cam
 from .transform import cut, named, parts_of, with_parts

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..components.assembly.named_parts import Assembly
 from ..components.sensing.sensors import Sensor
-from ..symbolic import Expression
+from ..foundation.symbolic import Expression
 
 
 @dataclass(frozen=True)

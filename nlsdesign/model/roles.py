@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-from ..errors import ArrangementError, unknown_name
+from ..foundation.errors import ArrangementError, unknown_name
 from .flat import FlatModel
 from .structure import CamNames, MotorNames, MovingBody, SpringNames
 

@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 
 from ..components.core.switches import StictionConstraint
-from ..errors import ArrangementError
-from ..symbolic import Expression, depends
+from ..foundation.errors import ArrangementError
+from ..foundation.symbolic import Expression, depends
 from .equation_builder import EquationBuilder
 from .switching import Switch, Switching
 

@@ -15,7 +15,7 @@ import sympy
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
-from ..errors import ExportError
+from ..foundation.errors import ExportError
 from .function_steps import read_instructions
 
 LONGEST = 60

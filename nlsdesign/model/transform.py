@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ..errors import ArrangementError, unknown_name
-from ..symbolic import Expression, depends
+from ..foundation.errors import ArrangementError, unknown_name
+from ..foundation.symbolic import Expression, depends
 from .flat import FlatModel, Symbols, Variable
 from .structure import ModelParts
 from .switching import Switching

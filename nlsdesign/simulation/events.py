@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ..errors import ConvergenceError
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from ..model.switching import Switch, Switching
 from .buffered import Array, Buffered

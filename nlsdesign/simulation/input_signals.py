@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import FlatModel
 from .signals import Sine
 

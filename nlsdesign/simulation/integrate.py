@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError, unknown_name
+from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from .buffered import Translate, as_it_is
 from .events import Event

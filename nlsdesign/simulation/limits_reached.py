@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..foundation.quantity import with_unit
 from ..model import FlatModel
 from ..model.declared_limits import declared_reading
-from ..quantity import with_unit
 from .trace import Trace
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Translate
 from .column_runs import ColumnEvaluator

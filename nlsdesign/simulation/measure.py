@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
-from ..errors import UnitError, ValueRangeError, unknown_name
-from ..quantity import typeset_unit
+from ..foundation.errors import UnitError, ValueRangeError, unknown_name
+from ..foundation.quantity import typeset_unit
 from .trace import Trace
 
 

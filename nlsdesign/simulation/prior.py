@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import FlatModel
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-from ..errors import ConvergenceError
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Buffered, Translate, as_it_is
 from .events import LOCATED, Event, Modes, branch_of, locate_event

@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.errors import ValueRangeError, unknown_name
 from .buffered import Translate, as_it_is
 from .column_runs import CHUNK, column_run
 from .sample_writer import SampleWriter

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError, unknown_name
+from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from ..model.transform import named
 from .buffered import Translate, as_it_is
@@ -150,7 +150,7 @@ def _check(model: FlatModel, keep: Sequence[str]) -> None:
         raise ValueRangeError(
             f"model '{model.name}'",
             "is discrete or has no states; a batch needs a continuous model with states",
-            next_step="run a sampled loop with nlsdesign.control.loop_over_spread",
+            next_step="run a sampled loop with nlsdesign.feedback.control.loop_over_spread",
         )
     known = named(model, model.symbols())
     for name in keep:

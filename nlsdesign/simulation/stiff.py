@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .input_signals import Drives
 

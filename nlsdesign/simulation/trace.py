@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data_frames import Axis, data_frame, data_set
-from ..errors import MeasurementError, unknown_name
+from ..foundation.data_frames import Axis, data_frame, data_set
+from ..foundation.errors import MeasurementError, unknown_name
+from ..foundation.quantity import parse_unit, with_unit
+from ..foundation.writing import write_table
 from ..model import Variable
-from ..quantity import parse_unit, with_unit
-from ..writing import write_table
 from .events import Event
 
 Array = NDArray[np.float64]

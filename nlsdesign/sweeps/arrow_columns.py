@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import missing_library
+from ..foundation.errors import missing_library
 
 
 def libraries() -> tuple[Any, Any]:

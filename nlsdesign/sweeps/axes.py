@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, brief, unknown_name
+from ..foundation.errors import ValueRangeError, brief, unknown_name
 from ..model import flatten
 from ..simulation.prior import LONGEST_ROW, declared_prior
 from .axis_values import Given, Subject

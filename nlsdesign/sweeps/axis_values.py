@@ -12,9 +12,9 @@ import numpy as np
 
 from ..components import materials
 from ..components.assembly.named_parts import Assembly
-from ..errors import NlsError, UnitError, ValueRangeError, brief, unknown_name
-from ..quantity import BASE, Quantity, parse_unit, same_dimension
-from ..written_numbers import split_number
+from ..foundation.errors import NlsError, UnitError, ValueRangeError, brief, unknown_name
+from ..foundation.quantity import BASE, Quantity, parse_unit, same_dimension
+from ..foundation.written_numbers import split_number
 from .changes import ASK, DECK, pieces_of_rubber, row_of_factor
 from .sweep_columns import SweepColumn
 

@@ -10,7 +10,7 @@ from ..components import material, with_rubber
 from ..components.assembly.named_parts import Assembly
 from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen
-from ..errors import unknown_name
+from ..foundation.errors import unknown_name
 
 DECK: Final = "deck"
 """Name of the axis whose words are decks."""

@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
+from ..bench.discrepancy import diagnose
+from ..bench.discrepancy.effects import catalogue
+from ..bench.identification import load_records
 from ..components.assembly.named_parts import Assembly
-from ..discrepancy import diagnose
-from ..discrepancy.effects import catalogue
-from ..errors import MeasurementError, unknown_name
-from ..identification import load_records
+from ..foundation.errors import MeasurementError, unknown_name
 from ..model import flatten
 from .changes import ASK
 from .sweep_columns import SweepColumn

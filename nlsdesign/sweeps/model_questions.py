@@ -8,16 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis import Chart, Observability, Stability, over_angle
 from ..components.assembly.named_parts import Assembly
-from ..control import TorqueGains, encoder_loop, loop_margins, sine_response, torque_controller
-from ..control.evaluation.linear_loop import LinearLoop
-from ..control.loop.closed_loop import ClosedLoop
-from ..errors import ArrangementError, ValueRangeError, brief
+from ..feedback.analysis import Chart, Observability, Stability, over_angle
+from ..feedback.control import TorqueGains, encoder_loop, loop_margins, sine_response, torque_controller
+from ..feedback.control.evaluation.linear_loop import LinearLoop
+from ..feedback.control.loop.closed_loop import ClosedLoop
+from ..feedback.observer import CascadeGain, design_observer, observer_bench, observer_errors
+from ..foundation.errors import ArrangementError, ValueRangeError, brief
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
-from ..observer import CascadeGain, design_observer, observer_bench, observer_errors
 from .axis_values import in_unit
 from .same_bits import same_bits
 from .sweep_columns import SweepColumn

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ..components.assembly.deck_writer import deck_text, declare
 from ..components.assembly.named_parts import Assembly
-from ..deck import read_deck
-from ..errors import MeasurementError, NlsError
+from ..foundation.deck import read_deck
+from ..foundation.errors import MeasurementError, NlsError
 from .changes import changed_assembly
 from .sweep_table import SweepTable
 

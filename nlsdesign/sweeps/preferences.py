@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantity import three_digits, with_unit
+from ..foundation.quantity import three_digits, with_unit
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.errors import ValueRangeError, unknown_name
 from .preferences import Preference, Requirement
 
 Floats = NDArray[np.float64]

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..components.assembly.named_parts import Assembly
-from ..errors import ArrangementError, NlsError, ValueRangeError
-from ..progress import Progress, Quiet
-from ..work_sharing import Executor, PointOutcome, Processes, shared_map
+from ..foundation.errors import ArrangementError, NlsError, ValueRangeError
+from ..foundation.progress import Progress, Quiet
+from ..foundation.work_sharing import Executor, PointOutcome, Processes, shared_map
 from .arrow_columns import libraries
 from .axes import AxisSet
 from .axis_values import Subject

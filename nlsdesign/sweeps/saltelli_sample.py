@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ValueRangeError, missing_library
+from ..foundation.errors import ValueRangeError, missing_library
 from .axes import MOST_HELD, AxisSet, BoundAxes, require_fractions, require_seed
 from .axis_values import Given, Subject
 from .sweep_columns import SALTELLI

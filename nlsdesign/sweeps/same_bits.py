@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..errors import ExportError
 from ..export import natively, quickest
+from ..foundation.errors import ExportError
 from ..simulation.column_graph import ColumnGraph, NotByColumnsError
 from ..simulation.column_runs import ColumnRun
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import missing_library
+from ..foundation.errors import missing_library
 from .axis_dependence import codes, dependent_axes
 from .saltelli_plan import SaltelliForm, saltelli_plan
 from .sweep_columns import SALTELLI

@@ -9,14 +9,14 @@ from typing import Any, Final
 
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
-from ..control import TorqueGains
-from ..deck import Deck, load_deck, read_deck
 from ..design import Target
 from ..design.jobs.job_file import built, job_in
-from ..errors import DeckError, NlsError, UnitError, brief, unknown_name
-from ..quantity import parse_unit, same_dimension
-from ..reading import text_of
-from ..written_numbers import split_number
+from ..feedback.control import TorqueGains
+from ..foundation.deck import Deck, load_deck, read_deck
+from ..foundation.errors import DeckError, NlsError, UnitError, brief, unknown_name
+from ..foundation.quantity import parse_unit, same_dimension
+from ..foundation.reading import text_of
+from ..foundation.written_numbers import split_number
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import unit_of_field
 from .design_question import QUICK, DesignQuestion

@@ -17,9 +17,9 @@ import numpy as np
 
 from ..components.assembly.deck_writer import deck_digest, deck_text
 from ..components.assembly.named_parts import Assembly
-from ..errors import ExportError, MeasurementError
-from ..work_sharing import CodeIdentity, code_identity
-from ..writing import make_folder, write_text
+from ..foundation.errors import ExportError, MeasurementError
+from ..foundation.work_sharing import CodeIdentity, code_identity
+from ..foundation.writing import make_folder, write_text
 from .arrow_columns import arrow_column, libraries, numpy_column, read_columns
 from .sweep_columns import RESULTS_FILE, SweepColumn
 from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order

@@ -15,8 +15,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExportError, MeasurementError
-from ..writing import draft
+from ..foundation.errors import ExportError, MeasurementError
+from ..foundation.writing import draft
 from .arrow_columns import arrow_column, give_back, libraries, numpy_column, read_columns
 from .sweep_columns import DONE, RESULTS_FILE, SweepColumn
 

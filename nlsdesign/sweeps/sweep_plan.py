@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .axes import AxisSet, BoundAxes
 from .axis_values import Subject
 from .changes import row_of_factor

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from ..components.assembly.named_parts import Assembly
-from ..errors import ValueRangeError, WorkSharingError, brief
-from ..quantity import Quantity
+from ..foundation.errors import ValueRangeError, WorkSharingError, brief
+from ..foundation.quantity import Quantity
 from .axis_values import with_settings
 from .changes import ASK, changed_assembly
 from .sweep_columns import SweepColumn

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
-from ..deck import read_deck
-from ..errors import DeckError, MeasurementError, unknown_name
-from ..reading import is_there, text_of
+from ..foundation.deck import read_deck
+from ..foundation.errors import DeckError, MeasurementError, unknown_name
+from ..foundation.reading import is_there, text_of
 from .arrow_columns import give_back, libraries, numpy_column, read_columns
 from .changes import changed_assembly
 from .sweep_columns import DONE, RESULTS_FILE, STATE_COLUMNS, SweepColumn

@@ -7,10 +7,19 @@ import sympy as sp
 from matplotlib.figure import Figure
 
 import nlsdesign as nls
-
-from .._published import FIG6_SAMPLE, Array, element_loop, figure_points
-from . import paper as p
-from .finding import AGAINST_FIGURES, FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
+from studies._published import FIG6_SAMPLE, Array, element_loop, figure_points
+from studies.audit_published_model import paper as p
+from studies.audit_published_model.finding import (
+    AGAINST_FIGURES,
+    FAILS,
+    HOLDS,
+    NOTES,
+    OPEN,
+    PAPER,
+    Finding,
+    equal,
+    step,
+)
 
 
 def stretch_period(degrees: int) -> float:

@@ -7,11 +7,10 @@ import sympy as sp
 from matplotlib.figure import Figure
 
 import nlsdesign as nls
-from nlsdesign.report import Section, TableSection
-
-from .._published import element_loop
-from . import paper as p
-from .finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
+from nlsdesign.presentation.report import Section, TableSection
+from studies._published import element_loop
+from studies.audit_published_model import paper as p
+from studies.audit_published_model.finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
 
 # --- units ----------------------------------------------------------------------------------------
 

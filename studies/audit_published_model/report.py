@@ -7,11 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.report import Chapter, FileSection, KeyNumber, NumbersSection, Section, TableSection
-from nlsdesign.writing import write_text
-
-from .finding import Finding, Results
-from .law import unit_table
+from nlsdesign.foundation.writing import write_text
+from nlsdesign.presentation.report import (
+    Chapter,
+    FileSection,
+    KeyNumber,
+    NumbersSection,
+    Section,
+    TableSection,
+)
+from studies.audit_published_model.finding import Finding, Results
+from studies.audit_published_model.law import unit_table
 
 ABSTRACT = (
     "Each statement on the published cam-rubber actuator, of the paper or of the project's design "

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.report import (
+from nlsdesign.presentation.report import (
     CamSection,
     Chapter,
     EquationsSection,
@@ -25,13 +25,12 @@ from nlsdesign.report import (
     tolerance_sections,
     verdict_sections,
 )
-
-from .._designed import drawing_section
-from .evaluation_report import evaluation_sections
-from .generated_report import generated_sections
-from .loop_report import loop_sections
-from .observer_report import observer_sections
-from .results import Results
+from studies._designed import drawing_section
+from studies.austin2015.evaluation_report import evaluation_sections
+from studies.austin2015.generated_report import generated_sections
+from studies.austin2015.loop_report import loop_sections
+from studies.austin2015.observer_report import observer_sections
+from studies.austin2015.results import Results
 
 ABSTRACT = (
     "Declared once, flattened once: the cam-rubber actuator of Austin, Schepelmann and Geyer (IROS 2015), "

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.analysis import RankDrops, rank_drops
 from nlsdesign.export import CSource, natively
-from nlsdesign.observer import (
+from nlsdesign.feedback.analysis import RankDrops, rank_drops
+from nlsdesign.feedback.observer import (
     Certificate,
     CertifiedGain,
     ObserverOfChoice,
@@ -22,9 +22,8 @@ from nlsdesign.observer import (
     observer_errors,
     write_certificate,
 )
-from nlsdesign.observer.certificates.certificate import hashes_of_code
-
-from .observer import ObserverComparison
+from nlsdesign.feedback.observer.certificates.certificate import hashes_of_code
+from studies.austin2015.observer import ObserverComparison
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import (
+from nlsdesign.export import natively
+from nlsdesign.feedback.control import (
     ClosedLoop,
     SineResponse,
     TorqueGains,
@@ -22,10 +23,8 @@ from nlsdesign.control import (
     torque_controller,
     zero_torque,
 )
-from nlsdesign.export import natively
-from nlsdesign.observer import CascadeGain, GridByTolerance
-
-from .late_torque import late_torque
+from nlsdesign.feedback.observer import CascadeGain, GridByTolerance
+from studies.austin2015_closed_loop.late_torque import late_torque
 
 Array = NDArray[np.float64]
 

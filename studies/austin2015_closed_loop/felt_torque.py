@@ -14,11 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import TorqueGains, ZeroTorque
-
-from .._published import figure_points
-from .benches import DECKS, FILES, NONLINEAR, POWER_LAW, SOFT, STIFF, Array, Bench
-from .causes import ADDED, LATE
+from nlsdesign.feedback.control import TorqueGains, ZeroTorque
+from studies._published import figure_points
+from studies.austin2015_closed_loop.benches import (
+    DECKS,
+    FILES,
+    NONLINEAR,
+    POWER_LAW,
+    SOFT,
+    STIFF,
+    Array,
+    Bench,
+)
+from studies.austin2015_closed_loop.causes import ADDED, LATE
 
 FIRST = 0.45  # Hz; below it the published torques are those of a few counts
 TO_TWO = (0.5, 1.0, 2.0)  # Hz

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsdesign.control import SineResponse, TorqueGains
-
-from .._published import figure_points
-from .benches import DECKS, FILES, HIGH, LOW, Array, Bench
+from nlsdesign.feedback.control import SineResponse, TorqueGains
+from studies._published import figure_points
+from studies.austin2015_closed_loop.benches import DECKS, FILES, HIGH, LOW, Array, Bench
 
 AMPLITUDES = {"low": LOW, "high": HIGH}
 

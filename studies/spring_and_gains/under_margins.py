@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import nlsdesign as nls
-from nlsdesign.analysis.rest import rest_states
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import (
+from nlsdesign.feedback.analysis.rest import rest_states
+from nlsdesign.feedback.control import (
     ClosedLoop,
     LoopChoice,
     LoopLimits,
@@ -30,10 +30,9 @@ from nlsdesign.control import (
     largest_gain,
     saturation_line,
 )
-from nlsdesign.errors import InfeasibleError, ValueRangeError
-from nlsdesign.observer import CascadeGain
-
-from ..alternative_rubber.merits import HELD, MOVED_AT
+from nlsdesign.feedback.observer import CascadeGain
+from nlsdesign.foundation.errors import InfeasibleError, ValueRangeError
+from studies.alternative_rubber.merits import HELD, MOVED_AT
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ a fixed seed, and every case that was ever red by name.
 
 from __future__ import annotations
 
-from .cases import Family
+from tests.fuzz.cases import Family
 
 
 def family_names() -> tuple[str, ...]:
@@ -17,21 +17,21 @@ def family_names() -> tuple[str, ...]:
 def family_of(name: str) -> Family:
     """Return a kind of cases by its name; only its own libraries are loaded."""
     if name == "decks":
-        from .decks import Decks
+        from tests.fuzz.decks import Decks
 
         return Decks()
     if name == "records":
-        from .records import Records
+        from tests.fuzz.records import Records
 
         return Records()
     if name == "fmus":
-        from .fmus import Fmus
+        from tests.fuzz.fmus import Fmus
 
         return Fmus()
     if name == "commands":
-        from .commands import Commands
+        from tests.fuzz.commands import Commands
 
         return Commands()
-    from .interrupts import Interrupts
+    from tests.fuzz.interrupts import Interrupts
 
     return Interrupts()

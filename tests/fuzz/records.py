@@ -13,19 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from nlsdesign.calibration import read_joint_numbers
+from nlsdesign.bench.calibration import read_joint_numbers
+from nlsdesign.bench.identification import load_records
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.materials.library import materials
-from nlsdesign.deck import load_deck
 from nlsdesign.design import read_job, read_task
 from nlsdesign.design.curves.target_files import read_band, read_target
-from nlsdesign.identification import load_records
-from nlsdesign.locations import bundled
-from nlsdesign.locations import folder as distributed
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.locations import bundled
+from nlsdesign.foundation.locations import folder as distributed
 from nlsdesign.model import flatten
-
-from .cases import ACCEPTED, Case, Outcome
-from .mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_lines, damaged_tokens
+from tests.fuzz.cases import ACCEPTED, Case, Outcome
+from tests.fuzz.mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_lines, damaged_tokens
 
 ROWS = 120
 _HEADS = ("t_s", "theta_rad", "current_A", "force_N")

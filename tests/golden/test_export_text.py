@@ -11,14 +11,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.deck import ParentDeck
 from nlsdesign.export.c.c_text import real_type
 from nlsdesign.export.c.controller_code import header_text, source_text
 from nlsdesign.export.fmi.fmu import fmu_texts
+from nlsdesign.foundation.deck import ParentDeck
+from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import Plausibility
 from nlsdesign.model.flat import FlatModel, Table, Variable
 from nlsdesign.model.origin import Origin
-from nlsdesign.quantity import quantity
 from tests.hand_built import plant
 
 STORED = Path(__file__).with_name("export")

@@ -11,11 +11,10 @@ import pytest
 from scipy.optimize import least_squares
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import rest_state
-
-from .published import (
+from tests.literature.published import (
     FIG_8_NONLINEAR,
     FIG_8_SOFT,
     MODEL_RELATIVE_ERROR,

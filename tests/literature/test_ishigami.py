@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("SALib")
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.sweeps import FunctionQuestion, PointPlan, SaltelliSample, Subject
 from nlsdesign.sweeps.sensitivity import AnswerSensitivity, sensitivity
 

@@ -15,12 +15,11 @@ import pytest
 from nlsdesign.components import TRANSLATION, Assembly, Driven, Specimen, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import rest_state
 from nlsdesign.simulation import Trace, simulate
-
-from .published import AREA, BRANCH, ENGAGING, FORCES, MODULI, REST_LENGTH, VISCOSITY
+from tests.literature.published import AREA, BRANCH, ENGAGING, FORCES, MODULI, REST_LENGTH, VISCOSITY
 
 PRINTED, CONSISTENT = "austin2015_as_printed", "austin2015_figure_consistent"
 

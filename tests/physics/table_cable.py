@@ -19,8 +19,7 @@ from nlsdesign.components import (
     TransportDelay,
     VoltageDrivenMotor,
 )
-
-from .table import Row
+from tests.physics.table import Row
 
 ROWS: tuple[Row, ...] = (
     Row(

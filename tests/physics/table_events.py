@@ -12,8 +12,7 @@ from nlsdesign.components import (
     Slack,
     StribeckFriction,
 )
-
-from .table import Row
+from tests.physics.table import Row
 
 _DRY, _CONTACT, _LUGRE = "test_dry_friction.py::", "test_stops_and_contact.py::", "test_lugre.py::"
 

@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from nlsdesign.analysis.rest import rest_states
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
 from nlsdesign.export import CompiledStep, export_c
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.transform import named
-from nlsdesign.observer import (
+from nlsdesign.feedback.analysis.rest import rest_states
+from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
     Duty,
@@ -22,10 +19,13 @@ from nlsdesign.observer import (
     design_adaptive_observer,
     estimator_bound,
 )
-from nlsdesign.observer.adaptive.adaptive_step import _matrices, _Side
-from nlsdesign.observer.adaptive.directions import UncertainDirections, uncertain_directions
-from nlsdesign.observer.adaptive.filter_equations import pairs, within_a_count
-from nlsdesign.observer.scheduling.forms import minimal_form
+from nlsdesign.feedback.observer.adaptive.adaptive_step import _matrices, _Side
+from nlsdesign.feedback.observer.adaptive.directions import UncertainDirections, uncertain_directions
+from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, within_a_count
+from nlsdesign.feedback.observer.scheduling.forms import minimal_form
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model.transform import named
 from nlsdesign.simulation import simulate
 from nlsdesign.simulation.prior import declared_prior
 

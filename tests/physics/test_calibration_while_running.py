@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from nlsdesign.calibration import (
+from nlsdesign.bench.calibration import (
     BoughtBy,
     CalibrationPlan,
     FreeRunTest,
@@ -19,8 +19,7 @@ from nlsdesign.calibration import (
     what_calibration_buys,
 )
 from nlsdesign.cli.calibrate import calibrate
-from nlsdesign.model import flatten
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     CascadeGain,
     Duty,
     design_observer,
@@ -28,6 +27,7 @@ from nlsdesign.observer import (
     observer_bench,
     observer_errors,
 )
+from nlsdesign.model import flatten
 from nlsdesign.simulation import Prior, declared_prior
 from tests.calibrated import LINEAR, deck
 from tests.renamed import SCHEMES, renamed

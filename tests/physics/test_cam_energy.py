@@ -17,9 +17,9 @@ from nlsdesign.design import (
     equilibrium_torque,
     torque_check,
 )
-from nlsdesign.errors import InfeasibleError
+from nlsdesign.foundation.errors import InfeasibleError
+from nlsdesign.foundation.symbolic import Expression
 from nlsdesign.model import flatten
-from nlsdesign.symbolic import Expression
 from tests.cam_cases import CONCAVE, CONVEX, TARGET, actuator
 
 LAWS: dict[str, Element] = {

@@ -24,7 +24,7 @@ from nlsdesign.design import (
     contour_of_cam,
     design_cam,
 )
-from nlsdesign.quantity import degrees
+from nlsdesign.foundation.quantity import degrees
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, TARGET, actuator
 
 Floats = NDArray[np.float64]

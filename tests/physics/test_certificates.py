@@ -15,10 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     Assumptions,
     CascadeGain,
     Certificate,
@@ -32,6 +29,9 @@ from nlsdesign.observer import (
     torque_bound,
     verify,
 )
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace
 from tests import renamed as rn
 

@@ -12,6 +12,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from nlsdesign.bench.discrepancy import Refit, predict, refit
+from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.identification import Column, RecordSet
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.equation_error.filter_choice import rate_span
+from nlsdesign.bench.identification.records.measurement import Record
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
@@ -22,13 +28,7 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import Assembly
-from nlsdesign.discrepancy import Refit, predict, refit
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.errors import MeasurementError
-from nlsdesign.identification import Column, RecordSet
-from nlsdesign.identification.equation_error.evidence import Bench
-from nlsdesign.identification.equation_error.filter_choice import rate_span
-from nlsdesign.identification.records.measurement import Record
+from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.discrepancy.selection.criteria import Criteria
+from nlsdesign.bench.discrepancy.selection.excess import excesses
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import Assembly
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.criteria import Criteria
-from nlsdesign.discrepancy.selection.excess import excesses
-from nlsdesign.identification import RecordSet, load_records
-from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
 from tests.diagnosed import declared_rig

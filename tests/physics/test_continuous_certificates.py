@@ -15,11 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.paper_form import GEOMETRIC, paper_form
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     ContinuousCertificate,
     Minimal,
     PaperForm,
@@ -28,7 +24,11 @@ from nlsdesign.observer import (
     verify,
     write_certificate,
 )
-from nlsdesign.observer.certificates.error_system import hull
+from nlsdesign.feedback.observer.certificates.error_system import hull
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model.paper_form import GEOMETRIC, paper_form
 from tests import renamed as rn
 
 DECKS = ("austin2015_as_printed", "austin2015_figure_consistent")

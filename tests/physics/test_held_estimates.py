@@ -16,10 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
     Assumptions,
@@ -34,7 +31,10 @@ from nlsdesign.observer import (
     verify,
     write_certificate,
 )
-from nlsdesign.observer.certificates import held_estimate_bound
+from nlsdesign.feedback.observer.certificates import held_estimate_bound
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation.prior import declared_prior
 
 STRAIN = "spring.rubber.relaxing.dashpot.strain"

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlsdesign.analysis import Observability, over_angle
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
 from nlsdesign.design.optimisation.result import Miss
-from nlsdesign.errors import NlsError, ValueRangeError
+from nlsdesign.feedback.analysis import Observability, over_angle
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import NlsError, ValueRangeError
 from nlsdesign.live import (
     AddPoint,
     ChangeLimit,

@@ -36,11 +36,10 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
-
-from .fed_by_rate import Hardening
+from tests.physics.fed_by_rate import Hardening
 
 DECKS = ("austin2015_as_printed", "austin2015_figure_consistent")
 

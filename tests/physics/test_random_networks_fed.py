@@ -19,11 +19,10 @@ from scipy.optimize import brentq
 
 from nlsdesign.components import TRANSLATION, Dashpot, Driven, Element, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import ArrangementError
+from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import LinearModel, linearise, rest_state
-
-from .fed_by_rate import FedSolid, Hardening
+from tests.physics.fed_by_rate import FedSolid, Hardening
 
 FREQUENCIES = (0.07, 1.3, 21.0)
 Law = Callable[[complex], complex]

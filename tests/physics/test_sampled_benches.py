@@ -16,13 +16,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification.equation_error import evidence
+from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.identification import Column, Record, RecordSet
-from nlsdesign.identification.equation_error import evidence
-from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
 

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
-from nlsdesign.control import joined
 from nlsdesign.export import CompiledStep
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.observer import design_observer_with_details
+from nlsdesign.feedback.control import joined
+from nlsdesign.feedback.observer import design_observer_with_details
 from tests.unguarded import unguarded
 
 ROUNDOFF = 2.0**-24

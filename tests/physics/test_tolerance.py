@@ -40,8 +40,8 @@ from nlsdesign.design import (
 )
 from nlsdesign.design.tolerance.declared_spreads import spring_causes
 from nlsdesign.design.tolerance.made_spring import MadeSpring, made_spring
+from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten
-from nlsdesign.quantity import quantity
 from tests.cam_cases import NeoHooke
 from tests.taut_string import arc_lip, pulled
 

@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
-from ...deck import NUMBER_FIELDS, Deck, ParentDeck
-from ...errors import ArrangementError, DeckError, NlsError, brief, nearest, unknown_name
-from ...extensions import extension_modules
-from ...quantity import Quantity
+from ...foundation.deck import NUMBER_FIELDS, Deck, ParentDeck
+from ...foundation.errors import ArrangementError, DeckError, NlsError, brief, nearest, unknown_name
+from ...foundation.extensions import extension_modules
+from ...foundation.quantity import Quantity
 from ..core.domain import Domain
 from ..core.element import Combination, Element
 from ..core.part import Part
@@ -312,7 +312,7 @@ class Builder:
         full_name
             What it is about.
         rule, did_you_mean, next_step
-            As for :class:`~nlsdesign.errors.NlsError`.
+            As for :class:`~nlsdesign.foundation.errors.NlsError`.
         """
         place = self.deck.place(full_name)
         self.problems.append(DeckError(place, rule, did_you_mean=did_you_mean, next_step=next_step))

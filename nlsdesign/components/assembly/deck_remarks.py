@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from ...quantity import Quantity
+from ...foundation.quantity import Quantity
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
@@ -29,7 +29,7 @@ def deck_remarks(machine: Assembly) -> list[str]:
 
     Examples
     --------
-    >>> from nlsdesign.deck import load_deck
+    >>> from nlsdesign.foundation.deck import load_deck
     >>> from nlsdesign.components.assembly.deck_writer import declare
     >>> deck_remarks(declare(load_deck("austin2015_as_printed")))
     []

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...deck import Deck, read_deck, template_names
-from ...errors import DeckError, NlsError, unknown_name
-from ...locations import folder
-from ...quantity import Quantity
+from ...foundation.deck import Deck, read_deck, template_names
+from ...foundation.errors import DeckError, NlsError, unknown_name
+from ...foundation.locations import folder
+from ...foundation.quantity import Quantity
 from ..mechanics.bodies import GearedMotor
 from ..mechanics.gear import Gear
 from ..mechanics.motor import ElectricMotor
@@ -180,7 +180,7 @@ def load_template(name: str) -> DeckTemplate:
     Parameters
     ----------
     name
-        One of :func:`nlsdesign.deck.template_names`.
+        One of :func:`nlsdesign.foundation.deck.template_names`.
 
     Raises
     ------

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...deck import Deck, ParentDeck
-from ...errors import DeckError, NlsError, nearest
-from ...quantity import Quantity
-from ...writing import write_text
+from ...foundation.deck import Deck, ParentDeck
+from ...foundation.errors import DeckError, NlsError, nearest
+from ...foundation.quantity import Quantity
+from ...foundation.writing import write_text
 from ..core.element import Element
 from ..core.part import Part
 from ..core.tie import Tie

@@ -6,8 +6,8 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from ...deck import Deck, Written
-from ...errors import DeckError, NlsError
+from ...foundation.deck import Deck, Written
+from ...foundation.errors import DeckError, NlsError
 from ..materials.library import material
 from ..materials.material_law import MaterialLaw, law_of
 from ..materials.relaxing_rubber import relaxing_law_of

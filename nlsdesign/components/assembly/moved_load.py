@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import ArrangementError
+from ...foundation.errors import ArrangementError
 from ..core.tie import Tie
 from ..mechanics.bodies import Driven, Fixed
 from ..sensing.sensors import Encoder

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...deck import ParentDeck
-from ...errors import ArrangementError, NlsError, unknown_name, visible
-from ...quantity import Quantity
+from ...foundation.deck import ParentDeck
+from ...foundation.errors import ArrangementError, NlsError, unknown_name, visible
+from ...foundation.quantity import Quantity
 from ..core.element import Element, Parallel
 from ..core.part import LONGEST, Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from ..core.tie import Tie

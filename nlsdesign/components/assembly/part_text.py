@@ -8,8 +8,8 @@ from decimal import Context
 from fractions import Fraction
 from itertools import chain
 
-from ...deck import Written
-from ...quantity import Quantity, parse_unit
+from ...foundation.deck import Written
+from ...foundation.quantity import Quantity, parse_unit
 from ..core.part import Part
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import UnknownNameError
+from ...foundation.errors import UnknownNameError
 
 COMPONENTS: dict[str, str] = {
     "CableGuide": "CapstanFriction with guide=WrapProduct(wrap=...); in a deck with wrap",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from ...errors import ArrangementError, NlsError, unknown_name
+from ...foundation.errors import ArrangementError, NlsError, unknown_name
 from ..core.element import Element
 from ..core.part import Part, walk
 from ..core.tie import Tie

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from .element import Scope
 
 

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol, Self, TypeAlias
 
-from ...errors import ArrangementError
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError
+from ...foundation.symbolic import Expression
 from .domain import MATERIAL as MATERIAL
 from .domain import ROTATION as ROTATION
 from .domain import TRANSLATION as TRANSLATION

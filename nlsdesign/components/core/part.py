@@ -9,8 +9,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-from ...errors import ArrangementError, UnitError, unknown_name
-from ...quantity import Quantity, same_dimension, typeset_unit
+from ...foundation.errors import ArrangementError, UnitError, unknown_name
+from ...foundation.quantity import Quantity, same_dimension, typeset_unit
 from .domain import Domain
 from .part_numbers import ParameterInfo as ParameterInfo
 from .part_numbers import Reading, Template, domain_by_units, readings, templates

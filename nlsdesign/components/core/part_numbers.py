@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeAlias
 
-from ...errors import ArrangementError, UnitError, ValueRangeError
-from ...quantity import Quantity, parse_unit, same_dimension, with_unit
+from ...foundation.errors import ArrangementError, UnitError, ValueRangeError
+from ...foundation.quantity import Quantity, parse_unit, same_dimension, with_unit
 from .domain import Domain
 
 Given: TypeAlias = Quantity | float | tuple[float, ...] | list[float]

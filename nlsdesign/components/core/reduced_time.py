@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from .element import UNBOUNDED, Range, Scope
 from .switches import StictionConstraint
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from ...symbolic import NEWTON_STEPS, Expression, depends
+from ...foundation.symbolic import NEWTON_STEPS, Expression, depends
 
 _SOFTEST = 1e-9
 """Smallest slope relative to the largest that is believed; where a member is flat, it takes what is asked."""

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, positive_part
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, positive_part
 from .contacts import WithCorners
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import UNBOUNDED, Element, Range, Scope

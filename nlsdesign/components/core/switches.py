@@ -14,7 +14,7 @@ from typing import Protocol
 
 import casadi as ca
 
-from ...symbolic import Expression, symbol
+from ...foundation.symbolic import Expression, symbol
 
 
 @dataclass(frozen=True)

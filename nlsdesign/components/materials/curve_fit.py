@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, significant
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, significant
 from ..core.contacts import Rounded
 from ..core.springs import FittedLaw, FittedRange, StrainStiffening
 from .hyperelastic import Ogden, Yeoh

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ...errors import ArrangementError, ValueRangeError, unknown_name
+from ...foundation.errors import ArrangementError, ValueRangeError, unknown_name
 from .library import Material, Property, materials
 from .quasilinear import relaxation_factor
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...errors import ArrangementError, unknown_name
-from ...quantity import Quantity
+from ...foundation.errors import ArrangementError, unknown_name
+from ...foundation.quantity import Quantity
 from ..core.dampers import ViscousMaterial
 from ..core.element import Element, Range
 from ..core.part_numbers import NotDeclared, Reading

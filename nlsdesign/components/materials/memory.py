@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from ..core.element import Scope
 
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import Combination, Scope
 from ..core.part_numbers import parameter
 

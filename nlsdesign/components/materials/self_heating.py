@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ArrangementError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from ..core.element import UNBOUNDED, Combination, Element, Scope, observed_effort
 from ..core.part import walk

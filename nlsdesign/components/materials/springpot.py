@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import MATERIAL, Domain, Element, Scope
 from ..core.part import parameter
 

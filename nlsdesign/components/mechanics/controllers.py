@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity, same_dimension
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity, same_dimension
+from ...foundation.symbolic import Expression
 from ..core.domain import Domain
 from ..core.element import Scope
 from ..core.part_numbers import Reading, one_of, parameter, read_as

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...quantity import Quantity, same_dimension
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity, same_dimension
+from ...foundation.symbolic import Expression
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
 from ..core.part_numbers import one_of, parameter

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ArrangementError, NlsError, ValueRangeError, unknown_name
-from ...quantity import Quantity
-from ...symbolic import Expression, smooth_sign
+from ...foundation.errors import ArrangementError, NlsError, ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, smooth_sign
 from ..core.element import ROTATION, Scope
 from ..core.part import Part, parameter
 from .bodies import Body, Free

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, with_unit
-from ...symbolic import Expression, uniform_spline
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, with_unit
+from ...foundation.symbolic import Expression, uniform_spline
 from ..core.contacts import WithFriction
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Element, Range, Scope

@@ -11,9 +11,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import Scope
 from ..core.part import parameter
 from .sensors import Array, Numbers, Sensor

@@ -9,8 +9,8 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.delay import delayed
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope

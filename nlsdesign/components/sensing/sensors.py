@@ -19,9 +19,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, same_dimension
-from ...symbolic import Expression
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, same_dimension
+from ...foundation.symbolic import Expression
 from ..core.domain import Domain
 from ..core.element import Scope
 from ..core.part import Part, parameter

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, uniform_spline, uniform_spline_integral
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import Part, parameter
 from ..core.part_numbers import NotDeclared, Reading, read_as

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import MeasurementError, UnitError, nearest
-from ...quantity import parse_unit, same_dimension, typeset_unit
-from ...reading import text_of
-from ...written_numbers import name_and_unit
+from ...foundation.errors import MeasurementError, UnitError, nearest
+from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
+from ...foundation.reading import text_of
+from ...foundation.written_numbers import name_and_unit
 
 Floats = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArrangementError, InfeasibleError
+from ...foundation.errors import ArrangementError, InfeasibleError
+from ...foundation.quantity import Quantity
 from ...model import FlatModel
 from ...model.roles import driven_body, series_spring
 from ...model.structure import MotorNames, MovingBody
-from ...quantity import Quantity
 from .numbers import in_si, plain
 from .target import Target
 from .task import Task, TaskCycle

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ...errors import UnitError, ValueRangeError
-from ...quantity import Quantity, degrees, same_dimension, with_unit
+from ...foundation.errors import UnitError, ValueRangeError
+from ...foundation.quantity import Quantity, degrees, same_dimension, with_unit
 
 _SLIPS = {
     "m": (("mm", 1e-3), ("cm", 1e-2)),
@@ -38,7 +38,7 @@ def in_si(
 
     Examples
     --------
-    >>> from nlsdesign.quantity import quantity
+    >>> from nlsdesign.foundation.quantity import quantity
     >>> in_si("radius", quantity(3.0, "mm"), "m")
     0.003
     """

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, with_unit
-from ...symbolic import Expression
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, with_unit
+from ...foundation.symbolic import Expression
 from .numbers import in_si, plain
 from .target import Target, piecewise, straight, table_of_curve
 

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from .numbers import in_si, plain
 
 Floats = NDArray[np.float64]
@@ -156,7 +156,7 @@ class ExponentialTorque(Target):
 
     Examples
     --------
-    >>> from nlsdesign.quantity import degrees
+    >>> from nlsdesign.foundation.quantity import degrees
     >>> curve = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0)
     >>> round(float(curve.torque(degrees(53.0))), 9), round(curve.initial_stiffness, 3)
     (5.0, 3.285)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import MeasurementError, ValueRangeError, unknown_name
-from ...locations import folder
-from ...quantity import Quantity, same_dimension
+from ...foundation.errors import MeasurementError, ValueRangeError, unknown_name
+from ...foundation.locations import folder
+from ...foundation.quantity import Quantity, same_dimension
 from .columns import ReadColumns, read_columns
 from .numbers import in_si
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InfeasibleError, NlsError, ValueRangeError
-from ...quantity import Quantity, with_unit
+from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError
+from ...foundation.quantity import Quantity, with_unit
 from .compliance import OddSpring, SpringSymmetry, TwoBranchSpring
 from .motor_and_gear import MotorAndGear, MotorCycle, motor_cycle
 from .numbers import in_si, plain

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
-from ...errors import InfeasibleError
+from ...foundation.errors import InfeasibleError
 from .compliance import ComplianceSpline
 from .motor_and_gear import MotorAndGear, MotorCycle, driven_cycle, motion_through
 from .numbers import plain

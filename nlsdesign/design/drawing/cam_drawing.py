@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError, unknown_name
-from ...quantity import Quantity
-from ...writing import write_text
+from ...foundation.errors import ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity
+from ...foundation.writing import write_text
 from ..statics.contour import Contour, turn
 from .arc_path import ArcPath
 from .cam_part import CamPart

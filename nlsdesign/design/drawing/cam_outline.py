@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity
 from .arc_path import ArcPath, biarc, clockwise_arc, joined, line
 from .lip_edge import LipEdge
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...quantity import Quantity
+from ...foundation.quantity import Quantity
 from .arc_path import ArcPath
 
 Floats = NDArray[np.float64]

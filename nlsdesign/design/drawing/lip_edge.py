@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
 from ..statics.contour import Contour
 from .arc_path import ArcPath, biarc, clockwise_arc, joined
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError
+from ...foundation.errors import ArrangementError, ValueRangeError
 from .arc_path import crossing, distance_to, inside_of
 from .cam_part import CamPart, Hole
 

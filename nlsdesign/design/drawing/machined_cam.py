@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity, quantity
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity, quantity
 from ..curves.numbers import in_si, plain
 from ..statics.contour import Contour
 from .arc_path import ArcPath
@@ -78,7 +78,7 @@ class BoltCircle:
 
     Examples
     --------
-    >>> from nlsdesign.quantity import quantity
+    >>> from nlsdesign.foundation.quantity import quantity
     >>> BoltCircle(count=4, circle=quantity(16.0, "mm"), hole=quantity(2.2, "mm")).centres.shape
     (4, 2)
     """
@@ -325,7 +325,7 @@ class MachinedTwoSidedCam(MachinedCam):
 
     Examples
     --------
-    >>> from nlsdesign.quantity import quantity
+    >>> from nlsdesign.foundation.quantity import quantity
     >>> MachinedTwoSidedCam(cable_radius=quantity(0.25, "mm")).given()["thickness"].shown
     4.0
     """

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ExportError, missing_library
+from ...foundation.errors import ExportError, missing_library
 from .arc_path import ArcPath
 from .cam_part import CamPart
 

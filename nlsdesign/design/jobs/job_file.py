@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...deck import Deck, read_deck
-from ...errors import DeckError, NlsError, UnitError, brief, unknown_name
-from ...quantity import Quantity, quantity
-from ...reading import text_of
-from ...written_numbers import split_number
+from ...foundation.deck import Deck, read_deck
+from ...foundation.errors import DeckError, NlsError, UnitError, brief, unknown_name
+from ...foundation.quantity import Quantity, quantity
+from ...foundation.reading import text_of
+from ...foundation.written_numbers import split_number
 from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target
 from ..curves.target_files import read_band, read_target

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import DeckError
+from ...foundation.errors import DeckError
 from ...model import flatten
 from ...model.roles import series_cam
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ConvergenceError, InfeasibleError
+from ...foundation.errors import ConvergenceError, InfeasibleError
 from .design_search import Search
 from .limits import Bound
 from .loosening import FEASIBLE, Freed, Give, Loosened

@@ -10,10 +10,10 @@ from typing import Literal, NamedTuple
 
 import casadi as ca
 
-from ...errors import ArrangementError
+from ...foundation.errors import ArrangementError
+from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ...model.structure import CamNames
-from ...symbolic import Expression
 from ..curves.target import Target
 from ..statics.equilibrium import ElasticLaw
 from ..statics.relaxing_law import RelaxingLaw, relaxing_law

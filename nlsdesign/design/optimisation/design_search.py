@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
+from ...foundation.symbolic import Expression
 from ...model import FlatModel
-from ...symbolic import Expression
 from ..curves.target import Target
 from ..statics.equilibrium import elastic_law
 from ..statics.rounding import has_corners

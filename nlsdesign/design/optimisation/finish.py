@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import NlsError
+from ...foundation.errors import NlsError
+from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.derived_deck import derived
-from ...quantity import Quantity, significant
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam
 from ..statics.equilibrium import cam_function

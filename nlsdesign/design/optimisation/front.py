@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data_frames import Axis, data_frame
-from ...errors import ValueRangeError
-from ...quantity import parse_unit, typeset_unit
-from ...writing import write_table
+from ...foundation.data_frames import Axis, data_frame
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import parse_unit, typeset_unit
+from ...foundation.writing import write_table
 from ..curves.target import Target
 from .finish import SolvedSearch, finished
 from .result import CamDesign

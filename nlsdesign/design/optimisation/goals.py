@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from .design_point import DesignPoint
 
 _LENGTH = 0.01

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ValueRangeError, unknown_name
-from ...quantity import Quantity, parse_unit, typeset_unit, with_unit
-from ...symbolic import Expression
+from ...foundation.errors import ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity, parse_unit, typeset_unit, with_unit
+from ...foundation.symbolic import Expression
 from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint, anchor_of
 

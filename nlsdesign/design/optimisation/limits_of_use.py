@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import UnitError, ValueRangeError
-from ...quantity import Quantity, same_dimension
+from ...foundation.errors import UnitError, ValueRangeError
+from ...foundation.quantity import Quantity, same_dimension
 from ..curves.numbers import in_si, plain
 from ..curves.shapes import TorqueBand
 from .design_point import DesignPoint

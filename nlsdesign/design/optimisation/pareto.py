@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ConvergenceError, ValueRangeError
-from ...processes import parallel_map
-from ...quantity import parse_unit, with_unit
+from ...foundation.errors import ConvergenceError, ValueRangeError
+from ...foundation.processes import parallel_map
+from ...foundation.quantity import parse_unit, with_unit
 from ..curves.target import Target
 from .conflict import feasible_point
 from .design_search import Search

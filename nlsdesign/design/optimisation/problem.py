@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InfeasibleError, NlsError, ValueRangeError, unknown_name
+from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError, unknown_name
+from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
 from ...model.structure import CamNames
-from ...symbolic import Expression
 from ..curves.target import Target
 from ..statics.declared_cam import declared_cam
 from ..statics.energy import closed_form

@@ -11,8 +11,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...processes import parallel_map
-from ...symbolic import Expression
+from ...foundation.processes import parallel_map
+from ...foundation.symbolic import Expression
 
 Floats = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...data_frames import Axis, data_frame
-from ...prefixes import prefixed, without_power
-from ...quantity import Quantity, parse_unit, with_unit
+from ...foundation.data_frames import Axis, data_frame
+from ...foundation.prefixes import prefixed, without_power
+from ...foundation.quantity import Quantity, parse_unit, with_unit
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ...foundation.symbolic import Expression
 from ...model import FlatModel
-from ...symbolic import Expression
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
 from .program import Rows

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...processes import parallel_map
-from ...quantity import parse_unit, with_unit
+from ...foundation.processes import parallel_map
+from ...foundation.quantity import parse_unit, with_unit
 from .design_search import Search, row_of
 from .limits import MaximumTorqueError
 from .program import Program, Solution

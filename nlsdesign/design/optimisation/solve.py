@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ConvergenceError, InfeasibleError, NlsError
+from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
+from ...foundation.processes import parallel_map
 from ...model import flatten
 from ...model.derived_deck import derived
 from ...model.roles import series_cam
-from ...processes import parallel_map
 from ..curves.target import Target
 from ..statics.declared_cam import with_contour
 from ..statics.smooth_cables import with_smooth_cables

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...errors import ValueRangeError
-from ...quantity import with_unit
-from ...symbolic import Expression, depends
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import with_unit
+from ...foundation.symbolic import Expression, depends
 from ..statics.relaxing_law import RelaxingLaw
 from .design_point import DesignPoint
 

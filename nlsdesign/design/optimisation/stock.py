@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from ...components.assembly.named_parts import Assembly
 from ...components.assembly.other_rubber import with_rubber
 from ...components.materials.library import material
-from ...errors import ValueRangeError, unknown_name
-from ...quantity import Quantity
+from ...foundation.errors import ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity
 from ..curves.numbers import plain
 
 _MOST = 1000

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from ...foundation.symbolic import Expression
 from ...model import Variable
-from ...symbolic import Expression
 
 
 class DesignVariable(NamedTuple):

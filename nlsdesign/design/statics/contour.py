@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
 
 Floats = NDArray[np.float64]
 

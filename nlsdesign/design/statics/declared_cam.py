@@ -13,8 +13,8 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from ...components.transmission.cam import Cam, TwoSidedCam
 from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity, significant
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity, significant
 from .contour import Contour, contour_from_lever_arm
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import InfeasibleError, ValueRangeError
+from ...foundation.errors import InfeasibleError, ValueRangeError
 from ...model import flatten
 from ..curves.target import Target
 from .equilibrium import ElasticLaw, elastic_law

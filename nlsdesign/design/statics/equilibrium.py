@@ -11,11 +11,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import ArrangementError, ConvergenceError
+from ...foundation.errors import ArrangementError, ConvergenceError
+from ...foundation.symbolic import Expression, depends
 from ...model import FlatModel, Variable
 from ...model.roles import series_cam, series_spring
 from ...model.structure import CamNames
-from ...symbolic import Expression, depends
 from .rounding import rounded
 
 _NEWTON_STEPS = 30

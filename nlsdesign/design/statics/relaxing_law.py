@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ArrangementError
+from ...foundation.errors import ArrangementError
+from ...foundation.symbolic import Expression, depends
 from ...model import FlatModel
 from ...model.flat import Symbols
 from ...model.roles import series_cam
 from ...model.structure import CamNames, body_moved_by
-from ...symbolic import Expression, depends
 from .equilibrium import cam_function, handle_of, resting_states
 
 _ANGLE = 0.2

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 
 _CORNERS = (ca.OP_FMAX, ca.OP_FMIN, ca.OP_FABS)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from ...quantity import Quantity
+from ...foundation.quantity import Quantity
 from ..curves.numbers import in_si
 from .declared_cam import declared_cam
 from .energy import CamProfile

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from ...quantity import parse_unit, with_unit
+from ...foundation.quantity import parse_unit, with_unit
 
 Floats = NDArray[np.float64]
 

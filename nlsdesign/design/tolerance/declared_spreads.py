@@ -13,11 +13,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ...errors import unknown_name
+from ...foundation.errors import unknown_name
+from ...foundation.quantity import Quantity
 from ...model import FlatModel, Variable
 from ...model.roles import series_cam
 from ...model.structure import CamNames, SpringNames
-from ...quantity import Quantity
 from ..curves.numbers import in_si
 from .causes import (
     AnchorCause,

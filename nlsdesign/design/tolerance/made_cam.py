@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from ...errors import ConvergenceError
-from ...symbolic import depends
+from ...foundation.errors import ConvergenceError
+from ...foundation.symbolic import depends
 from ..statics.equilibrium import ElasticLaw
 from .causes import AnchorCause, Cause, ProfileCause, WaveCause
 

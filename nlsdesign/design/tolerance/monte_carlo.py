@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
+from ...foundation.processes import parallel_map
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
-from ...processes import parallel_map
 from ..curves.target import Target
 from ..statics.smooth_cables import with_smooth_cables
 from .causes import NumberCause, SpreadReading, draw_deviations, shown_unit

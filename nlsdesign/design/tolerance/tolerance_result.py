@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr
 
-from ...data_frames import Axis, data_frame
-from ...prefixes import prefixed, shared_prefix, without_power
-from ...quantity import parse_unit, with_unit
+from ...foundation.data_frames import Axis, data_frame
+from ...foundation.prefixes import prefixed, shared_prefix, without_power
+from ...foundation.quantity import parse_unit, with_unit
 from ..curves.target import Target
 from .causes import Cause
 

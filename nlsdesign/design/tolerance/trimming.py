@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError, unknown_name
+from ...foundation.errors import ArrangementError, ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity
 from ...model import FlatModel
 from ...model.structure import CamNames
-from ...quantity import Quantity
 from ..curves.numbers import in_si
 from .causes import AnchorCause, Cause, NumberCause
 from .made_spring import MadeSpring

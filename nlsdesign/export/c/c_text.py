@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import ExportError, nearest
+from ...foundation.errors import ExportError, nearest
 
 # C99 and C++ together: the headers are meant to be included from both.
 _KEYWORDS = frozenset(

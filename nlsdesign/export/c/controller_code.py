@@ -11,8 +11,8 @@ from pathlib import Path
 
 import casadi as ca
 
-from ...errors import ExportError
-from ...locations import version
+from ...foundation.errors import ExportError
+from ...foundation.locations import version
 from ...model.flat import FlatModel, Variable
 from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from .c_text import Real
 
 _INLINE = 64  # longest text that is written inside another expression

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from ...errors import ExportError
-from ...locations import version
+from ...foundation.errors import ExportError
+from ...foundation.locations import version
+from ...foundation.quantity import Quantity
 from ...model.flat import FlatModel
 from ...model.origin import Origin
-from ...quantity import Quantity
 from .c_text import comment, string, wrapped
 
 SHORT = 12

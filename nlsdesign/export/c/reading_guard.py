@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Variable
 from .c_text import Real
 from .status_bits import INPUT_HELD, INPUT_JUMPED, INPUT_OUT_OF_RANGE, INPUT_STALE, RECOVERED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ...model import FlatModel
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ...model.flat import Variable
 from .c_text import Real, comment, identifier
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Table
 from .c_text import Real, wrapped
 

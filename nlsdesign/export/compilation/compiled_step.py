@@ -16,11 +16,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
+from ...foundation.writing import write_bytes
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.column_graph import ColumnGraph
 from ...simulation.column_runs import ColumnRun
-from ...writing import write_bytes
 from .columns_in_c import WIDTH, ColumnsInC, sampled_run_in_c
 from .cross_compiler import BASELINE, THIS_PROCESSOR, cache_folder, compile_library
 

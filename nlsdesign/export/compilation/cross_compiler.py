@@ -11,9 +11,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 
-from ...errors import ExportError, unknown_name
-from ...interruption import usual_temporary_folder
-from ...processes import run_to_end
+from ...foundation.errors import ExportError, unknown_name
+from ...foundation.interruption import usual_temporary_folder
+from ...foundation.processes import run_to_end
 from ..files import shell
 
 STRICT = (

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
 
 Array = NDArray[np.float64]
 MOST_POINTS = 20_000_000

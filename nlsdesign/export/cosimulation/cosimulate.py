@@ -1,7 +1,8 @@
 """Several FMUs as one system: wired by name, stepped together, recorded.
 
 Row k of a result shows what holds at its time: continuous values at that time, and what sampled instances
-have computed from values read at that time, as in a simulated :class:`~nlsdesign.control.ClosedLoop`.
+have computed from values read at that time, as in a simulated
+:class:`~nlsdesign.feedback.control.ClosedLoop`.
 
 Order. Without ``order`` all sampled instances that are due read before any computes (Jacobi), as most masters
 do: what a sampled instance computes reaches the others one sample later. With ``order`` each reads what
@@ -24,7 +25,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
+from ...foundation.errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
 from ...simulation.signals import Sine
 from ...simulation.trace import Trace
 from .coupling import Stepping

@@ -16,8 +16,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ConvergenceError, ValueRangeError
-from ...progress import Progress, Quiet
+from ...foundation.errors import ConvergenceError, ValueRangeError
+from ...foundation.progress import Progress, Quiet
 from .feeds import Curve
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ import stat
 import zipfile
 from pathlib import Path, PurePosixPath
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ..files import BROKEN_ARCHIVE
 from .foreign_text import fit_to_show
 

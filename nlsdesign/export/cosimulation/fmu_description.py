@@ -10,7 +10,7 @@ from typing import Any
 
 import fmpy
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from .foreign_text import fit_to_show
 
 DESCRIPTION_FILE = "modelDescription.xml"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ConvergenceError, ExportError
+from ...foundation.errors import ConvergenceError, ExportError
 from .fmu_description import FmuDescription, FmuScalar
 from .isolation import Activity, Watch
 from .loaded_fmu import LoadedFmu, why

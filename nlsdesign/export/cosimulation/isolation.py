@@ -27,10 +27,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import errors
-from ...errors import ExportError, NlsError
-from ...processes import signals_held
-from ...progress import Progress
+from ...foundation import errors
+from ...foundation.errors import ExportError, NlsError
+from ...foundation.processes import signals_held
+from ...foundation.progress import Progress
 from .foreign_text import fit_to_show
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
-from ...errors import ConvergenceError, ExportError
+from ...foundation.errors import ConvergenceError, ExportError
 from .fmu_description import FmuDescription
 from .foreign_text import fit_to_show
 from .isolation import Activity, Watch

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ConvergenceError
+from ...foundation.errors import ConvergenceError
 from .feeds import Curve
 from .fmu_instance import FmuInstance
 from .instance_inputs import ConnectedInputs, InstanceInputs, due_by_row

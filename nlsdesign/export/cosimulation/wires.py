@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...errors import ExportError, UnitError, ValueRangeError, unknown_name
-from ...quantity import Quantity, parse_unit
+from ...foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity, parse_unit
 from .fmu_description import FmuDescription
 
 

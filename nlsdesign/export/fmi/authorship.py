@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
-from ...errors import ExportError, ValueRangeError
+from ...foundation.errors import ExportError, ValueRangeError
 from ...model.origin import Origin
 
 SHORT_DIGEST = 12

@@ -10,8 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 
-from ...errors import ExportError
-from ...writing import write_bytes
+from ...foundation.errors import ExportError
+from ...foundation.writing import write_bytes
 from ..compilation import cross_compiler
 from ..compilation.cross_compiler import Platform, cache_folder, compile_library
 from ..files import shell

@@ -16,9 +16,9 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...errors import ExportError, ValueRangeError, nearest
+from ...foundation.errors import ExportError, ValueRangeError, nearest
+from ...foundation.writing import draft
 from ...model.flat import FlatModel
-from ...writing import draft
 from ..c.c_text import identifier
 from ..compilation.cross_compiler import ALL_PLATFORMS, Platform, chosen_platforms
 from ..files import shell

@@ -8,9 +8,9 @@ import zlib
 from collections.abc import Sequence
 from html import escape
 
-from ...locations import version as own_version
+from ...foundation.locations import version as own_version
+from ...foundation.quantity import typeset_unit
 from ...model.origin import Origin
-from ...quantity import typeset_unit
 from ..files import filled
 from .authorship import Authorship
 from .fmu_variables import FmuLayout, FmuVariable

@@ -7,8 +7,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from ...deck import ParentDeck
-from ...locations import version
+from ...foundation.deck import ParentDeck
+from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ...model.origin import Origin
 

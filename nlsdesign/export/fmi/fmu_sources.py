@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ...model.flat import Symbols, Variable
 from ..c.c_text import DOUBLE, comment, identifier, string
 from ..c.controller_code import check_discrete, header_text, source_text

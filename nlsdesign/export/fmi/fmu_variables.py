@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Variable
 from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
 from .event_variables import indicator_variables, mode_variables

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from xml.etree import ElementTree
 
-from ...locations import version as own_version
-from ...quantity import BASE, parse_unit
+from ...foundation.locations import version as own_version
+from ...foundation.quantity import BASE, parse_unit
 from ..c.c_text import identifier
 from .authorship import Authorship, described
 from .dependencies import FmiUnknown, ModelStructure, model_structure
@@ -78,7 +78,7 @@ def model_description(
         _element(structure, "EventIndicator", valueReference=each.reference)
     if not two and model.origin:
         notes = ElementTree.SubElement(root, "Annotations")
-        note = _element(notes, "Annotation", type="nlsdesign.deck")
+        note = _element(notes, "Annotation", type="nlsdesign.foundation.deck")
         _element(note, "deck", name=model.origin.deck, sha256=model.origin.digest)
     return _written(root)
 

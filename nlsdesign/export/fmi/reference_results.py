@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
 from ...model.flat import FlatModel
 from ...simulation import simulate
 from ..c.guarded_step import GuardedModel

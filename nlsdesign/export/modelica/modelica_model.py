@@ -8,11 +8,11 @@ from pathlib import Path
 
 import casadi as ca
 
-from ...errors import ExportError
-from ...locations import version
+from ...foundation.errors import ExportError
+from ...foundation.locations import version
+from ...foundation.quantity import NOT_STATED
+from ...foundation.writing import write_text
 from ...model import FlatModel, Variable
-from ...quantity import NOT_STATED
-from ...writing import write_text
 from ..c.c_text import comment
 from ..c.provenance import origin_lines, stamped
 from .modelica_equations import ModelicaEquations, modelica_equations

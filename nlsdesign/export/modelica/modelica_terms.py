@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 
 ATOM, POWER, PRODUCT, SUM, SIGNED, RELATION, AND, OR, CHOICE = range(8, -1, -1)
 """How strongly a text holds together; a sign is weaker than a sum, as ``a + -b`` is not allowed."""

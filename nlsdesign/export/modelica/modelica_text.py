@@ -6,8 +6,8 @@ import re
 import sys
 from collections.abc import Iterable
 
-from ...errors import ExportError
-from ...quantity import parse_unit
+from ...foundation.errors import ExportError
+from ...foundation.quantity import parse_unit
 
 _NOT_QUOTABLE = re.compile(r"[^A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~]")
 _KEYWORDS = frozenset(

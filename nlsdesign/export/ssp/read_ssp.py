@@ -8,8 +8,8 @@ from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from ...errors import ExportError, UnitError
-from ...quantity import BASE, Quantity, Unit, parse_unit
+from ...foundation.errors import ExportError, UnitError
+from ...foundation.quantity import BASE, Quantity, Unit, parse_unit
 from ..cosimulation.cosimulate import FmuSystem
 from ..cosimulation.fmu_archive import unpack
 from ..cosimulation.foreign_text import fit_to_show

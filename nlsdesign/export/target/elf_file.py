@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 
 _ALLOCATED, _WRITABLE = 2, 1
 _NO_BITS = 8

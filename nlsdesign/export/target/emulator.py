@@ -6,8 +6,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from ...errors import ExportError
-from ...processes import run_to_end
+from ...foundation.errors import ExportError
+from ...foundation.processes import run_to_end
 from .processors import Processor
 
 EMULATOR = "qemu-system-arm"

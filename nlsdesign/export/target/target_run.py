@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ..c.c_text import real_type
 from ..c.controller_code import CSource
 from ..c.self_test import number_rows, sample_inputs

@@ -1,0 +1,322 @@
+"""Hypotheses about what is missing, each fitted to the same records in the same way."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....components.assembly.named_parts import Assembly
+from ....foundation.errors import ConvergenceError, unknown_name
+from ....foundation.processes import parallel_map
+from ....foundation.quantity import Quantity
+from ....model import Variable, flatten
+from ...identification.equation_error.block import Block
+from ...identification.equation_error.block_response import free_in
+from ...identification.equation_error.evidence import Bench, Evidence, Floor
+from ...identification.estimation.least_squares import Fit
+from ...identification.records.measurement import Record
+from ..blocks.tearing import blocks_of
+from ..effects.candidate import Candidate, Unknown
+from .cross_validation import Folds, by_pieces, by_records
+from .hypothesis import Hypothesis
+from .hypothesis_fit import FreeBlock, HypothesisFit
+
+Array = NDArray[np.float64]
+
+_LONGEST_ROW = 12
+"""Points of a row of numbers beyond which it is the table of a shape, of which no point is refitted alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a fitted hypothesis says of one record, seen by one block.
+
+    Parameters
+    ----------
+    block, record, floor
+        Which block, which record, and how it is read.
+    predicted
+        Unfiltered output over the record.
+    residual
+        Filtered error in units of the noise floor.
+    """
+
+    block: Block
+    record: Record
+    floor: Floor
+    predicted: Array
+    residual: Array
+
+    @property
+    def error(self) -> Array:
+        """Filtered error in the unit of the block."""
+        result: Array = self.residual * self.floor.sigma
+        return result
+
+
+class Comparison:
+    """The records, and how hypotheses are fitted to them.
+
+    Parameters
+    ----------
+    bench
+        Records with filters and noise floors.
+    sizes
+        Largest value of each signal of the declared model on the records, by name.
+    """
+
+    def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
+        self.bench, self.sizes = bench, sizes
+        self._fit = HypothesisFit(bench, sizes)
+        self._polished: WeakKeyDictionary[Hypothesis, Hypothesis] = WeakKeyDictionary()
+        self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
+
+    def base(self, assembly: Assembly) -> Hypothesis:
+        """Refit the declared assembly, so that a wrong number is not taken for a wrong structure.
+
+        Parameters
+        ----------
+        assembly
+            As declared.
+        """
+        blank = Hypothesis(assembly)
+        return self._refitted(blank, self._groups(blank))
+
+    def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a hypothesis as the coarse look sees it.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted.
+        """
+        return self._refitted(replace(hypothesis, coarse=True), self._groups(hypothesis))
+
+    def with_effect(
+        self, hypothesis: Hypothesis, candidate: Candidate, wanted: Collection[str] = ()
+    ) -> Hypothesis | None:
+        """Fit a hypothesis with one more effect; blocks that it does not touch stay as they are.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted, coarsely or not.
+        candidate
+            Made from ``hypothesis.assembly``.
+        wanted
+            Names of blocks; ``None`` is returned for an effect that touches none of them.
+
+        Raises
+        ------
+        UnknownNameError
+            If the effect leaves a number open that its assembly does not have.
+        """
+        known = candidate.assembly.quantities()
+        for unknown in candidate.unknowns:
+            if unknown.name.partition("[")[0] not in known:
+                raise unknown_name(f"effect '{candidate.effect}': number", unknown.name, known)
+        before = _edited(hypothesis, candidate)
+        names = {u.name for u in candidate.unknowns}
+        groups = [g for g in self._groups(before) if any(names & set(each.free) for each in g)]
+        if wanted and not any(each.block.name in wanted for g in groups for each in g):
+            return None
+        return self._refitted(before, groups, candidate.unknowns)
+
+    def polished(self, hypothesis: Hypothesis, *, released: Collection[str] = ()) -> Hypothesis:
+        """Refit a hypothesis to all samples, from where it stands.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted, coarsely or not; without anything released the answer is remembered as long as it is.
+        released
+            Positive declared numbers of which nothing is taken as known from now on.
+
+        Raises
+        ------
+        ConvergenceError
+            If there is no response near where it stands.
+        """
+        if not released and hypothesis in self._polished:
+            return self._polished[hypothesis]
+        free = replace(hypothesis, released=hypothesis.released | frozenset(released), coarse=False)
+        result = self._refitted(free, self._groups(free))
+        if not released:
+            self._polished[hypothesis] = result
+        return result
+
+    def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a coarsely fitted hypothesis, its numbers as they are, with what all samples say of it.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted.
+        """
+        return self._rejudged(replace(hypothesis, coarse=False), by_pieces)
+
+    def without_whole_records(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a hypothesis with what it leaves over on each record when that is left out.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted.
+        """
+        return self._rejudged(hypothesis, by_records)
+
+    def _rejudged(self, hypothesis: Hypothesis, folds: Folds) -> Hypothesis:
+        groups = self._groups(hypothesis)
+        results = parallel_map(lambda k: self._fit.judged(hypothesis, groups[k], folds), len(groups))
+        return hypothesis.judged_by({key: tally for result in results for key, tally in result.items()})
+
+    def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:
+        """Return what all records say about all blocks of a hypothesis, on all samples.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted; the answer is remembered as long as the hypothesis is.
+        """
+        if hypothesis not in self._judged:
+            signals, records = self.bench.records.signals, self.bench.records.records
+            blocks = blocks_of(flatten(hypothesis.fitted), signals)
+            driven = [self.bench.driven(block, ()) for block in blocks]
+            evidence = [e for each in driven for e in self.bench.evidence(each, records, {})]
+            pairs = parallel_map(lambda k: _prediction(evidence[k]), len(evidence))
+            self._judged[hypothesis] = tuple(
+                Judged(e.driven.block, e.record, e.floor, *pair)
+                for e, pair in zip(evidence, pairs, strict=True)
+            )
+        return self._judged[hypothesis]
+
+    def _groups(self, hypothesis: Hypothesis) -> list[list[FreeBlock]]:
+        """Return the blocks of a hypothesis in groups that share no free number."""
+        blocks = []
+        for block in blocks_of(flatten(hypothesis.assembly), self.bench.records.signals):
+            spread = [v.name for v in _refittable(block.model.parameters)]
+            own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
+            blocks.append(FreeBlock(block, free_in(block, list(dict.fromkeys([*spread, *own])))))
+        return _groups(blocks)
+
+    def _refitted(
+        self, before: Hypothesis, groups: Sequence[Sequence[FreeBlock]], new: Sequence[Unknown] = ()
+    ) -> Hypothesis:
+        values, fits, tallies = dict(before.values), dict(before.fits), dict(before.tallies)
+        has_free_flight, unpredictable = before.has_free_flight, before.unpredictable
+        results = parallel_map(lambda k: self._fit.fitted(before, groups[k], new), len(groups))
+        for group, result in zip(groups, results, strict=True):
+            if isinstance(result, ConvergenceError):
+                raise result
+            values |= result.fit.values
+            names = tuple(each.block.name for each in group)
+            fits = {k: f for k, f in fits.items() if not set(k) & set(names)} | {names: result.fit}
+            tallies |= result.tallies
+            has_free_flight |= result.has_free_flight
+            others = frozenset(key for key in unpredictable if key not in result.tallies)
+            unpredictable = others | result.unpredictable
+        after = replace(
+            before,
+            values=values,
+            fits=fits,
+            has_free_flight=has_free_flight,
+            unpredictable=unpredictable,
+        )
+        return after.judged_by(tallies)
+
+
+def _prediction(evidence: Evidence) -> tuple[Array, Array]:
+    """Return the unfiltered output, and the filtered error in units of the noise floor."""
+    output = evidence.predicted({})
+    target = evidence.driven.block.target
+    error = (evidence.record.trace[target] if target else 0.0) - output
+    return output, (evidence.floor.filter @ error) / evidence.floor.sigma
+
+
+def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
+    """Return a hypothesis with the effect in its assembly, not fitted yet."""
+    moved = moved_numbers(hypothesis.assembly, candidate.assembly)
+
+    def renamed(name: str) -> str:
+        row, bracket, index = name.partition("[")
+        return moved.get(row, row) + bracket + index
+
+    old = tuple(replace(u, name=renamed(u.name)) for u in hypothesis.unknowns)
+    values = {renamed(n): v for n, v in hypothesis.values.items()}
+    # An edit may share a number out, for instance an inertia: what was fitted is shared out alike.
+    then, now = hypothesis.assembly.quantities(), candidate.assembly.quantities()
+    for name in values.keys() & then.keys() & now.keys():
+        if then[name].value != now[name].value:
+            values[name] *= now[name].number / then[name].number
+    added = (*_with_unknowns(hypothesis.added, old), candidate)
+    fits = {blocks: _renamed(fit, renamed) for blocks, fit in hypothesis.fits.items()}
+    released = frozenset(map(renamed, hypothesis.released))
+    return replace(
+        hypothesis, assembly=candidate.assembly, added=added, values=values, fits=fits, released=released
+    )
+
+
+def _renamed(fit: Fit, renamed: Callable[[str], str]) -> Fit:
+    """Return a fit under the names that its numbers have after an edit."""
+    parameters = tuple(replace(p, name=renamed(p.name)) for p in fit.parameters)
+    return replace(fit, parameters=parameters, values={renamed(n): v for n, v in fit.values.items()})
+
+
+def _refittable(parameters: Sequence[Variable]) -> list[Variable]:
+    """Return the numbers with a spread; long rows are tables of a shape, not refitted point by point."""
+    lengths = Counter(v.name.partition("[")[0] for v in parameters)
+    return [v for v in parameters if v.spread > 0.0 and lengths[v.name.partition("[")[0]] <= _LONGEST_ROW]
+
+
+def _groups(blocks: Sequence[FreeBlock]) -> list[list[FreeBlock]]:
+    """Return blocks in groups that share no free parameter."""
+    groups: list[list[FreeBlock]] = []
+    for block in blocks:
+        joined = [g for g in groups if any(set(b.free) & set(block.free) for b in g)]
+        groups = [g for g in groups if g not in joined] + [[*(b for g in joined for b in g), block]]
+    return groups
+
+
+def moved_numbers(before: Assembly, after: Assembly) -> dict[str, str]:
+    """Return the new name of each number that an edit has moved, by its old one.
+
+    An edit that puts an element inside another keeps its numbers, as the very same objects.
+
+    Parameters
+    ----------
+    before
+        An assembly.
+    after
+        Made from it by an edit.
+    """
+    old, new = before.quantities(), after.quantities()
+    departed = _by_identity({name: quantity for name, quantity in old.items() if name not in new})
+    arrived = _by_identity({name: quantity for name, quantity in new.items() if name not in old})
+    # One object may stand at several places, as where one law makes two branches: they keep their order.
+    moved: dict[str, str] = {}
+    for key, names in departed.items():
+        others = arrived.get(key, [])
+        if len(names) == len(others):
+            moved |= dict(zip(names, others, strict=True))
+    return moved
+
+
+def _by_identity(quantities: Mapping[str, Quantity]) -> dict[int, list[str]]:
+    places: dict[int, list[str]] = {}
+    for name, quantity in quantities.items():
+        places.setdefault(id(quantity), []).append(name)
+    return places
+
+
+def _with_unknowns(added: Sequence[Candidate], unknowns: Sequence[Unknown]) -> tuple[Candidate, ...]:
+    left = list(unknowns)
+    result = []
+    for each in added:
+        own, left = left[: len(each.unknowns)], left[len(each.unknowns) :]
+        result.append(replace(each, unknowns=tuple(own)))
+    return tuple(result)

@@ -1,0 +1,99 @@
+"""A hypothesis about what is missing: an assembly with effects, fitted to the records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from ....components.assembly.named_parts import Assembly
+from ....foundation.quantity import to_resolution
+from ...identification.estimation.least_squares import Fit
+from ..effects.candidate import Candidate, Unknown
+from ..fitting.unpredictable import Key, Tally, like_the_others
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """An assembly fitted to the records.
+
+    Parameters
+    ----------
+    assembly
+        With declared numbers, and the effects added so far.
+    added
+        The effects, in the order in which they were added.
+    values
+        Fitted numbers by name.
+    fits
+        One for each group of blocks that share parameters, by the names of the blocks.
+    tallies
+        What is left over by block and record; empty where nothing was fitted yet.
+    coarse
+        Whether it was fitted to thinned records only.
+    has_free_flight
+        Whether a body flies freely in it between contacts: one contact at the wrong moment, and the
+        prediction stays wrong for a while, however right the effect.
+    unpredictable
+        Blocks and records that such a body makes unpredictable; they count as the others do.
+    released
+        Declared numbers of which nothing is taken as known, because the records contradict their spread.
+    """
+
+    assembly: Assembly
+    added: tuple[Candidate, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
+    fits: Mapping[tuple[str, ...], Fit] = field(default_factory=dict)
+    tallies: Mapping[Key, Tally] = field(default_factory=dict)
+    coarse: bool = False
+    has_free_flight: bool = False
+    unpredictable: frozenset[Key] = frozenset()
+    released: frozenset[str] = frozenset()
+
+    @property
+    def newest(self) -> Candidate:
+        """The effect that was added last."""
+        return self.added[-1]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Identifiers of the effects."""
+        return tuple(c.effect for c in self.added)
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Numbers that the effects brought along."""
+        return tuple(u for c in self.added for u in c.unknowns)
+
+    @property
+    def prior(self) -> float:
+        """Sum of squared departures from declared numbers, in standard deviations of their spread."""
+        return float(sum(z**2 for f in self.fits.values() for z in f.prior_z_scores().values()))
+
+    @property
+    def expected_prior(self) -> float:
+        """What noise alone makes of that sum, if the rig is the declared one."""
+        return math.fsum(f.expected_prior_squares() for f in self.fits.values())
+
+    @property
+    def fitted(self) -> Assembly:
+        """The assembly with the fitted numbers."""
+        return self.assembly.with_values(self.values)
+
+    def as_written(self) -> Hypothesis:
+        """Return the hypothesis with each number rounded to a thousandth of its standard error.
+
+        So the deck that is written predicts what the verdict shows, on every processor.
+        """
+        errors = {p.name: fit.standard_error(p.name) for fit in self.fits.values() for p in fit.parameters}
+        return replace(self, values={n: to_resolution(v, errors.get(n, 0.0)) for n, v in self.values.items()})
+
+    def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
+        """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do.
+
+        Parameters
+        ----------
+        tallies
+            By block and record, as they are.
+        """
+        return replace(self, tallies=like_the_others(tallies, self.unpredictable))

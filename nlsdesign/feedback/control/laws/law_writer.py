@@ -1,0 +1,229 @@
+"""Writes a controller part by part: every part declares its numbers and states in one flat model."""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+
+from ....foundation.errors import ArrangementError
+from ....foundation.symbolic import Expression
+from ....model import FlatModel, Origin, Table, Variable
+
+_DEPTH = 3
+"""How many states in a row may begin with one another's values."""
+
+GAIN = "controller"
+"""What the names of settings begin with: they belong to no part of the plant."""
+
+
+class LawWriter:
+    """Collects what the parts of a controller declare, and writes it as one discrete flat model.
+
+    Parameters
+    ----------
+    sample_time
+        In s.
+    origin
+        The deck of the plant that the controller is for.
+    """
+
+    def __init__(self, sample_time: float, origin: Origin | None = None) -> None:
+        self.sample_time, self.origin = sample_time, origin
+        self._states: dict[str, tuple[Variable, Expression]] = {}
+        self._following: dict[str, Expression] = {}
+        self._beginning: dict[str, Expression] = {}
+        self._resuming: dict[str, Expression] = {}
+        self._inputs: dict[str, tuple[Variable, Expression]] = {}
+        self._parameters: dict[str, tuple[Variable, Expression]] = {}
+        self._signals: dict[str, tuple[Variable, Expression]] = {}
+        self._tables: list[tuple[Table, tuple[Expression, ...]]] = []
+
+    def input(self, name: str, unit: str, description: str) -> Expression:
+        """Return an input; the same for the same name.
+
+        Parameters
+        ----------
+        name, unit, description
+            Of the input.
+        """
+        return self._inputs.setdefault(name, (Variable(name, unit, description), ca.SX.sym(name)))[1]
+
+    def setting(self, name: str, unit: str, description: str, value: float) -> Expression:
+        """Return a setting of the controller, which is not negative, as the parameter ``controller.NAME``.
+
+        Parameters
+        ----------
+        name
+            Own name.
+        unit, description
+            Of the parameter.
+        value
+            In that unit.
+        """
+        full = f"{GAIN}.{name}"
+        return self.number(Variable(full, unit, description, value, value or 1.0, 0.0))
+
+    def number(self, variable: Variable) -> Expression:
+        """Return a parameter that is declared elsewhere, such as a number of the plant.
+
+        Parameters
+        ----------
+        variable
+            With its value as start.
+
+        Raises
+        ------
+        ArrangementError
+            If another parameter has that name, as where a part of the plant is called ``controller``.
+        """
+        known, symbol = self._parameters.setdefault(variable.name, (variable, ca.SX.sym(variable.name)))
+        if known != variable:
+            raise ArrangementError(
+                f"parameter '{variable.name}' of a controller", "is declared twice, with other numbers",
+                next_step=f"give the part of the plant another name than '{GAIN}'",
+            )  # fmt: skip
+        return symbol
+
+    def state(self, name: str, unit: str, description: str) -> Expression:
+        """Return a state that starts at zero.
+
+        Parameters
+        ----------
+        name, unit, description
+            Of the state.
+
+        Raises
+        ------
+        ArrangementError
+            If two parts have a state of the same name.
+        """
+        if name in self._states:
+            raise ArrangementError(f"state '{name}' of a controller", "is declared by two of its parts")
+        self._states[name] = (Variable(name, unit, description), ca.SX.sym(name))
+        return self._states[name][1]
+
+    def begin(self, name: str, value: Expression, *, resumes: bool = False) -> None:
+        """Say what a state is before the first sample, where that is not zero.
+
+        Parameters
+        ----------
+        name
+            Of the state.
+        value
+            In terms of inputs, parameters and what other states begin with.
+        resumes
+            Whether it is that after a gap in the readings too; other states go on as they were.
+        """
+        self._beginning[name] = value
+        if resumes:
+            self._resuming[name] = value
+
+    def follow(self, name: str, value: Expression) -> None:
+        """Say what a state is one sample later.
+
+        Parameters
+        ----------
+        name
+            Of the state.
+        value
+            Its next value.
+        """
+        self._following[name] = value
+
+    def signal(self, name: str, unit: str, description: str, value: Expression) -> Expression:
+        """Give a name to an expression, and return it.
+
+        Parameters
+        ----------
+        name, unit, description
+            Of the signal.
+        value
+            What it is.
+        """
+        self._signals[name] = (Variable(name, unit, description), value)
+        return value
+
+    def look_up(self, table: Table) -> tuple[Expression, ...]:
+        """Return the columns of a table over one of the inputs or states.
+
+        Parameters
+        ----------
+        table
+            Its argument has to be declared.
+        """
+        columns = tuple(ca.SX.sym(v.name) for v in table.columns)
+        self._tables.append((table, columns))
+        return columns
+
+    def low_pass(self, old: Expression, new: Expression, bandwidth: Expression) -> Expression:
+        """Return a low-pass of first order one sample on, exact for an input that is held.
+
+        Parameters
+        ----------
+        old, new
+            Value before, and what comes in.
+        bandwidth
+            Cut-off frequency in Hz.
+        """
+        keep = ca.exp(-2.0 * math.pi * bandwidth * self.sample_time)
+        return keep * old + (1 - keep) * new
+
+    def model(self, name: str, description: str, output: tuple[Variable, Expression]) -> FlatModel:
+        """Return the controller.
+
+        Parameters
+        ----------
+        name, description
+            Of the model.
+        output
+            Its one output.
+        """
+        x, u, p = (
+            ca.vertcat(*(symbol for _, symbol in group.values()))
+            for group in (self._states, self._inputs, self._parameters)
+        )
+        w = [symbol for _, columns in self._tables for symbol in columns]
+        following = [self._following[state] for state in self._states]
+        signals = [value for _, value in self._signals.values()]
+        return FlatModel(
+            name=name,
+            description=description,
+            states=tuple(v for v, _ in self._states.values()),
+            inputs=tuple(v for v, _ in self._inputs.values()),
+            parameters=tuple(v for v, _ in self._parameters.values()),
+            outputs=(output[0],),
+            signals=tuple(v for v, _ in self._signals.values()),
+            equations=ca.Function(
+                "equations",
+                [ca.SX.sym("time"), x, u, p, ca.vertcat(*w) if w else ca.SX(0, 1)],
+                [ca.vertcat(*following), output[1], ca.vertcat(*signals), ca.SX(0, 1)],
+                ["time", "state", "input", "parameter", "table"],
+                ["derivative", "output", "signal", "residual"],
+            ),
+            sample_time=self.sample_time,
+            origin=self.origin,
+            tables=tuple(table for table, _ in self._tables),
+            begin=self._begun(x, u, p, ca.vertcat(*w) if w else ca.SX(0, 1)),
+        )
+
+    def _begun(self, x: Expression, u: Expression, p: Expression, w: Expression) -> ca.Function:
+        """Return the states before the first sample, and those after a gap in the readings."""
+        first = ca.SX(ca.vertcat(*[self._beginning.get(name, ca.SX(0)) for name in self._states]))
+        own = [symbol for _, symbol in self._states.values()]
+        again = [self._resuming.get(name, symbol) for name, symbol in zip(self._states, own, strict=True)]
+        begun = ca.SX.zeros(len(own), 1)
+        for _ in range(_DEPTH):
+            begun = ca.substitute(first, ca.SX(x), begun)
+        return ca.Function("begin", [x, u, p, w], [ca.densify(begun), ca.densify(ca.vertcat(*again))])
+
+
+def limited(value: Expression, limit: Expression) -> Expression:
+    """Return a value within ±limit.
+
+    Parameters
+    ----------
+    value, limit
+        Of the same unit.
+    """
+    return ca.fmin(ca.fmax(value, -limit), limit)

@@ -1,0 +1,412 @@
+"""How far the estimate of an adaptive observer can be from the torque of its deck, whatever is measured.
+
+Its inner states get no correction and its slow states are held within ±limit. So the estimate
+Σⱼ (tⱼ(θ) + Σ_d s_d·tⱼ_d(θ))·ẑⱼ + t₀(θ) + Σ_d s_d·t₀_d(θ) differs from that of the same observer with all
+slow states at zero, which is a cascade with a bound of its own, only by what |s_d| ≤ limit can do. Current,
+friction and a load enter through the slow states alone, and these cannot leave their box.
+
+ẑ⁺ = (φ + Σ s_d·φ_d(θ))·ẑ + Σ_d s_d·(…) runs with its slow states inside: whether it stays in a box at all
+depends on the limit, since a linear φ(s) may reach 1. That is decided here, on the table as it is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....foundation.errors import ArrangementError, ValueRangeError
+from ....model import FlatModel
+from ..scheduling.scheduled import ObserverDesign
+from ..scheduling.step import ObserverStep
+from ..scheduling.table import ColumnPlace, Compact
+from .box_bound import clamped_estimate_bound
+from .certificate import declared_assumptions
+from .exact import corners
+from .torque_bound import OPERATIONS, ROUNDING, SLACK, Assumptions, torque_bound
+
+Array = NDArray[np.float64]
+
+LARGEST = 100.0
+"""Boxes up to so many times as wide as the range of an inner state at the deck are tried."""
+NARROWINGS = 5
+
+
+class LearningStep(Protocol):
+    """Step of an observer that learns."""
+
+    @property
+    def nominal(self) -> ObserverStep:
+        """With the declared numbers."""
+        ...
+
+    @property
+    def inner(self) -> int:
+        """Number of inner states."""
+        ...
+
+
+class Holding(Protocol):
+    """Settings that hold the slow states."""
+
+    @property
+    def limit(self) -> float:
+        """Largest size of a slow state, in deviations."""
+        ...
+
+    @property
+    def drift_time(self) -> float:
+        """Time in s in which a slow state fades."""
+        ...
+
+
+class LearningDesign(Protocol):
+    """An adaptive observer: inner states without correction, slow states within a limit."""
+
+    @property
+    def model(self) -> FlatModel:
+        """The observer."""
+        ...
+
+    @property
+    def step(self) -> LearningStep:
+        """Its step."""
+        ...
+
+    @property
+    def compact(self) -> Compact:
+        """Its table."""
+        ...
+
+    @property
+    def trust(self) -> Holding:
+        """Its settings."""
+        ...
+
+
+@dataclass(frozen=True)
+class HeldEstimateBound:
+    """Largest distance of an adaptive observer's estimate from the deck's torque, in N·m.
+
+    Parameters
+    ----------
+    learned
+        What the slow states can do to the estimate.
+    cascade
+        Bound of the same observer with all slow states at zero.
+    limit
+        Of the slow states, in deviations.
+    boxes
+        Range in which each inner state of the observer stays, by name.
+    """
+
+    learned: float
+    cascade: float
+    limit: float
+    boxes: Mapping[str, tuple[float, float]]
+
+    @property
+    def total(self) -> float:
+        """Largest distance in N·m."""
+        return (self.learned + self.cascade) * SLACK
+
+
+def held_estimate_bound(
+    model: FlatModel, design: LearningDesign, assumptions: Assumptions
+) -> HeldEstimateBound:
+    """Return the largest distance of an adaptive observer's estimate from the torque of its deck.
+
+    Parameters
+    ----------
+    model
+        Continuous; the deck's actuator, with the numbers of the deck.
+    design
+        Its adaptive observer.
+    assumptions
+        Ranges; without spreads, since the bound is from the torque of the deck.
+
+    Raises
+    ------
+    ArrangementError
+        If inner states are coupled, or the torque depends on more than angle and inner states.
+    ValueRangeError
+        If the assumptions have spreads or reach beyond the table, or the slow states may be so large that an
+        inner state is not held: with the largest limit at which it is.
+    UnknownNameError
+        If a parameter with a range does not exist.
+    """
+    if any(v > 0.0 for v in assumptions.spreads.values()):
+        raise ValueRangeError(
+            "spreads", "have no place here: the bound is from the torque of the deck",
+            next_step="leave the spreads out",
+        )  # fmt: skip
+    cascade = torque_bound(model, _nominal(design), assumptions).total
+    table, limit = _Table(design, ROUNDING[assumptions.real]), design.trust.limit
+    boxes = [table.box(k, limit) for k in range(table.inner)]
+    if any(box is None for box in boxes):
+        least, most = 0.0, limit
+        while most - least > 1e-3 * limit:
+            middle = (least + most) / 2.0
+            stays = all(table.box(k, middle) is not None for k in range(table.inner))
+            least, most = (middle, most) if stays else (least, middle)
+        name = table.names[next(k for k, box in enumerate(boxes) if box is None)]
+        raise ValueRangeError(
+            f"slow states up to {limit:g} deviations",
+            f"can keep '{name}' from decaying, so that no bound holds; it is held up to {least:.3g}",
+            next_step=f"design with Trust(limit={np.floor(20.0 * 0.98 * least) / 20.0:g})",
+        )
+    held = [box for box in boxes if box is not None]
+    return HeldEstimateBound(
+        learned=table.learned(held, limit) * SLACK, cascade=cascade, limit=limit,
+        boxes={n: (float(b[0]), float(b[1])) for n, b in zip(table.names, held, strict=True)},
+    )  # fmt: skip
+
+
+def _nominal(design: LearningDesign) -> ObserverDesign:
+    """Return the observer with all slow states at zero, as far as its inner states and estimate go."""
+    step = design.step.nominal
+    rows = {f"correction[{i}][0]": ColumnPlace(0.0) for i in range(len(step.plant.names))}
+    compact = replace(design.compact, places={**design.compact.places, **rows})
+    return ObserverDesign(design.model, step, compact)
+
+
+class _Table:
+    """The table of an adaptive observer at its grid points; between them all of it is linear."""
+
+    def __init__(self, design: LearningDesign, rounding: float) -> None:
+        # A slow state has faded by this share where the end of a sample is added.
+        self.faded = -np.expm1(-design.step.nominal.sample_time / design.trust.drift_time)
+        self.compact, plant = design.compact, design.step.nominal.plant
+        self.n, self.inner = len(plant.names), design.step.inner
+        self.names = plant.names[: self.inner]
+        places = self.compact.places
+        self.slow = sum(f"estimate.{d}[0][{self.n}]" in places for d in range(len(places)))
+        self.rounding = OPERATIONS * (1 + self.slow) * rounding
+        kinds = ["", *(f".{d}" for d in range(self.slow))]
+        for kind in kinds:
+            row = [f"next{kind}[{i}][{j}]" for i in range(self.inner) for j in range(self.n) if i != j]
+            row += [f"next{kind}[{i}][{j}]" for i in range(self.inner) for j in self._inputs(kind)]
+            wrong = [key for key in row if places[key].column is not None or places[key].factor != 0.0]
+            if wrong:
+                raise ArrangementError(
+                    f"bound of the estimate, entry {wrong[0]}",
+                    "another state or an input enters an inner state",
+                )  # fmt: skip
+
+    def _inputs(self, kind: str) -> range:
+        last = self.n + 1
+        while f"next{kind}[0][{last}]" in self.compact.places:
+            last += 1
+        return range(self.n + 1, last)
+
+    def read(self, key: str) -> Array:
+        """Return an entry at the grid points, shape (points,)."""
+        place = self.compact.places[key]
+        if place.column is None:
+            return np.full(len(self.compact.angles), place.factor)
+        column: Array = place.factor * self.compact.values[:, place.column]
+        return column
+
+    def deck_box(self, k: int) -> Array:
+        """Return the range of an inner state with all slow states at zero, shape (2,)."""
+        kept, drive, prior = (self.read(f"{key}[{k}][{j}]") for key, j in self._keys(k))
+        whole = 1.0 - float(np.max(kept))
+        return np.array([np.min(drive) + np.min(prior), np.max(drive) + np.max(prior)]) / whole
+
+    def _keys(self, k: int, d: int | None = None) -> list[tuple[str, int]]:
+        end = "" if d is None else f".{d}"
+        return [(f"next{end}", k), (f"next{end}", self.n), (f"prior{end}", 0)]
+
+    def box(self, k: int, limit: float) -> tuple[float, float] | None:
+        """Return a box that an inner state never leaves, or ``None`` where none was found.
+
+        The next state is affine in the state, in each slow state and, within cells, in both angles, so the
+        corners of the box and the grid points decide for all angles that follow each other, also by a jump.
+        """
+        deck = self.deck_box(k)
+        width = max(float(deck[1] - deck[0]), 1e-12)
+        middle = float(deck[0] + deck[1]) / 2.0
+
+        def tried(size: float) -> tuple[float, float] | None:
+            ends = middle - size * width / 2.0, middle + size * width / 2.0
+            low, high = self._reached(k, ends, limit)
+            return ends if low >= ends[0] and high <= ends[1] else None
+
+        size, stays_in = 1.0 + 1e-6, None
+        while stays_in is None and size <= LARGEST:
+            size, stays_in = 1.5 * size, tried(size)
+        least, most = size / 2.25, size / 1.5
+        for _ in range(NARROWINGS if stays_in is not None else 0):
+            between = (least + most) / 2.0
+            narrower = tried(between)
+            least, most = (between, most) if narrower is None else (least, between)
+            stays_in = narrower or stays_in
+        return stays_in
+
+    def _reached(self, k: int, box: tuple[float, float], limit: float) -> tuple[float, float]:
+        """Return the range of the next state from a box, over all angles and slow states."""
+        at = [[self.read(f"{key}[{k}][{j}]") for key, j in self._keys(k)]]
+        at += [[self.read(f"{key}[{k}][{j}]") for key, j in self._keys(k, d)] for d in range(self.slow)]
+        low, high, spare = np.inf, -np.inf, 0.0
+        for z in box:
+            kept, drive, prior = at[0]
+            middle = (kept * z + drive)[:, None] + prior[None, :]
+            room = self._moved(k, z, limit)
+            low = min(low, float(np.min(middle - room)))
+            high = max(high, float(np.max(middle + room)))
+            size = sum(
+                w * float(np.max(np.abs(kept * z)) + np.max(np.abs(drive)) + np.max(np.abs(prior)))
+                for w, (kept, drive, prior) in zip([1.0] + [limit] * self.slow, at, strict=True)
+            )
+            spare = max(spare, self.rounding * size)
+        return low - spare, high + spare
+
+    def _moved(self, k: int, z: float, limit: float) -> Array:
+        """Return what slow states can add to the next state, by angle before and after."""
+        total = np.zeros((len(self.compact.angles),) * 2)
+        for d in range(self.slow):
+            kept, drive, prior = (self.read(f"{key}[{k}][{j}]") for key, j in self._keys(k, d))
+            if not (np.any(kept) or np.any(drive) or np.any(prior)):
+                continue
+            both = (kept * z + drive)[:, None] + prior[None, :]
+            total += limit * (np.abs(both) + self.faded * np.abs(prior)[None, :])
+        return total
+
+    def _apart(self, k: int, box: tuple[float, float], limit: float) -> float:
+        """Return how far an inner state can be from where it is with all slow states at zero."""
+        deck = self.deck_box(k)
+        by_box = max(box[1] - float(deck[0]), float(deck[1]) - box[0])
+        kept = np.abs(self.read(f"next[{k}][{k}]"))
+        kept = kept + limit * sum(np.abs(self.read(f"next.{d}[{k}][{k}]")) for d in range(self.slow))
+        most = float(np.max(kept))
+        if most >= 1.0:
+            return by_box
+        moved = max(float(np.max(self._moved(k, float(z), limit))) for z in deck)
+        size = self.rounding * max(map(abs, box))
+        return min(by_box, (moved + size) / (1.0 - most))
+
+    def learned(self, boxes: list[tuple[float, float]], limit: float) -> float:
+        """Return how far the estimate can be from that with all slow states at zero."""
+        apart = [self._apart(k, box, limit) for k, box in enumerate(boxes)]
+        own = [self.read(f"estimate[0][{k}]") for k in range(self.inner)]
+        held = np.array([(-a, a) for a in apart] + [(-limit, limit)] * self.slow).reshape(-1, 2)
+        worst = 0.0
+        for z in corners([b[0] for b in boxes], [b[1] for b in boxes]):
+            slopes = []
+            for d in range(self.slow):
+                slope = self.read(f"estimate.{d}[0][{self.n}]").copy()
+                for k, value in enumerate(z):
+                    slope += value * self.read(f"estimate.{d}[0][{k}]")
+                slopes.append(slope)
+            rows = np.array([*own, *slopes]).T
+            size = float(np.max(np.abs(rows) @ np.concatenate([np.abs(z), np.full(self.slow, limit)])))
+            bound = clamped_estimate_bound(rows, held, np.zeros_like(held))
+            worst = max(worst, bound + self.rounding * size)
+        return worst
+
+
+def held_assumptions(model: FlatModel, design: LearningDesign) -> Assumptions:
+    """Return the whole table, and half a count of the encoder that the deck declares.
+
+    Parameters
+    ----------
+    model
+        Its readings say how the angle is measured.
+    design
+        The adaptive observer.
+    """
+    return declared_assumptions(model, _nominal(design))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldEstimateCertificate:
+    """What is proved of an adaptive observer.
+
+    Parameters
+    ----------
+    deck
+        Name and text of the deck; empty where the model came from elsewhere.
+    parameters
+        Values of the model by name.
+    estimate, measured
+        Torque and angle by name.
+    sample_time
+        In s.
+    settings
+        Numbers of the settings of trust by name.
+    assumptions
+        Of the bound.
+    bound
+        The bound.
+    code
+        SHA-256 of the C files by name.
+    """
+
+    deck: tuple[str, str]
+    parameters: Mapping[str, float]
+    estimate: str
+    measured: str
+    sample_time: float
+    settings: Mapping[str, float]
+    assumptions: Assumptions
+    bound: HeldEstimateBound
+    code: Mapping[str, str]
+
+    @property
+    def statement(self) -> tuple[str, ...]:
+        """Return in sentences what is proved, and what is not."""
+        a, b = self.assumptions, self.bound
+        boxes = ", ".join(f"'{n}' from {low:.4g} to {high:.4g}" for n, (low, high) in b.boxes.items())
+        return (
+            f"The estimated torque stays within {b.total:.4g} N·m of that of the deck's model (of which "
+            f"{b.cascade:.3g} without slow states), for every current and friction, every motion from "
+            f"{a.angles[0]:.4g} to {a.angles[1]:.4g} rad with at most {a.speed:g} rad/s, and an angle "
+            f"measured to {a.angle_error:.3g} rad, with slow states within ±{b.limit:g} deviations and "
+            f"inner states begun in their boxes: {boxes or 'there are none'}.",
+            "This bounds what wrong currents can do to the estimate; it is not the error that is reached, "
+            "and no convergence is claimed.",
+        )
+
+
+def certify_held_estimate(
+    model: FlatModel,
+    design: LearningDesign,
+    *,
+    assumptions: Assumptions,
+    settings: Mapping[str, float],
+    deck: tuple[str, str] = ("", ""),
+    code: Mapping[str, str] | None = None,
+) -> HeldEstimateCertificate:
+    """Certify that the estimate of an adaptive observer stays near the torque of its deck.
+
+    Parameters
+    ----------
+    model
+        Continuous; what the observer was designed on, with the numbers of the deck.
+    design
+        The adaptive observer.
+    assumptions
+        Ranges, without spreads.
+    settings
+        Numbers of its settings of trust by name, so that it can be designed again.
+    deck
+        Name and text.
+    code
+        SHA-256 of the C files by name.
+
+    Raises
+    ------
+    ValueRangeError
+        If no bound holds, with the largest limit of the slow states at which one does.
+    ArrangementError
+        If the structure of the rubber allows none.
+    """
+    plant = design.step.nominal.plant
+    return HeldEstimateCertificate(
+        deck=deck, parameters=model.values, estimate=plant.estimate.name, measured=plant.angle,
+        sample_time=design.step.nominal.sample_time, settings=dict(settings), assumptions=assumptions,
+        bound=held_estimate_bound(model, design, assumptions), code={} if code is None else dict(code),
+    )  # fmt: skip

@@ -1,0 +1,328 @@
+"""Re-checks a certificate without the solver that found it: in fractions and in interval arithmetic."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from ....foundation.errors import NlsError
+from ....foundation.prefixes import prefixed
+from ....model import FlatModel
+from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
+from ..scheduling.table import Grid
+from .certificate import Certificate, contracts, hashes_of_code, within_condition
+from .certificate_file import Proof
+from .co_design import GainAndLyapunov
+from .continuous import ContinuousCertificate, covers, decays
+from .error_system import error_system
+from .held_estimate import HeldEstimateCertificate, LearningDesign, held_estimate_bound
+from .polytope import ErrorPolytope, error_polytope
+from .torque_bound import TorqueErrorBound, torque_bound
+
+SAME = 1e-9
+"""Relative difference of numbers that another machine may compute for the same table."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was looked at.
+
+    Parameters
+    ----------
+    name
+        What.
+    holds
+        ``None`` where it could not be looked at.
+    detail
+        What was again.
+    """
+
+    name: str
+    holds: bool | None
+    detail: str
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What a re-check of a certificate found.
+
+    Parameters
+    ----------
+    checks
+        In the order in which they were made.
+    """
+
+    checks: tuple[Check, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing that was looked at failed."""
+        return all(check.holds is not False for check in self.checks)
+
+    def __str__(self) -> str:
+        words = {True: "holds", False: "DOES NOT HOLD", None: "not compared"}
+        return "\n".join(f"{words[c.holds]}: {c.name} ({c.detail})" for c in self.checks)
+
+
+class WritesCode(Protocol):
+    """Writes an observer as C."""
+
+    def __call__(self, observer: FlatModel, folder: Path, /, *, real: str, name: str) -> object:
+        """Write ``<name>.c`` and ``<name>.h``."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class CodeToCompare:
+    """C files that should be those of a certificate.
+
+    Parameters
+    ----------
+    folder
+        Where they are.
+    writes
+        Writes the observer of the certificate anew, :func:`~nlsdesign.export.export_c`; without it only
+        hashes are compared, which a forger can write anew too.
+    """
+
+    folder: Path
+    writes: WritesCode | None = None
+
+
+def verify(
+    certificate: Proof,
+    *,
+    untouched: bool = True,
+    model: FlatModel | None = None,
+    deck: str | None = None,
+    code: Path | CodeToCompare | None = None,
+    design: LearningDesign | None = None,
+    grid: Grid | None = None,
+) -> Verification:
+    """Check a certificate again.
+
+    Parameters
+    ----------
+    certificate
+        As :func:`~nlsdesign.feedback.observer.certificates.certificate_file.read_certificate` gives it.
+    untouched
+        Whether checksum and sentences of the file are those of its numbers.
+    model
+        Flat model of its deck; without it the table and the bound on the torque are not compared.
+    deck
+        Text of a deck that should be the certified one.
+    code
+        Folder of C files that should be the certified ones; with what writes them they are written anew from
+        the deck and compared character by character.
+    design
+        Of a bound on the estimate of an adaptive observer: that observer, designed again with the settings of
+        the certificate.
+    grid
+        With which a scheduled observer was designed, if not the default one.
+    """
+    checks = [Check("file", untouched, "checksum and sentences agree with the numbers" if untouched
+                    else "a character differs from what was written")]  # fmt: skip
+    observer: FlatModel | None = None
+    if isinstance(certificate, Certificate):
+        checks += _contraction(certificate)
+        again = _designed_again(certificate, model, grid)
+        checks += _against_model(certificate, model, again)
+        observer = again[1].model if isinstance(again, tuple) else None
+    elif isinstance(certificate, ContinuousCertificate):
+        checks += _decay(certificate, model)
+    else:
+        checks.append(_held(certificate, model, design))
+        observer = None if design is None else design.model
+    if deck is not None:
+        same = _hash(deck) == _hash(certificate.deck[1])
+        checks.insert(1, Check("deck", same, f"sha256 {_hash(deck)[:12]}"))
+    named = {} if isinstance(certificate, ContinuousCertificate) else certificate.code
+    if code is not None:
+        compare = code if isinstance(code, CodeToCompare) else CodeToCompare(code)
+        checks.append(_against_code(certificate, compare, observer))
+    elif named:
+        checks.append(Check("C code", None, "name its folder with --c"))
+    return Verification(tuple(checks))
+
+
+def _contraction(certificate: Certificate) -> list[Check]:
+    p = certificate.lyapunov
+    holds = bool(np.all(np.isfinite(p))) and certificate.decay > 0.0
+    holds = holds and contracts(certificate.polytope, p, certificate.decay)
+    condition = holds and within_condition(p, certificate.condition)
+    return [
+        Check("contraction", holds, f"decay {certificate.decay:g} 1/s at every corner, in fractions"),
+        Check("condition of P", condition, f"at most {certificate.condition:g}"),
+    ]
+
+
+def _decay(certificate: ContinuousCertificate, model: FlatModel | None) -> list[Check]:
+    p, system = certificate.lyapunov, certificate.system
+    solution = GainAndLyapunov(np.array(certificate.gain), p)
+    holds = bool(np.all(np.isfinite(p)) and certificate.decay > 0.0)
+    holds = holds and decays(system, solution, certificate.decay)
+    condition = holds and within_condition(p, certificate.condition)
+    checks = [
+        Check("decay", holds, f"{certificate.decay:g} 1/s at every corner, in fractions"),
+        Check("condition of P", condition, f"at most {certificate.condition:g}"),
+    ]
+    if model is None:
+        return [*checks, Check("ranges of A", None, "needs the deck")]
+    try:
+        changed = model.with_values(dict(certificate.parameters))
+        again = error_system(
+            changed, certificate.form, estimate=certificate.estimate, measured=certificate.measured,
+            angles=system.angles,
+        )  # fmt: skip
+    except NlsError as error:  # the deck does not give this error system, whatever the reason
+        return [*checks, Check("ranges of A", False, str(error))]
+    words = "bounded again over every angle and speed" + _others(certificate, model)
+    return [*checks, Check("ranges of A", covers(system, again), words)]
+
+
+def _others(certificate: Proof, model: FlatModel) -> str:
+    declared = model.values
+    others = [n for n, v in certificate.parameters.items() if declared[n] != v]
+    return f"; {len(others)} parameters differ from the deck: {', '.join(others[:3])}" if others else ""
+
+
+def _held(
+    certificate: HeldEstimateCertificate, model: FlatModel | None, design: LearningDesign | None
+) -> Check:
+    name, claimed = "bound of the estimate", certificate.bound
+    if model is None or design is None:
+        return Check(name, None, "needs the deck, and the observer designed again from it")
+    try:
+        changed = model.with_values(dict(certificate.parameters))
+        again = held_estimate_bound(changed, design, certificate.assumptions)
+    except NlsError as error:  # nothing can be bounded, so nothing may be claimed
+        return Check(name, False, str(error))
+    room = 1.0 + 1e-6
+    same = again.limit == claimed.limit and again.boxes.keys() == claimed.boxes.keys()
+    parts = again.learned <= claimed.learned * room and again.cascade <= claimed.cascade * room
+    boxes = same and all(
+        claimed.boxes[n][0] <= low + 1e-6 * (high - low) and claimed.boxes[n][1] >= high - 1e-6 * (high - low)
+        for n, (low, high) in again.boxes.items()
+    )
+    words = f"{again.total:.4g} N·m found again" + _others(certificate, model)
+    return Check(name, same and parts and boxes, words)
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _against_code(certificate: Proof, code: CodeToCompare, observer: FlatModel | None) -> Check:
+    if isinstance(certificate, ContinuousCertificate) or not certificate.code:
+        return Check("C code", False, "the certificate names no C files")
+    hashed = hashes_of_code(code.folder)
+    wrong = [name for name, digest in certificate.code.items() if hashed.get(name) != digest]
+    if wrong:
+        return Check("C code", False, f"{', '.join(wrong)} differs or is missing")
+    if code.writes is None or observer is None:
+        return Check("C code", True, f"{', '.join(certificate.code)}: hashes only, not written anew")
+    with TemporaryDirectory() as folder:
+        for name in sorted({Path(file).stem for file in certificate.code}):
+            code.writes(observer, Path(folder), real=certificate.assumptions.real, name=name)
+        wrong = [file for file in certificate.code if _differs(Path(folder), code.folder, file)]
+    if wrong:
+        return Check(
+            "C code", False, f"{', '.join(wrong)} is not what the deck gives, though its hash is named"
+        )
+    return Check("C code", True, f"{', '.join(certificate.code)}: written anew from the deck")
+
+
+def _differs(one: Path, other: Path, name: str) -> bool:
+    again = one / name
+    return not again.is_file() or again.read_bytes() != (other / name).read_bytes()
+
+
+Again: TypeAlias = tuple[FlatModel, ObserverDesign] | Check
+
+
+def certified_design(
+    certificate: Certificate, model: FlatModel, *, grid: Grid | None = None
+) -> ObserverDesign:
+    """Return the observer of a certificate, designed from its deck with its gain: what belongs into C.
+
+    Parameters
+    ----------
+    certificate
+        Of a scheduled observer.
+    model
+        Flat model of its deck.
+    grid
+        With which it was designed, if not the default one.
+
+    Raises
+    ------
+    NlsError
+        If the model does not give this observer.
+    """
+    return design_observer_with_details(
+        model.with_values(dict(certificate.parameters)), estimate=certificate.estimate,
+        measured=certificate.measured, sample_time=certificate.polytope.sample_time,
+        gain=certificate.gain, grid=grid,
+    )  # fmt: skip
+
+
+def _designed_again(certificate: Certificate, model: FlatModel | None, grid: Grid | None) -> Again:
+    if model is None:
+        return Check("table and torque bound", None, "needs the deck")
+    try:
+        changed = model.with_values(dict(certificate.parameters))
+        return changed, certified_design(certificate, model, grid=grid)
+    except NlsError as error:  # the deck does not give this observer, whatever the reason
+        return Check("table", False, str(error))
+
+
+def _against_model(certificate: Certificate, model: FlatModel | None, again: Again) -> list[Check]:
+    if model is None or isinstance(again, Check):
+        return [again] if isinstance(again, Check) else []
+    changed, design = again
+    same = _same(certificate.polytope, error_polytope(design))
+    return [
+        Check("table", same, "designed again from the deck" + _others(certificate, model)),
+        _torque(certificate, changed, design),
+    ]
+
+
+def _same(a: ErrorPolytope, b: ErrorPolytope) -> bool:
+    """Return whether two polytopes are the same but for the last digits of another machine."""
+    if (a.states, a.moving, a.seen, a.sample_time) != (b.states, b.moving, b.seen, b.sample_time):
+        return False
+    if len(a.columns) != len(b.columns) or a.friction[0] > b.friction[0] or a.friction[1] < b.friction[1]:
+        return False
+    first, second = a.corners(), b.corners()
+    used = [e.column for row in (*a.transition, *b.transition) for e in row]
+    same = (
+        first.shape == second.shape and [e.column for r in a.transition for e in r] == used[: len(used) // 2]
+    )
+    return same and bool(np.allclose(first, second, rtol=SAME, atol=SAME) and np.allclose(
+        np.array(a.columns).ravel(), np.array(b.columns).ravel(), rtol=SAME, atol=1e-15
+    )) and a.sizes == b.sizes  # fmt: skip
+
+
+def _torque(certificate: Certificate, model: FlatModel, design: ObserverDesign) -> Check:
+    claimed = certificate.torque
+    if isinstance(claimed, str):
+        return Check("torque bound", None, f"none is claimed: {claimed}")
+    try:
+        again = torque_bound(model, design, certificate.assumptions)
+    except NlsError as error:  # nothing can be bounded, so nothing may be claimed
+        return Check("torque bound", False, str(error))
+    return Check("torque bound", _covers(claimed, again), f"{prefixed(again.total, digits=4)} found again")
+
+
+def _covers(claimed: TorqueErrorBound, again: TorqueErrorBound) -> bool:
+    causes = all(value <= claimed.causes[name] * (1.0 + 1e-6) + 1e-12 for name, value in again.causes.items())
+    start = claimed.start.keys() == again.start.keys() and all(
+        claimed.start[n][0] * (1.0 + 1e-6) >= torque and claimed.start[n][1] <= rate * (1.0 + 1e-6)
+        for n, (torque, rate) in again.start.items()
+    )
+    return causes and start

@@ -1,0 +1,290 @@
+"""Brings a flat model into the form ẋ = A(θ)x + g(θ) + b(θ)·δ̇ + E·d(u) + friction(ω), and checks it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from ....foundation.errors import ArrangementError
+from ....model import FlatModel
+from ...analysis.rest import RestSolver, evaluate_rows
+from .plant import Coefficients
+
+Array = NDArray[np.float64]
+
+ADDITIVE_LIMIT = 1e-6
+"""Largest part of the equations, relative to the largest rate, that may be missed by the form above."""
+FINE = 2.5e-4
+"""Distance in rad of the nodes at which what follows the speed is summed up, a quarter of a sharp corner."""
+
+
+@dataclass(frozen=True)
+class ScheduledNames:
+    """Which variable of a model plays which role.
+
+    Parameters
+    ----------
+    angle, speed
+        States.
+    speed_size
+        Typical speed in rad/s.
+    angles
+        Ascending, shape (n,): the range in which the form is wanted.
+    consistent
+        States that agree with a signal at rest, as for :func:`~nlsdesign.feedback.analysis.rest.rest_states`.
+    rate
+        Input that is the rate of a measured state, if there is one.
+    """
+
+    angle: str
+    speed: str
+    speed_size: float
+    angles: Array
+    consistent: Mapping[str, str]
+    rate: str | None = None
+
+
+class AngleForm:
+    """Evaluates one model in the form above; states in the order of the observer: inner ones, angle, speed.
+
+    Parameters
+    ----------
+    model
+        Continuous; its first output is what is wanted.
+    layout
+        Which variable plays which role.
+    """
+
+    def __init__(self, model: FlatModel, layout: ScheduledNames) -> None:
+        names = [v.name for v in model.states]
+        moving = [names.index(layout.angle), names.index(layout.speed)]
+        self.model, self.layout = model, layout
+        self.order = [i for i in range(len(names)) if i not in moving] + moving
+        self.n, self.inner = len(names), len(names) - len(moving)
+        # Places among the states of the model, and in the order of the observer.
+        self.angle_state, self.speed_state = moving
+        self.angle, self.speed = (self.order.index(place) for place in moving)
+        self.p, self.u = model.start(model.parameters), model.start(model.inputs)
+        self.free_inputs = [i for i, v in enumerate(model.inputs) if v.name != layout.rate]
+        s = model.symbols()
+        x = ca.vertcat(*[s.state[i] for i in self.order])
+        rate = ca.vertcat(*[s.derivative[i] for i in self.order])
+        led = s.input[[v.name for v in model.inputs].index(layout.rate)] if layout.rate else ca.SX.sym("none")
+        arguments, wanted = [s.time, s.state, s.input, s.parameter], s.output[0]
+
+        def slopes(of: ca.SX, by: ca.SX) -> ca.SX:
+            return ca.densify(ca.jacobian(of, by))
+
+        self.rates_and_estimate = ca.Function("values", arguments, [rate, wanted])
+        self._slopes = ca.Function(
+            "slopes", arguments, [rate, slopes(rate, x), wanted, slopes(wanted, x), slopes(rate, led)]
+        )
+        follow = slopes(rate[: self.inner], x[self.speed]) if self.inner else ca.SX(0, 1)
+        self._follow = ca.Function("follow", arguments, [follow])
+        self._rest = RestSolver(model, angle=layout.angle, consistent=layout.consistent)
+        self._rested: tuple[Array, Array] | None = None
+        self._sum = self._summed()
+
+    def with_values(self, values: Mapping[str, float]) -> AngleForm:
+        """Return the same form of the model with other numbers.
+
+        Parameters
+        ----------
+        values
+            In SI by name.
+        """
+        other = copy.copy(self)
+        other.model = self.model.with_values(values)
+        other.p = other.model.start(other.model.parameters)
+        other._rested = None
+        other._sum = other._summed()
+        return other
+
+    def rest(self, angles: Array) -> Array:
+        """Return rest states in the order of the observer, shape (N, n).
+
+        Parameters
+        ----------
+        angles
+            Shape (N,).
+        """
+        ordered: Array = self.rest_in_model_order(angles)[:, self.order]
+        return ordered
+
+    def at(self, angles: Array) -> Coefficients:
+        """Return the coefficients at many angles.
+
+        Parameters
+        ----------
+        angles
+            Shape (N,).
+        """
+        rest, n, k, count = self.rest_in_model_order(angles), self.n, self.inner, len(angles)
+        rate, jacobian, wanted, row, led = evaluate_rows(self._slopes, rest, self.u, self.p)
+        # Slopes in the speed are those of the moving actuator: dry friction has none there.
+        _, moving, _, moving_row, _ = evaluate_rows(
+            self._slopes, _moving(rest, self.speed_state, self.layout.speed_size), self.u, self.p
+        )
+        a, shift = jacobian.reshape(-1, n, n).copy(), np.zeros((count, n))
+        shift[:, :k] = self._shift(angles)
+        a[:, :, self.angle] = 0.0
+        a[:, :, self.speed] = moving.reshape(-1, n, n)[:, :, self.speed]
+        a[:, :k, self.speed] = 0.0
+        carried = rest[:, self.order[:k]] - shift[:, :k]
+        drive = rate - np.einsum("aij,aj->ai", a[:, :, :k], carried)
+        row[:, self.angle], row[:, self.speed] = 0.0, moving_row[:, self.speed]
+        offset = wanted[:, 0] - np.einsum("aj,aj->a", row[:, :k], carried)
+        measured = rest[:, [i for i, v in enumerate(self.model.states) if v.name in self.layout.consistent]]
+        return Coefficients(a, drive, shift, np.column_stack([row, offset]), led, measured)
+
+    def driven(self) -> tuple[ca.Function, tuple[int, ...]]:
+        """Return what the inputs add to the rates, u -> d, and the states whose rates these are."""
+        u = ca.SX.sym("input", len(self.free_inputs))
+        x0 = self.rest_in_model_order(np.zeros(1))[0]
+        free = self.free_inputs
+        given = ca.vertcat(*[u[free.index(i)] if i in free else float(v) for i, v in enumerate(self.u)])
+        added = (
+            self.rates_and_estimate(0.0, x0, given, self.p)[0]
+            - self.rates_and_estimate(0.0, x0, self.u, self.p)[0]
+        )
+        values = _sampled(ca.Function("driven", [u], [added]), 1.0)
+        scale = max(float(np.max(np.abs(values), initial=0.0)), 1e-300)
+        rows = tuple(int(i) for i in np.flatnonzero(np.max(np.abs(values), axis=0) > 1e-12 * scale))
+        return ca.Function("driven", [u], [ca.vertcat(*[added[i] for i in rows])]), rows
+
+    def friction(self) -> ca.Function | None:
+        """Return what the speed adds to its own rate beyond its linear part, ω -> ω̇; ``None`` for nothing."""
+        speed, x0 = ca.SX.sym("speed"), self.rest_in_model_order(np.zeros(1))[0]
+        slope = float(self.at(np.zeros(1)).a[0, self.speed, self.speed])
+        x = ca.vertcat(*[speed if i == self.speed_state else x0[i] for i in range(len(x0))])
+        moving, still = (self.rates_and_estimate(0.0, at, self.u, self.p)[0][self.speed] for at in (x, x0))
+        function = ca.Function("friction", [speed], [moving - still - slope * speed])
+        size = self.layout.speed_size
+        values = _sampled(function, size)
+        # Where nothing is left but rounding, there is no friction beyond the linear part.
+        return function if np.max(np.abs(values)) > 1e-10 * abs(slope) * size + 1e-12 * size else None
+
+    def check_additive(
+        self, driven: ca.Function, rows: Sequence[int], friction: ca.Function | None, sizes: Array
+    ) -> None:
+        """Raise unless the rates have the form, at random angles, speeds and inputs and rested inner states.
+
+        Parameters
+        ----------
+        driven, rows, friction
+            As :meth:`driven` and :meth:`friction` gave them.
+        sizes
+            Typical sizes of the states, shape (n,).
+
+        Raises
+        ------
+        ArrangementError
+            With the name of the state whose rate does not have the form.
+        """
+        draw, angles = np.random.default_rng(2), self.layout.angles
+        at = draw.uniform(angles[0], angles[-1], 40)
+        speeds = self.layout.speed_size * draw.normal(size=40)
+        inputs = np.tile(self.u, (40, 1))
+        inputs[:, self.free_inputs] = draw.normal(size=(40, len(self.free_inputs)))
+        x = self.rest_in_model_order(at)
+        x[:, self.speed_state] = speeds
+        rate, _ = evaluate_rows(self.rates_and_estimate, x, inputs, self.p)
+        c = self.at(at)
+        form = np.einsum("aij,aj->ai", c.a, x[:, self.order] - c.shift) + c.drive
+        form[:, : self.inner] += self._followed(at) * speeds[:, None]
+        for i, (speed, u) in enumerate(zip(speeds, inputs[:, self.free_inputs], strict=True)):
+            form[i, list(rows)] += np.array(driven(u)).ravel()
+            form[i, self.speed] += 0.0 if friction is None else float(friction(speed))
+        # At rest the rates of the inner states vanish; they are measured by what they would be far from it.
+        scale = np.maximum(np.max(np.abs(rate), axis=0), np.max(np.abs(c.a) @ sizes, axis=0))
+        missed = np.max(np.abs(rate - form), axis=0) / np.maximum(scale, 1e-300)
+        worst = int(np.argmax(missed))
+        if missed[worst] > ADDITIVE_LIMIT:
+            raise ArrangementError(
+                f"observer: rate of '{self.model.states[self.order[worst]].name}'",
+                "is not a sum of functions of angle, speed and inputs, and a part linear in the other states",
+                next_step="friction inside the spring that follows its speed, as of a cable on a guide "
+                "(CapstanFriction), or a load that moves, has no observer over one angle: take the "
+                "friction out of the spring, or hold the load",
+            )
+
+    def affine_error(self) -> float:
+        """Return how far the estimate is from its tangent in the inner states, share of its largest value.
+
+        Taken where the angle jumps from zero to any angle, and from both ends of the range.
+        """
+        angles, k = self.layout.angles, self.inner
+        if not k:
+            return 0.0
+        c, x, before = (
+            self.at(angles),
+            self.rest_in_model_order(angles),
+            np.array([0.0, angles[0], angles[-1]]),
+        )
+        off, largest = 0.0, 1e-300
+        for carried in self.rest(before)[:, :k] - self._shift(before):
+            x[:, self.order[:k]] = carried + c.shift[:, :k]
+            wanted = evaluate_rows(self.rates_and_estimate, x, self.u, self.p)[1][:, 0]
+            tangent = c.estimate[:, :k] @ carried + c.estimate[:, -1]
+            off = max(off, float(np.max(np.abs(wanted - tangent))))
+            largest = max(largest, float(np.max(np.abs(wanted))))
+        return off / largest
+
+    # --- inside ---------------------------------------------------------------------------------------
+
+    def rest_in_model_order(self, angles: Array) -> Array:
+        """Return rest states in the order of the model, shape (N, n).
+
+        Parameters
+        ----------
+        angles
+            Shape (N,).
+        """
+        if self._rested is None or not np.array_equal(self._rested[0], angles):
+            self._rested = angles.copy(), self._rest(self.model, angles)
+        return self._rested[1].copy()
+
+    def _followed(self, angles: Array) -> Array:
+        """Return ∂ż/∂ω of the inner states, shape (N, inner); it may depend on the angle only."""
+        x = np.tile(self.model.start(self.model.states), (len(angles), 1))
+        x[:, self.angle_state] = angles
+        slopes: Array = evaluate_rows(
+            self._follow, _moving(x, self.speed_state, self.layout.speed_size), self.u, self.p
+        )[0]
+        return slopes
+
+    def _shift(self, angles: Array) -> Array:
+        """Return Q(θ), shape (N, inner)."""
+        shift: Array = np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
+        return shift
+
+    def _summed(self) -> CubicHermiteSpline | None:
+        """Return Q = ∫₀^θ ∂ż/∂ω dθ as a spline with its exact slope at fine nodes, zero among them."""
+        low, high = min(0.0, float(self.layout.angles[0])), max(0.0, float(self.layout.angles[-1]))
+        if not self.inner or not np.any(self._followed(np.linspace(low, high, 7))):
+            return None
+        below, above = int(np.ceil(-low / FINE)), int(np.ceil(high / FINE))
+        # Node, middle, node: Simpson's rule.
+        slopes = self._followed(FINE / 2.0 * np.arange(-2.0 * below, 2.0 * above + 1.0))
+        parts = (slopes[:-2:2] + 4.0 * slopes[1:-1:2] + slopes[2::2]) * (FINE / 6.0)
+        whole = np.vstack([np.zeros((1, self.inner)), np.cumsum(parts, axis=0)])
+        return CubicHermiteSpline(np.arange(-below, above + 1) * FINE, whole - whole[below], slopes[::2])
+
+
+def _moving(x: Array, place: int, speed: float) -> Array:
+    """Return the states with a speed instead of rest."""
+    moved = x.copy()
+    moved[:, place] = speed
+    return moved
+
+
+def _sampled(function: ca.Function, size: float) -> Array:
+    """Return the results of a function of one vector at random arguments of a size, one row each."""
+    draw, width = np.random.default_rng(1), function.size1_in(0)
+    return np.array([np.array(function(size * draw.normal(size=width))).ravel() for _ in range(16)])

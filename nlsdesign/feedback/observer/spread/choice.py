@@ -1,0 +1,194 @@
+"""Which observer errs least over the spread of the deck, and the one that is designed where none is named."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError
+from ....foundation.prefixes import prefixed
+from ....foundation.quantity import typeset_unit
+from ....model import FlatModel
+from ....model.roles import measured_motion, spring_torque
+from ....simulation.sampled_batch import run_batch
+from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
+from ..adaptive.adaptive_settings import AdaptiveSettings
+from ..adaptive.adaptive_variables import SPREAD
+from ..scheduling.forms import StateForm
+from ..scheduling.gains import FittedGain, GainRule
+from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details
+from ..scheduling.table import Grid
+from .observer_bench import observer_bench
+
+
+@dataclass(frozen=True, eq=False)
+class ObserverOfChoice:
+    """The observer that errs least over the spread, and why it was taken.
+
+    Parameters
+    ----------
+    design
+        Adaptive where that helps, else the cascade.
+    reason
+        One sentence with the errors that decided.
+    expected
+        Root mean square torque error over the spread, to first order, along the duty: of the cascade, and of
+        the adaptive observer where it could be designed.
+    """
+
+    design: AdaptiveDesign | ObserverDesign
+    reason: str
+    expected: tuple[float, ...]
+
+    @property
+    def model(self) -> FlatModel:
+        """The observer; its description ends with the reason."""
+        model = self.design.model
+        return replace(model, description=f"{model.description}; {self.reason}")
+
+
+def choose_observer(
+    model: FlatModel,
+    *,
+    estimate: str | None = None,
+    measured: str | None = None,
+    sample_time: float = 1e-3,
+    settings: AdaptiveSettings | None = None,
+    grid: Grid | None = None,
+) -> ObserverOfChoice:
+    """Return the observer that errs least over the spread of the deck.
+
+    Compared are, to first order, the error of the cascade, which takes the numbers of the deck for granted,
+    and that which the adaptive filter expects of itself along one run of the bench with these numbers.
+    :func:`~nlsdesign.feedback.observer.observer_errors` measures both on drawn machines.
+
+    Parameters
+    ----------
+    model, estimate, measured, sample_time
+        As for :func:`design_observer`.
+    settings
+        What is known, what the actuator does, and how far the equations are trusted.
+    grid
+        As for :func:`design_observer`.
+
+    Raises
+    ------
+    UnknownNameError
+        If a name does not exist.
+    ArrangementError
+        If the equations cannot be scheduled over one angle.
+    ValueRangeError
+        If the model is discrete, the estimate is far from linear in the inner states, or a setting is out of
+        range.
+    ConvergenceError
+        If a table does not keep its error bound.
+    """
+    check_sampling(model, sample_time)
+    settings = settings or AdaptiveSettings()
+    cascade = design_observer_with_details(
+        model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
+    )
+    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
+    unit = typeset_unit(model.variable(estimate).unit)
+    try:
+        adaptive = design_adaptive_observer(
+            model, estimate=estimate, measured=measured, sample_time=sample_time, settings=settings, grid=grid
+        )
+        learned = _expected(model, adaptive, settings)
+    except (ArrangementError, ValueRangeError, ConvergenceError) as error:
+        # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
+        return ObserverOfChoice(cascade, f"cascade, for no adaptive observer can be designed: {error}", ())
+    effects = adaptive.directions.effect * adaptive.directions.torque_share
+    alone = math.hypot(float(np.linalg.norm(effects)), adaptive.directions.left_out)
+    sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
+    both = f"expected over the spread {sizes} of the cascade"
+    if learned < alone:
+        return ObserverOfChoice(adaptive, f"adaptive: {both}", (alone, learned))
+    return ObserverOfChoice(cascade, f"cascade: the adaptive one has {both}", (alone, learned))
+
+
+def _expected(model: FlatModel, design: AdaptiveDesign, settings: AdaptiveSettings) -> float:
+    """Return the deviation that the filter expects along the bench with the numbers of the deck."""
+    plant = design.step.nominal.plant
+    bench = observer_bench(
+        model, duty=settings.duty, estimate=plant.estimate.name, measured=plant.angle,
+        sample_time=design.step.nominal.sample_time,
+    )  # fmt: skip
+    name = f"observer.{plant.estimate.name}.{SPREAD}"
+    batch = run_batch(bench.system({"observer": design.model}), bench.stop, inputs=bench.inputs, keep=[name])
+    counted = np.zeros(len(batch.time), dtype=bool)
+    for _, first, last in bench.stretches:
+        counted |= (batch.time >= first) & (batch.time < last)
+    deviation = batch[name][0, counted]
+    if not np.all(np.isfinite(deviation)):
+        raise ConvergenceError(
+            f"bench of {model.name}", "does not stay finite",
+            next_step="use a smaller torque or lower frequencies in the duty",
+        )  # fmt: skip
+    return float(np.sqrt(np.mean(deviation**2)))
+
+
+def design_observer(
+    model: FlatModel,
+    *,
+    estimate: str | None = None,
+    measured: str | None = None,
+    sample_time: float = 1e-3,
+    gain: GainRule | FittedGain | None = None,
+    form: StateForm | None = None,
+    grid: Grid | None = None,
+) -> FlatModel:
+    """Design an observer that estimates a torque from a measured angle and the known inputs.
+
+    Without ``gain`` and ``form`` it is the one that errs least over the spread of the deck, as
+    :func:`choose_observer` says; its description gives the reason. With one of them it is a scheduled
+    observer of that kind, designed at the declared numbers.
+
+    Its inputs are the measured angle and the inputs of the model, held over the coming sample; its outputs
+    the estimate, the states, and the innovation. A name is that of the plant; what the plant does not have
+    carries an ending: ``.memory`` is what goes from sample to sample, ``.innovation`` the measured minus
+    the expected angle, ``.estimate`` the estimate of the angle itself, whose name the input has;
+    ``.standard_deviation`` what an adaptive observer expects of its estimate, ``.deviation[i]`` its slow
+    states.
+
+    Parameters
+    ----------
+    model
+        Continuous, load fixed.
+    estimate
+        Output or signal that is wanted; by default the torque of the series spring.
+    measured
+        State that is measured and over which everything is scheduled; by default the motion of the driven
+        body.
+    sample_time
+        In s.
+    gain
+        Rule for the correction of a scheduled observer, at each angle or for all angles together.
+    form
+        Which states a scheduled observer carries;
+        :class:`~nlsdesign.feedback.observer.scheduling.forms.Minimal` where only a gain is named.
+    grid
+        Range and number of grid points; the whole contour of the cam by default.
+
+    Raises
+    ------
+    UnknownNameError
+        If a name does not exist.
+    ArrangementError
+        If the equations cannot be scheduled over one angle, or the structure does not say what is estimated
+        or measured.
+    ValueRangeError
+        If the estimate is far from linear in the inner states, or a setting is out of range.
+    ConvergenceError
+        If a gain cannot be found, or the table does not keep its error bound.
+    """
+    if gain is None and form is None:
+        chosen = choose_observer(
+            model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
+        )
+        return chosen.model
+    return design_observer_with_details(
+        model, estimate=estimate, measured=measured, sample_time=sample_time, gain=gain, form=form, grid=grid
+    ).model

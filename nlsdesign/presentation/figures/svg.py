@@ -1,0 +1,210 @@
+"""Figures as SVG: the same bytes for the same figure, with colours that follow the page."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from ...foundation.errors import ExportError, nearest
+from ...foundation.writing import write_bytes
+from .style import STYLE, TONES, alternative_text
+
+_SVG = "{http://www.w3.org/2000/svg}"
+_LINK = "{http://www.w3.org/1999/xlink}href"
+_NUMBER = re.compile(r"-?\d+\.\d+")
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
+_REFERENCE = re.compile(r"#([\w-]+)")
+_MARKS = (f"{_SVG}use", f"{_SVG}path")
+_GEOMETRY = ("d", "x", "y", "points", "width", "height")
+SUFFIXES = (".svg", ".png", ".pdf")
+
+_VARIABLES = {tone.light: f"var(--{tone.name})" for tone in TONES}
+
+
+def svg_text(figure: Figure) -> str:
+    """Return a figure as a file of its own: light colours on white.
+
+    Parameters
+    ----------
+    figure
+        Any figure.
+    """
+    stream = io.StringIO()
+    with mpl.rc_context({**STYLE, "savefig.facecolor": "white"}), _any_letters():
+        metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}
+        figure.savefig(stream, format="svg", metadata=metadata)
+    return stream.getvalue()
+
+
+def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
+    """Return a figure as an SVG element to stand in an HTML page.
+
+    Colours of the palette become CSS variables such as ``var(--blue)``, identifiers start with the key (they
+    must be unique on the page), coordinates are rounded to a hundredth of a point, text stays text.
+
+    Parameters
+    ----------
+    figure
+        Any figure.
+    key
+        Identifier that no other figure of the page uses.
+    alternative
+        Alternative text; by default the one attached to the figure.
+    """
+    stream = io.StringIO()
+    with mpl.rc_context(STYLE), _any_letters():
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    root = ET.fromstring(stream.getvalue())
+    _remove_global(root)
+    kept = {name for element in root.iter() for name in _references(element)}
+    kept |= {str(artist.get_gid()) for artist in figure.findobj() if artist.get_gid()}
+    for element in root.iter():
+        _adapt(element, key, kept)
+    for element in root.iter(f"{_SVG}g"):
+        _share_looks(element)
+    for name in ("width", "height", "version"):
+        root.attrib.pop(name, None)
+    # What an image holds is hidden from readers who hear the page, and links must not be.
+    root.set("role", "img" if root.find(f".//{_SVG}a") is None else "group")
+    root.set("aria-label", alternative or alternative_text(figure))
+    ET.register_namespace("", _SVG[1:-1])
+    return ET.tostring(root, encoding="unicode")
+
+
+def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = ".svg") -> list[Path]:
+    """Write figures as files of their own; each appears whole or not at all.
+
+    Parameters
+    ----------
+    folder
+        Is made where it does not exist.
+    figures
+        By name of the file without suffix.
+    suffix
+        ``".svg"``, ``".png"`` (200 dots per inch) or ``".pdf"``.
+
+    Raises
+    ------
+    ExportError
+        If the suffix is another, or a file cannot be written.
+    """
+    if suffix not in SUFFIXES:
+        raise ExportError(
+            f"figures as '{suffix}'", "is not a format of figures", did_you_mean=nearest(suffix, SUFFIXES),
+            next_step=f"use one of {', '.join(SUFFIXES)}",
+        )  # fmt: skip
+    paths = {Path(folder) / f"{name}{suffix}": figure for name, figure in figures.items()}
+    for path, figure in paths.items():
+        write_bytes(path, _content(figure, suffix))
+    return list(paths)
+
+
+@contextmanager
+def _any_letters() -> Iterator[None]:
+    """Accept letters that matplotlib's font lacks: text stays text, and who shows it has fonts of its own."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
+        yield
+
+
+def _content(figure: Figure, suffix: str) -> bytes:
+    if suffix == ".svg":
+        return svg_text(figure).encode()
+    stream = io.BytesIO()
+    # No date and no version, so that the same figure gives the same file; letters as fonts, not as drawings.
+    with mpl.rc_context({**STYLE, "pdf.fonttype": 42}):
+        if suffix == ".pdf":
+            metadata = {"CreationDate": None, "Creator": None, "Producer": None}
+            figure.savefig(stream, format="pdf", facecolor="white", metadata=metadata)
+        else:
+            figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _remove_global(root: ET.Element) -> None:
+    """Remove the style for ``*``, which would act on the whole page, and the metadata."""
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
+                parent.remove(child)
+
+
+def _references(element: ET.Element) -> set[str]:
+    links = [element.get(_LINK, ""), element.get("clip-path", ""), element.get("style", "")]
+    return {name for text in links for name in _REFERENCE.findall(text)}
+
+
+def _adapt(element: ET.Element, key: str, kept: set[str]) -> None:
+    name = element.get("id")
+    if name is not None:
+        del element.attrib["id"]
+        if name in kept:
+            element.set("id", f"{key}-{name}")
+    if _LINK in element.attrib:
+        # Links of a figure lead out of it; all other references stay within.
+        link = element.attrib.pop(_LINK)
+        if element.tag == f"{_SVG}a":
+            element.set("href", link)
+            element.attrib.pop("target", None)
+        else:
+            element.set("href", link.replace("#", f"#{key}-"))
+    if "clip-path" in element.attrib:
+        element.set("clip-path", element.get("clip-path", "").replace("url(#", f"url(#{key}-"))
+    if "style" in element.attrib:
+        style = element.get("style", "").replace("url(#", f"url(#{key}-")
+        element.set("style", _COLOUR.sub(lambda m: _VARIABLES.get(m[0].lower(), m[0]), style))
+    for attribute in ("fill", "stroke"):
+        # CSS variables work in styles, not in attributes.
+        if element.get(attribute, "").lower() in _VARIABLES:
+            colour = _VARIABLES[element.attrib.pop(attribute).lower()]
+            element.set("style", f"{attribute}: {colour}; {element.get('style', '')}")
+    for attribute in _GEOMETRY:
+        if attribute in element.attrib:
+            element.set(attribute, _NUMBER.sub(_rounded, " ".join(element.get(attribute, "").split())))
+
+
+def _share_looks(group: ET.Element) -> None:
+    """Give a group of links the style and clip of its marks, where it is the same for all, in place of each.
+
+    Thousands of points of one kind then take a third of the room.
+    """
+    links = [each for each in group if each.tag == f"{_SVG}a"]
+    marks = [_mark_of(link) for link in links]
+    if not links or any(mark is None for mark, _ in marks):
+        return
+    looks = {(mark.get("style"), clip) for mark, clip in marks if mark is not None}
+    if len(looks) > 1 or len(group) > len(links) + 1 or {"style", "clip-path"} & set(group.attrib):
+        return
+    for name, value in zip(("style", "clip-path"), looks.pop(), strict=True):
+        if value is not None:
+            group.set(name, value)
+    for link, (mark, _) in zip(links, marks, strict=True):
+        if mark is not None:
+            for name in ("style", "clip-path"):
+                mark.attrib.pop(name, None)
+            mark.tail = link.text = None
+            link[:] = [mark]
+            link.tail = "\n"
+
+
+def _mark_of(link: ET.Element) -> tuple[ET.Element | None, str | None]:
+    """Return the one mark that a link holds and the clip around it."""
+    inner: ET.Element | None = link
+    while inner is not None and inner.tag not in _MARKS:
+        clip = inner.get("clip-path")
+        inner = inner[0] if len(inner) == 1 else None
+    if inner is None:
+        return None, None
+    return inner, inner.get("clip-path") or clip
+
+
+def _rounded(match: re.Match[str]) -> str:
+    return f"{float(match[0]):.2f}".rstrip("0").rstrip(".") or "0"

@@ -1,0 +1,309 @@
+"""Sections of a report on a diagnosis: findings, errors, candidates, numbers, next experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...bench.discrepancy.effects.plain_names import kind_in_words, title
+from ...bench.discrepancy.reporting.circumstances import settings_of
+from ...bench.discrepancy.reporting.fitted_numbers import FittedNumber, fitted_numbers
+from ...bench.discrepancy.reporting.verdict import RecordGap, Verdict, best_forms, let_go, suspicions
+from ...foundation.quantity import typeset_unit, with_error
+from ...model import FlatModel, flatten
+from ..figures import (
+    CandidateShare,
+    HeldOut,
+    RecordError,
+    binned_errors,
+    candidate_shares,
+    compact,
+    gap_bars,
+    held_out_series,
+    significant,
+)
+from .sections import Chapter, FigureSection, Section, TableSection
+from .verdict_section import VerdictSection
+
+_SHAPES = 2
+_EDGE = 1.0
+"""Declared spreads beyond which a number has left what was declared."""
+ROLES = {"fit": "fitted", "selection": "for selection", "held_out": "held out"}
+
+
+def verdict_sections(verdict: Verdict) -> list[Section]:
+    """Return the sections of a report on a diagnosis.
+
+    Parameters
+    ----------
+    verdict
+        Result of a diagnosis.
+    """
+    parts = [
+        _blocks(verdict),
+        *_findings(verdict),
+        *_error_figures(verdict),
+        *_candidates(verdict),
+        *_shape_figures(verdict),
+        *_numbers(verdict),
+        *_next_steps(verdict),
+        *_left_out(verdict),
+        *_circumstances(verdict),
+        _all_gaps(verdict),
+    ]
+    card = VerdictSection(
+        "Verdict",
+        verdict.verdict,
+        "\n\n".join(verdict.paragraphs()),
+        headline=verdict.headline(),
+        gap=verdict.gap(),
+        after="with declared numbers let go" if let_go(verdict) else "with what was added",
+        parts=tuple(parts),
+    )
+    text = (
+        "Bench records against the declared model. Before: the declared model with its numbers refitted. "
+        "After: the same model with what was added."
+    )
+    return [Chapter("Diagnosis", text), card]
+
+
+def _blocks(verdict: Verdict) -> TableSection:
+    """Return the table of blocks: where the model disagrees with the records."""
+    rows = []
+    for name in verdict.blocks:
+        gap, kind = verdict.gap(name), kind_in_words(verdict.actuator, name)
+        size = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
+        times = (significant(each) for each in gap.times)
+        unit = typeset_unit(gap.unit) or "1"
+        rows.append((f"`{name}`{f', {kind}' if kind else ''}", *size, unit, *times))
+    columns = ("block", "before", "after", "noise", "unit", "before / noise", "after / noise")
+    which = "held-out" if verdict.gap().role == "held_out" else "fitted"
+    caption = (
+        "The machine, cut at the measured signals: error of each block, root mean square over the "
+        f"{which} records. At 1 × noise nothing is missing there."
+    )
+    marked = frozenset([verdict.blocks.index(verdict.block)])
+    return TableSection("Where", columns, tuple(rows), caption=caption, marked=marked)
+
+
+def _findings(verdict: Verdict) -> list[Section]:
+    """Return what was noticed besides the errors of the blocks and what the card says already."""
+    reasons = suspicions(verdict)
+    others = [text for text in verdict.findings if text not in reasons]
+    return _list("Findings", "finding", others, "What was noticed besides the errors of the blocks.")
+
+
+def _error_figures(verdict: Verdict) -> list[Section]:
+    """Return the error of each record, and one record over time, of the summed-up block."""
+    gaps = [g for g in verdict.gaps if g.block == verdict.block]
+    errors = [RecordError(g.record, g.before, g.after, g.noise_floor, g.role == "held_out") for g in gaps]
+    course = verdict.course
+    held = "held-out" if course.role == "held_out" else "fitted"
+    heading = f"A {held} record: {course.record}"
+    series = HeldOut(
+        course.time, course.measured, course.before, course.after, course.quantity, course.unit, course.noise,
+        heading,
+    )  # fmt: skip
+    return [
+        FigureSection(
+            f"Error of each record: {verdict.block}", gap_bars(errors, unit=gaps[0].unit),
+            caption=f"Root mean square error {_when(verdict)}; the line across is what noise alone leaves.",
+            means="Where a bar ends at the line, the model explains the record down to its noise. "
+            "Records marked as held out were used by no fit.",
+        ),
+        FigureSection(
+            heading, held_out_series(series),
+            caption=f"Above: {course.quantity}, as measured and {_model(verdict)}. Below: the "
+            "difference. Where a line is interrupted, samples do not count.",
+            means="All curves have passed the filter of the block, so the errors in the legend are those "
+            "of this record in the bars and tables.",
+        ),
+    ]  # fmt: skip
+
+
+def _when(verdict: Verdict) -> str:
+    return (
+        "before and after" if verdict.gap().changed else "of the refitted model, to which nothing was added"
+    )
+
+
+def _model(verdict: Verdict) -> str:
+    if verdict.gap().changed:
+        return "as the model has it before and after"
+    return "as the refitted model has it, to which nothing was added"
+
+
+def _candidates(verdict: Verdict) -> list[Section]:
+    """Return what each effect explains alone, and why it was not named."""
+    if not verdict.runners_up:
+        return []
+    chosen = {effect.name for effect in verdict.effects}
+    shares = [
+        CandidateShare(title(name), share, name in chosen)
+        for name, share, *_ in best_forms(verdict.runners_up)
+    ]
+    figure = FigureSection(
+        "Effects tried first", candidate_shares(shares),
+        caption="Share of the excess over the noise floor that each effect explains alone, in its best form.",
+        means="A large share is not enough to be named: an effect must predict records that it was not "
+        "fitted to, and better than its simpler form.",
+    )  # fmt: skip
+    caption = "Effects that help but are not named, and why."
+    return [figure, *_list("Not named", "effect", verdict.tried_words(), caption)]
+
+
+def _shape_figures(verdict: Verdict) -> list[Section]:
+    """Return the residual over the signals on which its mean depends most, before and after."""
+
+    def strength(name: str) -> float:
+        first, _ = verdict.shapes[name]
+        return float(np.mean(np.square(first.mean)))
+
+    over = [n for n in verdict.shapes if "frequency" not in n and "ward" not in n]
+    model = flatten(verdict.declared)
+    unit = next(g.unit for g in verdict.gaps if g.block == verdict.block)
+    return [
+        FigureSection(
+            f"Error {name}: {verdict.block}",
+            binned_errors(
+                *((binned.centre, binned.mean) for binned in verdict.shapes[name]),
+                across=_with_unit_of(name.removeprefix("over "), model),
+                unit=unit,
+                name=f"block {verdict.block}",
+            ),
+            caption="Mean of the filtered error in bins, over all records; noise alone leaves zero.",
+        )
+        for name in sorted(over, key=strength, reverse=True)[:_SHAPES]
+    ]
+
+
+def _with_unit_of(abscissa: str, model: FlatModel) -> str:
+    """Return the label of an axis: the name of a signal, ``time`` or ``speed``, with its unit."""
+    if abscissa == "time":
+        return "time in s"
+    if abscissa == "speed":
+        units = dict.fromkeys(typeset_unit(body.domain.rate_unit) for body in model.bodies)
+        return f"speed of the motion in {' or '.join(units) or 'rad/s or m/s'}"
+    return f"{abscissa} in {typeset_unit(model.variable(abscissa).unit) or '1'}"
+
+
+def _numbers(verdict: Verdict) -> list[Section]:
+    """Return the declared numbers after the refit, those that left their declared range highlighted."""
+    numbers = fitted_numbers(verdict.fits)
+    return fitted_table(numbers, f"{'with' if verdict.effects else 'without'} what was added")
+
+
+def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
+    """Return the table of refitted numbers, highlighted those that left their declared range.
+
+    Parameters
+    ----------
+    numbers
+        Declared and fitted.
+    how
+        Under which model they were fitted, for the caption.
+    """
+    if not numbers:
+        return []
+    rows = tuple(
+        (
+            n.name,
+            compact(n.declared),
+            f"± {100 * n.spread:.3g} %",
+            with_error(n.fitted, n.standard_error),
+            typeset_unit(n.unit),
+            f"{n.strain:+.2f}".replace("-0.00", "0.00").replace("-", "−"),
+        )
+        for n in numbers
+    )
+    beyond = frozenset(i for i, n in enumerate(numbers) if abs(n.strain) > _EDGE)
+    caption = (
+        f"Numbers that were declared with a spread, refitted {how}, with standard errors. The last column is "
+        "how far each moved, in declared spreads: beyond 1 it has left what was declared"
+        f"{' (marked)' if beyond else '; none has'}."
+    )
+    columns = ("number", "declared", "spread", "refitted", "unit", "moved")
+    return [TableSection("Refitted numbers", columns, rows, caption=caption, marked=beyond)]
+
+
+def _next_steps(verdict: Verdict) -> list[Section]:
+    return _list(
+        "What to measure next", "experiment", verdict.next_steps,
+        "Experiments that would tell apart what these records leave open.",
+    )  # fmt: skip
+
+
+def _left_out(verdict: Verdict) -> list[Section]:
+    """Return what was masked, set aside or not compared, so that nothing is left out silently."""
+    remarks = _list(
+        "Done to the records",
+        "remark",
+        verdict.remarks,
+        "Samples that were masked or set aside, files that were not read, and what was chosen by default.",
+    )
+    if not verdict.skipped:
+        return remarks
+    rows = tuple(
+        (title(s.effect), s.location, " and ".join(map(title, s.beside)), s.reason) for s in verdict.skipped
+    )
+    columns = ("effect", "location", "beside", "reason")
+    caption = "Effects that were left out of the comparison; each may still be there."
+    return [*remarks, TableSection("What could not be compared", columns, rows, caption=caption)]
+
+
+def _circumstances(verdict: Verdict) -> list[Section]:
+    """Return records, deck, day and command, and the rule that decided."""
+    sections: list[Section] = []
+    if verdict.run is not None:
+        caption = (
+            f"Deck `{verdict.run.deck}`, records in `{verdict.run.folder}`, {verdict.run.date}, nlsdesign "
+            f"{verdict.run.version}. To repeat it: `{verdict.run.command}`"
+        )
+        rows = tuple(
+            (
+                r.name,
+                ROLES.get(r.role, r.role),
+                compact(r.duration),
+                str(r.samples),
+                compact(r.rate),
+                r.source,
+            )
+            for r in verdict.run.records
+        )
+        columns = ("record", "used", "duration in s", "samples", "samples per s", "file")
+        sections.append(TableSection("Records, deck and command", columns, rows, caption=caption))
+    settings = tuple(
+        (s.name.replace("_", " "), str(s.value), s.meaning) for s in settings_of(verdict.criteria)
+    )
+    if settings:
+        caption = "The rule that decided, with the value and meaning of each of its numbers."
+        heads = ("criterion", "value", "meaning")
+        sections.append(TableSection("Criteria", heads, settings, caption=caption, folded=True))
+    return sections
+
+
+def _all_gaps(verdict: Verdict) -> TableSection:
+    columns = ("block", "record", "used", "before", "after", "noise", "unit", "after / noise")
+    rows = tuple(_gap_row(g) for g in verdict.gaps)
+    caption = "Root mean square error of every block on every record."
+    return TableSection("All blocks and records", columns, rows, caption=caption, folded=True)
+
+
+def _gap_row(gap: RecordGap) -> tuple[str, ...]:
+    numbers = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
+    times = significant(gap.after / gap.noise_floor)
+    return (
+        gap.block,
+        gap.record,
+        ROLES.get(gap.role, gap.role),
+        *numbers,
+        typeset_unit(gap.unit) or "1",
+        times,
+    )
+
+
+def _list(heading: str, column: str, texts: Sequence[str], caption: str) -> list[Section]:
+    """Return a table of sentences; none where there are none."""
+    rows = tuple((text,) for text in texts)
+    return [TableSection(heading, (column,), rows, caption=caption)] if rows else []

@@ -1,0 +1,249 @@
+"""The page of a sweep, with the files beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...foundation.command_words import typed_command
+from ...foundation.errors import MissingLibraryError, visible
+from ...sweeps import SweepTable
+from ...sweeps.preferences import NotBelow, Preference, Requirement
+from ...sweeps.ranked_points import RankedPoints, rank_points
+from ...sweeps.sensitivity import AnswerSensitivity, sensitivity
+from ..report import FileSection, PointTableSection, Section, TableSection, TextSection, write_report
+from .answer_sections import histogram_sections, sensitivity_sections
+from .asked_sections import asked_sections, unit_of
+from .figure_sections import coordinate_sections, front_sections
+from .page_content import PageContent
+from .point_rows import named_columns, point_rows
+from .shown_points import shown_column, shown_points
+from .surface_sections import surface_sections
+from .sweep_files import DECKS_FOLDER, about_of, write_decks, write_points
+
+PAGE_FILE = "sweep.html"
+MOST_DECKS = 50
+_MOST_SENSITIVITIES, _MOST_AXES = 6, 8
+_MET = "met"
+_ABSTRACT = (
+    "What was asked, which points failed, which are best where it is stated what is better, and how the "
+    "answers depend on the axes. Figures are in units that people read, the table of all points in SI."
+)
+_FACTS = ("deck", "deck, digest", "question", "version", "seed", "points asked")
+
+
+class SweepPage(NamedTuple):
+    """What was written.
+
+    Parameters
+    ----------
+    page
+        The page.
+    points
+        Table of all points, as CSV.
+    decks
+        Decks of the points in the table of the page, by number.
+    front
+        Numbers of the points that no other betters, the best in the first direction first.
+    remarks
+        What the reader should know, one sentence each.
+    """
+
+    page: Path
+    points: Path
+    decks: dict[int, Path]
+    front: tuple[int, ...]
+    remarks: tuple[str, ...]
+
+
+def write_sweep_report(
+    table: SweepTable,
+    out: Path | str,
+    *,
+    preferences: Sequence[Preference] = (),
+    requirements: Sequence[Requirement] | None = None,
+    source: Path | str = "FOLDER",
+) -> SweepPage:
+    """Write the page of a sweep, finished or not: what was asked, failures, best points, figures, decks.
+
+    Parameters
+    ----------
+    table
+        Of the sweep.
+    out
+        Folder for ``sweep.html``, ``points.csv`` and the decks of the points in its table.
+    preferences
+        Which values of which answers are better. Without them no point is called better than another.
+    requirements
+        What an answer must keep, so that a point is no miss; by default that ``met`` is one, where there is
+        such an answer.
+    source
+        Folder of the sweep, for the command that the page names.
+
+    Raises
+    ------
+    UnknownNameError
+        If a preference or requirement names no answer.
+    ValueRangeError
+        If one answer has two directions.
+    ExportError
+        If a file cannot be written.
+    """
+    folder = Path(out)
+    if requirements is None:
+        requirements = usual_requirements(table)
+    answers = {column.name: np.asarray(table.values[column.name], dtype=float) for column in table.answers}
+    ranked = rank_points(answers, table.done, preferences=preferences, requirements=requirements)
+    listed, notes = _listed_rows(table, ranked)
+    remarks: list[str] = []
+    points_file = write_points(table, folder)
+    numbers = [int(table.values["point"][row]) for row in listed[:MOST_DECKS]]
+    decks, missing = write_decks(table, numbers, folder)
+    remarks += missing
+    names = _answer_order(table, ranked)
+    sensitivities, refusal = _sensitivities(table, answers, names)
+    remarks += refusal
+    content = PageContent(table, ranked, shown_points(table, ranked), names, sensitivities, points_file)
+    best = _best(content, listed, notes, decks=decks, source=str(source))
+    files = _files(points_file, folder, decks)
+    page = _written(content, folder / PAGE_FILE, best=best, files=files, remarks=remarks)
+    front = tuple(int(table.values["point"][row]) for row in ranked.front)
+    return SweepPage(
+        page, points_file, {n: folder / name for n, name in decks.items()}, front, tuple(remarks)
+    )
+
+
+def _written(
+    content: PageContent, path: Path, *, best: Section, files: Section, remarks: Sequence[str]
+) -> Path:
+    """Write the page and return its path."""
+    table = content.table
+    about = {name: visible(text) for name, text in about_of(table).items()}
+    sections: list[Section] = [
+        *asked_sections(table, content.ranked),
+        best,
+        *front_sections(content),
+        *coordinate_sections(content),
+        *sensitivity_sections(content),
+        *surface_sections(content),
+        *histogram_sections(content),
+        *([TextSection("Remarks", "\n\n".join(remarks))] if remarks else []),
+        files,
+        TableSection(
+            "Where it comes from", ("what", "as the sweep states it"), tuple(about.items()),
+            folded=True, caption="What the sweep states of itself.",
+        ),
+    ]  # fmt: skip
+    deck = str(table.about.get("deck", "")) or "a deck"
+    facts = {name: _brief(text) for name, text in about.items() if name in _FACTS}
+    title = f"{visible(deck)}: {len(table)} points"
+    return write_report(path, *sections, title=title, abstract=_ABSTRACT, facts=facts)
+
+
+def usual_requirements(table: SweepTable) -> list[Requirement]:
+    """Return what a point must keep where nothing is stated: a design must have met its target.
+
+    Parameters
+    ----------
+    table
+        Of the sweep.
+    """
+    return [NotBelow(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
+
+
+def _brief(text: str) -> str:
+    """Return a text for the head of the page; of a digest its beginning, the whole stands at the end."""
+    return text[:12] if len(text) == 64 and not text.strip("0123456789abcdef") else text
+
+
+def _answer_order(table: SweepTable, ranked: RankedPoints) -> tuple[str, ...]:
+    return tuple(dict.fromkeys([*ranked.judged, *(column.name for column in table.answers)]))
+
+
+def _sensitivities(
+    table: SweepTable, answers: dict[str, Any], names: tuple[str, ...]
+) -> tuple[dict[str, AnswerSensitivity], list[str]]:
+    axes = {axis.name: np.asarray(table.values[axis.name]) for axis in table.axes}
+    chosen = {name: answers[name] for name in names[:_MOST_SENSITIVITIES]}
+    try:
+        kinds = {axis.name: axis.kind for axis in table.axes}
+        shares = sensitivity(axes, chosen, table.done, kinds=kinds)
+    except MissingLibraryError as error:
+        return {}, [f"No shares of the variance: {error}"]
+    left = len(names) - len(chosen)
+    remarks = (
+        [f"Shares of the variance are given for the first {len(chosen)} answers; {left} are left out."]
+        if left
+        else []
+    )
+    return {each.answer: each for each in shares}, remarks
+
+
+def _listed_rows(table: SweepTable, ranked: RankedPoints) -> tuple[list[int], dict[int, str]]:
+    """Return the rows of the table of the page, and without directions what each has least or most of."""
+    if ranked.preferences:
+        return ranked.front.tolist(), {}
+    notes: dict[int, list[str]] = {}
+    good = np.flatnonzero(ranked.compared)
+    for column in table.answers[:_MOST_AXES]:
+        values = np.asarray(table.values[column.name], dtype=float)[good]
+        finite = np.flatnonzero(np.isfinite(values))
+        if len(finite) and np.ptp(values[finite]) > 0.0:
+            for place, what in ((np.argmin(values[finite]), "least"), (np.argmax(values[finite]), "largest")):
+                notes.setdefault(int(good[finite[place]]), []).append(f"{what} {column.name}")
+    return list(notes), {row: ", ".join(each) for row, each in notes.items()}
+
+
+def _best(
+    content: PageContent, listed: list[int], notes: dict[int, str], *, decks: dict[int, str], source: str
+) -> PointTableSection:
+    """Return the table of the best points, with the rows of all that figures show."""
+    table, ranked = content.table, content.ranked
+    rows = np.array(listed[:MOST_DECKS], dtype=np.intp)
+    names = ranked.judged or content.answers[:_MOST_AXES]
+    columns = [table.column(name) for name in names] + content.varying_axes()[:_MOST_AXES]
+    shown = [shown_column(table, column, rows) for column in columns]
+    cells = tuple(
+        (*([notes[row]] if notes else []), *(_cell(each.values[k]) for each in shown))
+        for k, row in enumerate(rows.tolist())
+    )
+    heads = (*(["why it is here"] if notes else []), *(column.name + unit_of(column) for column in columns))
+    title = "Best points" if ranked.preferences else "Points at the ends"
+    inner = TableSection(title, heads, cells, caption=_caption(content, len(listed)))
+    points = [int(table.values["point"][row]) for row in rows]
+    folder = content.points_file.parent
+    command = typed_command("nlsdesign", "report", source, "--deck-of", "POINT", "--out", folder)
+    return PointTableSection(
+        title, inner, points, decks=decks, rows=point_rows(table, ranked, content.shown),
+        columns=named_columns(table), command=command,
+        elsewhere=f"All rows stand in {content.points_file.name}.",
+    )  # fmt: skip
+
+
+def _cell(value: Any) -> str | float:
+    return float(value) if isinstance(value, float | np.floating) else visible(str(value))
+
+
+def _caption(content: PageContent, count: int) -> str:
+    ranked = content.ranked
+    if not np.any(ranked.compared):
+        return "No point has answers that can be compared."
+    if not ranked.preferences:
+        return (
+            "No direction was stated, so no point is called better than another: these have the least and "
+            "the largest of each answer. `--smaller`, `--larger` and `--near` state what is better."
+        )
+    if len(ranked.preferences) == 1:
+        return "The best in the one direction that was stated; several where they are equal."
+    more = f" The first {MOST_DECKS} of {count}." if count > MOST_DECKS else ""
+    return f"Points on the front, the best in `{ranked.preferences[0].answer}` first.{more}"
+
+
+def _files(points_file: Path, folder: Path, decks: dict[int, str]) -> FileSection:
+    files = {points_file: "all points: axes, answers, status and reason, in SI"}
+    if decks:
+        files[folder / DECKS_FOLDER] = f"decks behind {len(decks)} points, which every command takes"
+    return FileSection("Files", files, caption="Written beside this page.")
