@@ -73,12 +73,11 @@ def _advice(name: str) -> str:
     """Return the message for a name that is not public here."""
     homes = _homes()
     text = f"nlsdesign has no name '{name}'"
-    rooms = (
-        f"{home.rstrip('.')}.{inner}" if inner in _rooms(home) else home for home, inner in homes.values()
-    )
-    for room in dict.fromkeys(room for room in rooms if room != "models"):
-        if name in _public(importlib.import_module(room, __name__)):
-            return f"{text}; it is nlsdesign{room}.{name}"
+    for home, inner in (place for place in homes.values() if place[0] != "models"):
+        value = _value(home, inner)
+        module = value if isinstance(value, ModuleType) else importlib.import_module(home, __name__)
+        if name in _public(module):
+            return f"{text}; it is {module.__name__}.{name}"
     from .components.assembly.renamed import renamed  # here, as components take time to load
 
     old = renamed(name)
