@@ -100,8 +100,8 @@ class CalibratedMachine:
         suspect = [
             f"suspect: {name} moved by {estimate.strain[name]:+.1f} standard deviations of what was "
             f"declared, {abs(estimate.doubt[name]):.1f} times what such records would by chance: its "
-            "declared value or spread, or that of another number of the same product, is wrong, or the records show "
-            "something that the deck lacks; ask `nlsdesign diagnose`."
+            "declared value or spread, or that of another number of the same product, is wrong, or the "
+            "records show something that the deck lacks; ask `nlsdesign diagnose`."
             for name in estimate.suspects
         ]
         if estimate.chance < _RARE and not suspect:
