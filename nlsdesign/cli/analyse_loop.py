@@ -17,8 +17,8 @@ from .units import Number
 
 if TYPE_CHECKING:
     from ..feedback.control import ClosedLoop, LimitCycleOnset, LoopMargins, SineResponse
-    from ..feedback.control.evaluation.limits import SaturationLine
     from ..feedback.control.evaluation.margins import CoupledStability, OutputImpedance
+    from ..feedback.control.evaluation.onset import SaturationLine
     from ..feedback.control.evaluation.responses import HeldTorque, ZeroTorque
 
 GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}

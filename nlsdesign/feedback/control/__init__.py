@@ -1,15 +1,6 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
 from .closed_loop import ClosedLoop, encoder_loop, joined
-from .evaluation.limits import (
-    LimitCycleOnset,
-    LoopSpread,
-    SaturationLine,
-    linear_onset,
-    loop_over_spread,
-    onset_of_limit_cycling,
-    saturation_line,
-)
 from .evaluation.linear_loop import LinearLoop, linear_loop
 from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
@@ -20,6 +11,15 @@ from .evaluation.margins import (
     coupled_stability,
     loop_margins,
     output_impedance,
+)
+from .evaluation.onset import (
+    LimitCycleOnset,
+    LoopSpread,
+    SaturationLine,
+    linear_onset,
+    loop_over_spread,
+    onset_of_limit_cycling,
+    saturation_line,
 )
 from .evaluation.responses import (
     HeldTorque,

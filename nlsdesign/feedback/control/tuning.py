@@ -13,8 +13,8 @@ from ...foundation.errors import InfeasibleError, ValueRangeError
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import declared_prior
 from .closed_loop import ClosedLoop
-from .evaluation.limits import checked_gains
 from .evaluation.margins import loop_margins, output_impedance
+from .evaluation.onset import checked_gains
 from .evaluation.responses import sine_response
 
 Array = NDArray[np.float64]
