@@ -9,6 +9,7 @@ from . import export as export
 from . import model as model
 from . import simulation as simulation
 from . import sweeps as sweeps
+from .bench import calibration as calibration
 from .bench import discrepancy as discrepancy
 from .bench import identification as identification
 from .bench.discrepancy import diagnose as diagnose
