@@ -22,11 +22,9 @@ from nlsdesign.feedback.analysis import (
     SensorRanking,
     Stability,
     empirical_gramian,
+    rank_drops,
     rank_sensors,
     rest_points,
-)
-from nlsdesign.feedback.analysis import (
-    observability as rank_drops,
 )
 from nlsdesign.model.paper_form import GEOMETRIC, PaperFormNames, paper_form
 from nlsdesign.presentation.report import (

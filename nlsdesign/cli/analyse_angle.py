@@ -70,8 +70,7 @@ def analyse_angle(
     import numpy as np
 
     from ..components.assembly.deck_writer import declare
-    from ..feedback.analysis import Observability, Stability, View, over_angle
-    from ..feedback.analysis import observability as rank_drops
+    from ..feedback.analysis import Observability, Stability, View, over_angle, rank_drops
     from ..foundation.deck import load_deck
     from ..model import flatten
     from ..model.roles import series_spring

@@ -9,8 +9,7 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.export import CSource, natively
-from nlsdesign.feedback.analysis import RankDrops
-from nlsdesign.feedback.analysis import observability as rank_drops
+from nlsdesign.feedback.analysis import RankDrops, rank_drops
 from nlsdesign.feedback.observer import (
     Certificate,
     CertifiedGain,
