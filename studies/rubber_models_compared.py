@@ -30,7 +30,8 @@ from nlsdesign.components import (
     maxwell,
 )
 from nlsdesign.presentation.report import FigureSection, TableSection
-from studies._published import (
+
+from ._published import (
     FIG6_SAMPLE,
     Array,
     bench_records,

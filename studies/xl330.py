@@ -21,7 +21,8 @@ from nlsdesign.components import Assembly, LoadFriction, tie
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import FlatModel
 from nlsdesign.presentation.report import TableSection
-from studies._measured import data_folder, write_skipped
+
+from ._measured import data_folder, write_skipped
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from nlsdesign.feedback.observer import CascadeGain, ObserverDesign
 from nlsdesign.model import Variable
 from nlsdesign.model.transform import with_signal
 from nlsdesign.simulation.sampled_batch import run_batch
-from studies.alternative_rubber.candidates import BRANCHES, without_loss
+
+from .candidates import BRANCHES, without_loss
 
 Array = NDArray[np.float64]
 

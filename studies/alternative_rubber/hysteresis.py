@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nlsdesign.components import Material
-from studies.alternative_rubber.bench import Bench, Measured, Rubber, Run
-from studies.alternative_rubber.candidates import TARGET, designed, with_loss
-from studies.alternative_rubber.merits import AT, GAIN_MARGIN, HELD, HIGH, largest_gains
+
+from .bench import Bench, Measured, Rubber, Run
+from .candidates import TARGET, designed, with_loss
+from .merits import AT, GAIN_MARGIN, HELD, HIGH, largest_gains
 
 Array = NDArray[np.float64]
 

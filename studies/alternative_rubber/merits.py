@@ -13,8 +13,9 @@ from scipy.interpolate import PchipInterpolator
 import nlsdesign as nls
 from nlsdesign.design import CamDesign
 from nlsdesign.foundation.errors import ConvergenceError, NlsError
-from studies.alternative_rubber.bench import Bench, Rubber, Run
-from studies.alternative_rubber.candidates import Candidate, designed
+
+from .bench import Bench, Rubber, Run
+from .candidates import Candidate, designed
 
 Array = NDArray[np.float64]
 

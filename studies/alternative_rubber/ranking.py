@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.alternative_rubber.merits import METRICS, MORE_IS_BETTER, Merits
+from .merits import METRICS, MORE_IS_BETTER, Merits
 
 Array = NDArray[np.float64]
 

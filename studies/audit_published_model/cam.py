@@ -7,9 +7,10 @@ import sympy as sp
 from scipy.optimize import least_squares
 
 import nlsdesign as nls
-from studies._published import Array, figure_points
-from studies.audit_published_model import paper as p
-from studies.audit_published_model.finding import (
+
+from .._published import Array, figure_points
+from . import paper as p
+from .finding import (
     AGAINST_FIGURES,
     FAILS,
     HOLDS,

@@ -24,7 +24,8 @@ from nlsdesign.feedback.control import (
     zero_torque,
 )
 from nlsdesign.feedback.observer import CascadeGain, GridByTolerance
-from studies.austin2015_closed_loop.late_torque import late_torque
+
+from .late_torque import late_torque
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,9 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.feedback.control import TorqueGains, ZeroTorque
-from studies._published import figure_points
-from studies.austin2015_closed_loop.benches import (
+
+from .._published import figure_points
+from .benches import (
     DECKS,
     FILES,
     NONLINEAR,
@@ -26,7 +27,7 @@ from studies.austin2015_closed_loop.benches import (
     Array,
     Bench,
 )
-from studies.austin2015_closed_loop.causes import ADDED, LATE
+from .causes import ADDED, LATE
 
 FIRST = 0.45  # Hz; below it the published torques are those of a few counts
 TO_TWO = (0.5, 1.0, 2.0)  # Hz

@@ -24,10 +24,11 @@ from nlsdesign.feedback.control import LoopChoice, best_choices
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.foundation.quantity import three_digits
 from nlsdesign.presentation.report import FigureSection, TableSection
-from studies.alternative_rubber.bench import Bench, Rubber
-from studies.alternative_rubber.candidates import designed
-from studies.alternative_rubber.merits import HIGH, MOVED_AT, largest_gains, measured
-from studies.spring_and_gains.under_margins import (
+
+from ..alternative_rubber.bench import Bench, Rubber
+from ..alternative_rubber.candidates import designed
+from ..alternative_rubber.merits import HIGH, MOVED_AT, largest_gains, measured
+from .under_margins import (
     DECKS,
     DRAWS,
     LIMITS,

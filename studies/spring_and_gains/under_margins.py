@@ -32,7 +32,8 @@ from nlsdesign.feedback.control import (
 )
 from nlsdesign.feedback.observer import CascadeGain
 from nlsdesign.foundation.errors import InfeasibleError, ValueRangeError
-from studies.alternative_rubber.merits import HELD, MOVED_AT
+
+from ..alternative_rubber.merits import HELD, MOVED_AT
 
 Array = NDArray[np.float64]
 

@@ -21,9 +21,8 @@ from scipy.linalg import schur
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ....model.roles import series_spring
 from ....simulation.sampled_batch import PLANT, SampledSystem
-from ..laws.wired_names import DESIRED
-from ..loop.closed_loop import ClosedLoop
-from .fine_counts import with_fine_counts
+from ..closed_loop import ClosedLoop
+from ..laws.law_writer import DESIRED
 from .linear_parts import (
     LinearBlock,
     LinearMode,
@@ -32,6 +31,7 @@ from .linear_parts import (
     SlopedTables,
     TableSlope,
     linear_plant,
+    with_fine_counts,
 )
 
 Array = NDArray[np.float64]

@@ -31,7 +31,7 @@ from ....model.roles import measured_motion, series_spring
 from ....model.transform import named
 from ....simulation.sampled_batch import PLANT
 from ...analysis.rest import evaluate_rows, rate_state, rest_states
-from ..loop.closed_loop import ClosedLoop
+from ..closed_loop import ClosedLoop
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ....foundation.errors import ArrangementError, ConvergenceError, MeasurementError, ValueRangeError
 from ....foundation.prefixes import shared_prefix, without_power
 from ....model import FlatModel
-from ..scheduling.gains import ConstantGain
 from ..scheduling.scheduled import ObserverDesign
+from ..scheduling.step import ConstantGain
 from .co_design import fastest, lyapunov_function
 from .exact import (
     Matrix,

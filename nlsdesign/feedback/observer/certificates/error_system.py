@@ -21,12 +21,11 @@ from ....foundation.errors import ArrangementError, ConvergenceError
 from ....model import FlatModel
 from ....model.paper_form import GEOMETRIC, paper_form
 from ....model.transform import named, with_outputs, without_idle_states
-from ..scheduling.forms import Minimal, PaperForm
-from ..scheduling.plant import AngleScheduledPlant
+from ..scheduling.angle_form import AngleScheduledPlant, Minimal, PaperForm
 from .exact import Matrix, corners
 from .intervals import Bounds, enclose
 from .polytope import SPEED_LIMIT, scaling
-from .spring_view import NARROWEST
+from .torque_bound import NARROWEST
 
 Array = NDArray[np.float64]
 

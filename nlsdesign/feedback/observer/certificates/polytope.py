@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scheduling.plant import AngleScheduledPlant
+from ..scheduling.angle_form import AngleScheduledPlant
 from ..scheduling.scheduled import ObserverDesign
 from .exact import Matrix, combined, corners, identity, times
 from .intervals import enclose, multiply
