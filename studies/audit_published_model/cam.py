@@ -7,8 +7,9 @@ import sympy as sp
 from scipy.optimize import least_squares
 
 import nlsdesign as nls
+from nlsdesign.foundation.arrays import Array
 
-from .._published import Array, figure_points
+from .._published import figure_points
 from . import paper as p
 from .finding import (
     AGAINST_FIGURES,

@@ -7,7 +7,8 @@ import math
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from .._published import Array
+from nlsdesign.foundation.arrays import Array
+
 from . import paper as p
 from .finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
 

@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq, nnls
 
 import nlsdesign as nls
+from nlsdesign.foundation.arrays import Array
 
-from .._published import Array, element_loop, figure_points
+from .._published import element_loop, figure_points
 from . import paper as p
 from .cycle import CAMS, Cam, cycle, fig8_energy, loss
 from .finding import (

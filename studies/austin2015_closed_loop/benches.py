@@ -6,9 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 import nlsdesign as nls
 from nlsdesign.components.assembly.moved_load import with_moved_load
 from nlsdesign.export import natively
@@ -24,10 +21,9 @@ from nlsdesign.feedback.control import (
     zero_torque,
 )
 from nlsdesign.feedback.observer import CascadeGain, GridByTolerance
+from nlsdesign.foundation.arrays import Array
 
 from .late_torque import late_torque
-
-Array = NDArray[np.float64]
 
 NONLINEAR, SOFT, STIFF = "nonlinear", "soft", "stiff"
 DECKS = {

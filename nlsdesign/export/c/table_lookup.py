@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Table
 from .c_text import Real, wrapped
@@ -102,7 +102,7 @@ class CTable:
         return f"{inside} ? {per} : {zero}"
 
     @cached_property
-    def _points(self) -> NDArray[np.float64]:
+    def _points(self) -> Array:
         """Breakpoints as this type holds them."""
         assert self.table.breakpoints is not None
         return np.array([self.real.round(float(v)) for v in self.table.breakpoints])
