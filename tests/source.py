@@ -47,11 +47,12 @@ def parse(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
 
 
-def lines_of(file: Path, tree: ast.Module | None = None) -> Lines:
+def lines_of(file: Path, nodes: Iterable[ast.AST] | None = None) -> Lines:
+    """Sort the lines of a file; with its nodes (imports and expressions) where it was read already."""
     text = file.read_text(encoding="utf-8").splitlines()
     docstrings: set[int] = set()
     imported: set[int] = set()
-    for node in ast.walk(tree or parse(file)):
+    for node in ast.walk(parse(file)) if nodes is None else nodes:
         if isinstance(node, ast.Import | ast.ImportFrom):
             imported.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
         elif isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
@@ -102,15 +103,15 @@ def untyped(file: Path) -> Iterator[str]:
 
 def misshapen(file: Path) -> Iterator[str]:
     """Files, functions, argument lists and classes that have outgrown the limits above."""
-    tree = parse(file)
-    yield from outgrown(tree, lines_of(file, tree))
+    nodes = list(ast.walk(parse(file)))
+    yield from outgrown(nodes, lines_of(file, nodes))
 
 
-def outgrown(tree: ast.Module, lines: Lines) -> Iterator[str]:
-    """Say the same of a module that was read already."""
+def outgrown(nodes: Iterable[ast.AST], lines: Lines) -> Iterator[str]:
+    """Say the same of a file that was read already: of its functions and classes."""
     if len(lines.code) > MOST_LINES_IN_FILE:
         yield f"line 1: the file has {len(lines.code)} lines of code, limit {MOST_LINES_IN_FILE}"
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, Function):
             length, count = lines.code_of(node), len(arguments(node))
             if length > MOST_LINES_IN_FUNCTION:

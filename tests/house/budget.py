@@ -14,7 +14,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tests import source
 from tests.house.counts import counted
 from tests.house.modules import Module, exported_by, modules
 from tests.house.repetitions import pairs, sources
@@ -61,7 +60,7 @@ def rooms(every: Sequence[Module], found_by_being_there: Sequence[str]) -> dict[
         small = [module for module in chosen if module.is_small]
         figures[room] = {
             "code": sum(len(module.lines.code) for module in chosen),
-            "outgrown": sum(len(list(source.outgrown(module.tree, module.lines))) for module in chosen),
+            "outgrown": sum(len(module.outgrown) for module in chosen),
             "thin": sum(helper.thin for module in chosen for helper in module.helpers),
             "small": sum(not module.path.startswith(tuple(found_by_being_there)) for module in small),
         }

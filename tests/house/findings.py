@@ -52,7 +52,7 @@ def unused_exports(root: Path, modules: Sequence[Module], chosen: Sequence[Modul
 
 
 def _shape(module: Module) -> Iterator[tuple[int, str]]:
-    for text in source.outgrown(module.tree, module.lines):
+    for text in module.outgrown:
         line, _, what = text.removeprefix("line ").partition(": ")
         yield int(line), f"- {what}"
     if module.is_small:

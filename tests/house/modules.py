@@ -48,7 +48,7 @@ class Module:
 
     @cached_property
     def lines(self) -> source.Lines:
-        return source.lines_of(self.file, self.tree)
+        return source.lines_of(self.file, self.of_kind(ast.Import, ast.ImportFrom, ast.Expr))
 
     @cached_property
     def exported(self) -> frozenset[str]:
@@ -69,6 +69,12 @@ class Module:
 
     def of_kind(self, *kinds: type[ast.AST]) -> list[Any]:
         return [node for kind in kinds for node in self.nodes.get(kind, ())]
+
+    @cached_property
+    def outgrown(self) -> list[str]:
+        """Say what is beyond the bounds of a file, function, list of arguments or class."""
+        definitions = self.of_kind(ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+        return list(source.outgrown(definitions, self.lines))
 
     @property
     def is_small(self) -> bool:
