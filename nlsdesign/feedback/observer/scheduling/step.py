@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import place_poles
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ....model import Variable
 from ...analysis.kalman import discrete_noise, steady_state_kalman
@@ -29,8 +30,6 @@ from .table import Entry
 
 if TYPE_CHECKING:
     from .angle_form import AngleScheduledPlant
-
-Array = NDArray[np.float64]
 
 
 def held(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
