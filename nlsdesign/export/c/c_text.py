@@ -41,7 +41,13 @@ class Real(StrEnum):
 
     @classmethod
     def named(cls, name: str) -> Real:
-        """Return the type of that name, ``"double"`` or ``"float"``; an ``ExportError`` if there is none."""
+        """Return the type of that name, ``"double"`` or ``"float"``.
+
+        Raises
+        ------
+        ExportError
+            If there is none of that name.
+        """
         if name not in tuple(cls):
             raise ExportError(
                 f"real='{name}'",
@@ -77,7 +83,10 @@ class Real(StrEnum):
     def literal(self, value: float) -> str:
         """Return a number as C text that reads back as the same number; an infinite one as ``INFINITY``.
 
-        NaN, and a finite number that is infinite in this type, raise an ``ExportError``.
+        Raises
+        ------
+        ExportError
+            For NaN, and for a finite number that is infinite in this type.
         """
         if math.isnan(value):
             raise ExportError(
