@@ -189,7 +189,7 @@ class FilterEquations:
         )
         return ca.SX(ca.mtimes(matrix, ca.vertcat(state, 1, pushed)))
 
-    def _slopes(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
+    def slopes(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
         """Return slopes by states and slow states, both in the units of the filter.
 
         They are taken at the deck, not at the estimate: what no motion can tell apart (a drive, a rubber and
@@ -203,7 +203,7 @@ class FilterEquations:
 
     def _carried(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
         """Return the slopes of one half of a sample; slow states, which stay, below the others."""
-        upper = ca.mtimes(ca.diag(1.0 / self.units), self._slopes(expression, of, slow))
+        upper = ca.mtimes(ca.diag(1.0 / self.units), self.slopes(expression, of, slow))
         return ca.SX(ca.vertcat(upper, ca.horzcat(ca.SX(self.slow, self.n), ca.SX.eye(self.slow))))
 
     def _direction(self, covariance: Expression, speed: Expression) -> tuple[Expression, Expression]:
@@ -304,7 +304,7 @@ class FilterEquations:
         torque = ca.mtimes(self.matrix("estimate", 1, self.n + 1, s), ca.vertcat(x, 1))
         free, corrected = ca.vertcat(x, s), ca.vertcat(state, slow)
         return ca.substitute(torque, free, corrected), ca.substitute(
-            self._slopes(torque, x, s), free, corrected
+            self.slopes(torque, x, s), free, corrected
         )
 
     def _process_noise(self, forgetting: Expression, inflation: Expression, u: Expression) -> Expression:
