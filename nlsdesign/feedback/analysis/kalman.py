@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
+from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ...model import FlatModel, Variable
 from ...model.roles import spring_torque
@@ -110,9 +110,6 @@ def declared_deviation(model: FlatModel, name: str) -> float:
             next_step=f"give it: measurement={{'{name}': standard deviation}}, or declare an Encoder of it",
         )  # fmt: skip
     return min(deviations)
-
-
-Array = NDArray[np.float64]
 
 
 def discrete_noise(a: Array, density: Array, sample_time: float) -> tuple[Array, Array]:
@@ -273,7 +270,7 @@ def noise_over_a_sample(a: Array, density: Array, sample_time: float) -> tuple[A
 
 def best_covariances(
     a: Array, density: Array, measurement: tuple[Array, Array], sample_time: float
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """Return the covariance of the best estimate at many angles, and where it has a steady state.
 
     Parameters

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array, Indices, Mask
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...model import FlatModel, Variable
 from ...model.roles import measured_motion
@@ -34,7 +35,6 @@ from ...simulation.input_signals import Drive
 from .rest_points import RestPoints, rest_points
 from .sweep import Columns, View, exponential_and_gramian, transposed
 
-Array = NDArray[np.float64]
 _STILL = 1e-9
 """Share of the largest slope below which the eigenvalue of what is not seen counts as zero."""
 
@@ -354,8 +354,7 @@ def empirical_gramian(
 
 Points = Callable[[Array], RestPoints]
 
-Rows = NDArray[np.intp]
-Choice = Callable[[Array, Array], tuple[Rows, Rows]]
+Choice = Callable[[Array, Array], tuple[Indices, Indices]]
 
 REFINED = 1e-9
 """Uncertainty in rad down to which angles are refined."""
@@ -592,12 +591,12 @@ class _Search:
         angles: Array = low + share * (high - low)
         return angles
 
-    def _are_zeros(self, at: Array) -> NDArray[np.bool_]:
+    def _are_zeros(self, at: Array) -> Mask:
         """Tell at which angles the smallest singular value falls to nothing, and is not only low."""
         if not len(at):
             return np.zeros(0, dtype=bool)
         here, near = (self._numbers(self.points(each))[1] for each in (at, at + 1e4 * REFINED))
-        zero: NDArray[np.bool_] = here <= np.maximum(self.view.tolerance, 1e-3 * near)
+        zero: Mask = here <= np.maximum(self.view.tolerance, 1e-3 * near)
         return zero
 
     def _run(self, at: Array, rows: list[int]) -> RankDrop:
@@ -635,7 +634,7 @@ class _Search:
         return RankDrop(at, at, unseen, arms[0] if arms else "")
 
 
-def _first_change(determinant: Array, _: Array) -> tuple[Rows, Rows]:
+def _first_change(determinant: Array, _: Array) -> tuple[Indices, Indices]:
     """Return the part in which a sign changes first; a zero ends the search."""
     sign = np.sign(determinant)
     changes = sign[:, :-1] * sign[:, 1:] <= 0.0
@@ -645,13 +644,13 @@ def _first_change(determinant: Array, _: Array) -> tuple[Rows, Rows]:
     return np.where(zero, first + 1, first), np.where(sign[rows, first] == 0.0, first, first + 1)
 
 
-def _lowest(_: Array, smallest: Array) -> tuple[Rows, Rows]:
+def _lowest(_: Array, smallest: Array) -> tuple[Indices, Indices]:
     """Return the two parts around the smallest value."""
     least = np.argmin(smallest, axis=-1)
     return np.maximum(least - 1, 0), np.minimum(least + 1, smallest.shape[-1] - 1)
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[list[int]]:
+def _runs(flags: Mask) -> list[list[int]]:
     """Return the rows of each unbroken run of true flags."""
     groups = groupby(range(len(flags)), key=lambda row: bool(flags[row]))
     return [list(rows) for true, rows in groups if true]

@@ -9,15 +9,13 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ConvergenceError, unknown_name
 from ...foundation.quantity import with_unit
 from ...model import FlatModel
 from ...model.roles import measured_motion
 from ...model.transform import named
-
-Array = NDArray[np.float64]
 
 
 def rate_state(model: FlatModel, angle: str) -> str:

@@ -24,6 +24,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.linear import LinearModel
@@ -273,9 +274,6 @@ def _extrapolated(values: list[Array]) -> Array:
     same = (values[0] == values[1]) & (values[1] == values[2])
     result: Array = np.where(same, values[0], limit)
     return result
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

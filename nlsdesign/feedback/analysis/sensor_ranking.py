@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import typeset_unit
 from ...model import FlatModel
@@ -26,7 +26,6 @@ from .kalman import NoiseAssumptions, best_covariances, declared_deviation, devi
 from .rest import evaluate_rows
 from .rest_points import RestPoints, limit_at_zero_speed, rest_points
 
-Array = NDArray[np.float64]
 Sizes = Callable[[str], float]
 
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...model import FlatModel, Variable
 from ...model.roles import spring_torque
 from .rest_points import PlantMode, RestPoints
 from .sweep import Columns, View
 
-Array = NDArray[np.float64]
 _STILL = 1e-9
 """Share of the size of an eigenvalue below which its real or imaginary part counts as zero."""
 

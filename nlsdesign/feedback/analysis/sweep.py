@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array, Mask
 from ...foundation.data_frames import Axis, data_frame, data_set
 from ...foundation.errors import unknown_name
 from ...foundation.quantity import typeset_unit
@@ -23,8 +23,6 @@ from ...foundation.writing import write_table
 from ...model import FlatModel, Variable
 from ...model.roles import measured_motion
 from .rest_points import RestPoint, RestPoints, rest_points
-
-Array = NDArray[np.float64]
 
 
 class Columns(NamedTuple):
@@ -292,7 +290,7 @@ def covariance_without_measurement(transition: Array, noise: Array) -> Array:
     return np.where((radius < 1.0)[:, None, None], symmetric(total), np.inf)
 
 
-def riccati(transition: Array, information: Array, noise: Array) -> tuple[Array, NDArray[np.bool_]]:
+def riccati(transition: Array, information: Array, noise: Array) -> tuple[Array, Mask]:
     """Return the steady prior covariance of each Kalman filter, and whether there is one.
 
     P = Φ·(P − P·Cᵀ(C·P·Cᵀ + R)⁻¹C·P)·Φᵀ + Q by structure-preserving doubling: after k steps it is the
@@ -334,9 +332,9 @@ def riccati(transition: Array, information: Array, noise: Array) -> tuple[Array,
     return np.where(settled[:, None, None], h, np.nan), settled
 
 
-def _decays(transition: Array, information: Array, prior: Array) -> NDArray[np.bool_]:
+def _decays(transition: Array, information: Array, prior: Array) -> Mask:
     """Tell whether the error of each filter decays: Φ·(I + P·CᵀR⁻¹C)⁻¹ has all eigenvalues inside 1."""
     error = transition @ np.linalg.inv(np.eye(transition.shape[-1]) + prior @ information)
     radius = np.max(np.abs(np.linalg.eigvals(error)), axis=-1, initial=0.0)
-    decays: NDArray[np.bool_] = radius < 1.0 - 1e-12
+    decays: Mask = radius < 1.0 - 1e-12
     return decays

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ...foundation.errors import ArrangementError, ConvergenceError, ValueRangeError, nearest, unknown_name
 from ...foundation.symbolic import Expression
@@ -262,7 +261,6 @@ def _check_tables(controller: FlatModel, known: set[str]) -> None:
             )  # fmt: skip
 
 
-Array = NDArray[np.float64]
 Drive = Callable[[float], float] | float
 
 OBSERVER, CONTROLLER = "observer", "controller"

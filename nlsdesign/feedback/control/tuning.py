@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError, ValueRangeError
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import declared_prior
@@ -16,9 +16,6 @@ from .closed_loop import ClosedLoop
 from .evaluation.margins import loop_margins, output_impedance
 from .evaluation.onset import checked_gains
 from .evaluation.responses import sine_response
-
-Array = NDArray[np.float64]
-
 
 _TRIED = 9
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
 from ....model import FlatModel, Table
 from ....model.roles import measured_motion
@@ -78,9 +78,6 @@ def with_fine_counts(model: FlatModel) -> FlatModel:
     names = ([function.name_in(i) for i in range(function.n_in())],
              [function.name_out(i) for i in range(function.n_out())])  # fmt: skip
     return replace(model, equations=ca.Function(function.name(), arguments, results, *names))
-
-
-Array = NDArray[np.float64]
 
 
 class LinearMode(ABC):

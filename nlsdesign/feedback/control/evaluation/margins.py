@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ValueRangeError
 from ....model.roles import moved_load, series_spring
 from ....simulation.sampled_batch import PLANT
@@ -22,8 +22,6 @@ from ..closed_loop import ClosedLoop
 from ..laws.law_writer import GAIN
 from .linear_loop import Complex, LinearLoop, assembled, linear_loop, plant_of
 from .linear_parts import LinearMode, LinearPlant, SlidingPlant, SlopedTables, TableSlope, with_fine_counts
-
-Array = NDArray[np.float64]
 
 _POINTS = 600
 
@@ -278,10 +276,10 @@ class CoupledStability:
     frequency: Array
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Where the coupled loop is stable or at its limit, shape (i, s)."""
         # A free load has a double eigenvalue at one, which rounding parts by 1e-8.
-        result: NDArray[np.bool_] = self.radius < 1.0 + 1e-6
+        result: Mask = self.radius < 1.0 + 1e-6
         return result
 
 

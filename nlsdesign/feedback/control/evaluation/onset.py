@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError, unknown_name
 from ....model.roles import measured_motion, series_spring
 from ....model.transform import named
@@ -24,8 +24,6 @@ from .linear_loop import linear_loop
 from .linear_parts import LinearMode
 from .loop_verdict import DIVERGED, LIMIT_CYCLE, LoopJudge, LoopVerdict
 from .responses import PeriodicDrive, PeriodicRun, held_drive, run_periodic, sine_drive
-
-Array = NDArray[np.float64]
 
 _STEPS = 160
 _ANGLES = 40

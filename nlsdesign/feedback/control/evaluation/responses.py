@@ -19,6 +19,7 @@ from itertools import count
 import numpy as np
 from numpy.typing import NDArray
 
+from ....foundation.arrays import Array, Indices
 from ....foundation.errors import ValueRangeError
 from ....model.roles import moved_load
 from ....simulation import Trace
@@ -28,8 +29,7 @@ from ..closed_loop import ClosedLoop
 from ..laws.known_drive import check_torque
 from .loop_verdict import NO_ANSWER, UNSETTLED, LoopJudge, LoopVerdict, tangent_stiffness, without_harmonics
 
-Array = NDArray[np.float64]
-Drives = Callable[[Array, NDArray[np.intp]], Mapping[str, Array | float]]
+Drives = Callable[[Array, Indices], Mapping[str, Array | float]]
 """Takes times, shape (T,), and the numbers of the runs; returns open inputs, shape (runs, T) or numbers."""
 
 TRANSIENT = 0.5
@@ -67,7 +67,7 @@ class PeriodicDrive:
     parameters: Mapping[str, Array | float] = field(default_factory=dict)
     cycles: int | None = None
 
-    def windows(self, sample_time: float) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    def windows(self, sample_time: float) -> tuple[Indices, Indices, Array]:
         """Return samples and cycles of the window of each run, and the frequencies that fit them.
 
         Parameters
@@ -192,7 +192,7 @@ class _Setup:
 class _Group:
     """Runs of similar length, advanced together."""
 
-    def __init__(self, setup: _Setup, group: NDArray[np.intp]) -> None:
+    def __init__(self, setup: _Setup, group: Indices) -> None:
         self.loop, self.drive, self.group, self.judge = setup.judge.loop, setup.drive, group, setup.judge
         self.keep, self.system = setup.keep, setup.system
         self.parameters = {
@@ -202,8 +202,8 @@ class _Group:
 
     def run(
         self,
-        samples: NDArray[np.intp],
-        cycles: NDArray[np.intp],
+        samples: Indices,
+        cycles: Indices,
         used: Array,
         translate: Translate,
     ) -> dict[int, PeriodicRun]:
@@ -512,7 +512,7 @@ def sine_drive(
     omega = 2.0 * math.pi * plain.windows(loop.sample_time)[2]
     size = amplitude * np.ones(len(omega))
 
-    def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
+    def drives(time: Array, runs: Indices) -> dict[str, Array | float]:
         return {loop.desired: offset + size[runs, None] * np.sin(omega[runs, None] * time)}
 
     return PeriodicDrive(frequencies=frequencies, drives=drives, parameters=parameters or {}, cycles=cycles)
@@ -535,7 +535,7 @@ def held_drive(
         Of the loop by full name, numbers or shape (runs,).
     """
 
-    def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
+    def drives(time: Array, runs: Indices) -> dict[str, Array | float]:
         share = 0.475 - 0.475 * np.cos(math.pi * np.minimum(time / _APPROACH, 1.0))
         return {loop.desired: torques[runs, None] * np.where(time >= _APPROACH, 1.0, share)}
 
@@ -606,7 +606,7 @@ def zero_torque(
     plain = PeriodicDrive(frequencies=wanted, drives=lambda _, __: {}, cycles=cycles)
     omega = 2.0 * math.pi * plain.windows(loop.sample_time)[2]
 
-    def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
+    def drives(time: Array, runs: Indices) -> dict[str, Array | float]:
         turned = omega[runs, None] * time
         return {
             loop.desired: 0.0,

@@ -13,8 +13,8 @@ from typing import ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
@@ -237,8 +237,6 @@ def check_settings(part: object) -> None:
         if isinstance(value, int | float) and not (math.isfinite(value) and value >= 0.0):
             raise ValueRangeError(f"{name} {value:g}", "must be finite and not negative")
 
-
-Array = NDArray[np.float64]
 
 POINTS = 257
 """Grid points of the table of the stiffness; odd, so that zero is one of them."""

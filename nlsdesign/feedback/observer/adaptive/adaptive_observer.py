@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
 from ....foundation.prefixes import prefixed
 from ....foundation.quantity import typeset_unit
@@ -48,8 +48,6 @@ from .duty_and_directions import (
     uncertain_directions,
 )
 from .filter_equations import FilterEquations, FilterNoise, expected_inputs, first_states, pairs
-
-Array = NDArray[np.float64]
 
 DEVIATION, SPREAD, INFLATION = "deviation", "standard_deviation", "unrest"
 """Endings of the name of the estimate: slow states, the deviation that the filter expects, and the factor on

@@ -23,16 +23,14 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Variable
 from ..scheduling.angle_form import AngleForm, AngleScheduledPlant
 from ..scheduling.step import ObserverStep, held, linear
 from ..scheduling.table import Compact, Entry
 from .duty_and_directions import UncertainDirections, spring_inertia
-
-Array = NDArray[np.float64]
 
 KINDS = ("estimate", "next", "prior", "coupling", "shift")
 NEGLIGIBLE = 1e-4

@@ -24,14 +24,12 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....simulation.prior import Prior
 from ...analysis.rest import evaluate_rows
 from ..scheduling.angle_form import AngleForm
-
-Array = NDArray[np.float64]
 
 POINTS = 96
 """Operating points along one period of each frequency."""

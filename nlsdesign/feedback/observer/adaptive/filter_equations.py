@@ -29,7 +29,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from ....foundation.symbolic import Expression
@@ -38,8 +37,6 @@ from ..scheduling.step import speed_change
 from ..scheduling.table import Compact
 from .adaptive_step import AdaptiveStep
 from .duty_and_directions import Trust
-
-Array = NDArray[np.float64]
 
 LOW_PASS_TIME = 0.01
 """Seconds by which an angle lags the measured one; their distance says whether the actuator moves at all."""

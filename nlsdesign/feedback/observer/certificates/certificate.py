@@ -10,8 +10,8 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ConvergenceError, MeasurementError, ValueRangeError
 from ....foundation.prefixes import shared_prefix, without_power
 from ....model import FlatModel
@@ -30,8 +30,6 @@ from .exact import (
 )
 from .polytope import ErrorPolytope, error_polytope
 from .torque_bound import Assumptions, TorqueErrorBound, torque_bound
-
-Array = NDArray[np.float64]
 
 LITERALS = 1e-5
 """Part of the contraction kept for numbers that the C code rounds: four roundings of a float in each entry of

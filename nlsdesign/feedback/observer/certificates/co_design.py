@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
 from ..scheduling.angle_form import AngleScheduledPlant
 from ..scheduling.step import ConstantGain, linear
 from .exact import corners
 from .polytope import friction_slopes, scaling
-
-Array = NDArray[np.float64]
 
 SOLVED = ("Solved", "AlmostSolved")
 

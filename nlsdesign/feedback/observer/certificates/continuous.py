@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
 from ....model import FlatModel
 from ....model.roles import measured_motion, spring_torque
@@ -23,8 +23,6 @@ from ..scheduling.scheduled import whole_contour
 from .co_design import MARGIN, GainAndLyapunov, Inequality, fastest, minimised, noise_inequality
 from .error_system import ErrorSystem, error_system
 from .exact import combined, exact, is_positive_definite, times, transposed
-
-Array = NDArray[np.float64]
 
 BANDWIDTH = 20.0
 """Hz; no faster decay is sought where none is asked for."""

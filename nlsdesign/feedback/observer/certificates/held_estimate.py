@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....model import FlatModel
 from ..scheduling.scheduled import ObserverDesign
@@ -26,8 +27,6 @@ from ..scheduling.table import ColumnPlace, Compact
 from .certificate import declared_assumptions
 from .exact import corners
 from .torque_bound import OPERATIONS, ROUNDING, SLACK, Assumptions, torque_bound
-
-Array = NDArray[np.float64]
 
 
 def clamped_estimate_bound(rows: ArrayLike, estimated: ArrayLike, true: ArrayLike) -> float:

@@ -16,15 +16,14 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError, unknown_name
 from ....model import FlatModel
 from ....model.transform import with_outputs, without_idle_states
 from ..scheduling.scheduled import ObserverDesign
 from .intervals import Bounds, Range, enclose
-
-Array = NDArray[np.float64]
 
 NARROWEST = 1e-7
 """Width in rad below which a range of angles around the knot of a contour is not divided further."""

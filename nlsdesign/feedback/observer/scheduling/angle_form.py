@@ -19,16 +19,14 @@ from typing import NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError, unknown_name
 from ....model import FlatModel, Variable
 from ....model.paper_form import GEOMETRIC, PaperFormNames, paper_form
 from ....model.transform import with_outputs, without_idle_states
 from ...analysis.rest import RestSolver, evaluate_rows, rate_state, rest_states, typical_sizes
-
-Array = NDArray[np.float64]
 
 
 class Coefficients(NamedTuple):

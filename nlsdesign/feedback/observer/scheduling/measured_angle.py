@@ -8,16 +8,14 @@ from typing import Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Plausibility, Variable
 from ....model.declared_limits import declared_reading
 from ....simulation import Trace, simulate
 from .angle_form import AngleScheduledPlant
-
-Array = NDArray[np.float64]
 
 FASTER = 2.0
 """Times the typical speed that a motion has at most where the deck does not declare a largest rate."""

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.quantity import typeset_unit
 from ....foundation.symbolic import Expression
@@ -31,8 +31,6 @@ from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
 from .step import CascadeGain, FittedGain, GainRule, ObserverStep, speed_change
 from .table import Compact, Draft, FineEntries, Grid, TableTorqueError
 from .torque_grid import RESOLUTION, GridByTorqueError, TableTrial
-
-Array = NDArray[np.float64]
 
 MEMORY, ESTIMATE, INNOVATION, PREVIOUS = "memory", "estimate", "innovation", "previous"
 """What is added to a name of the plant for variables that the plant does not have."""

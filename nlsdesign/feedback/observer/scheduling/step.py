@@ -21,14 +21,13 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import place_poles
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ....foundation.symbolic import Expression
 from ....model import Variable
 from ...analysis.kalman import discrete_noise, steady_state_kalman
 from .angle_form import AngleScheduledPlant
 from .table import Entry
-
-Array = NDArray[np.float64]
 
 
 def held(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:

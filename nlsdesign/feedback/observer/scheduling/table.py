@@ -15,14 +15,12 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, ValueRangeError
 from ....foundation.quantity import typeset_unit
 from ....model import FlatModel, Table, Variable
 from .angle_form import AngleScheduledPlant
-
-Array = NDArray[np.float64]
 
 SHARE = 0.1
 """Part of the tolerance that may be spent on making an entry a literal or letting it share a column."""

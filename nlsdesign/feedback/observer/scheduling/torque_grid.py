@@ -13,8 +13,8 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, ValueRangeError
 from ....foundation.quantity import typeset_unit
 from ....model import FlatModel
@@ -32,8 +32,6 @@ from .table import (
     check_range,
     linearly,
 )
-
-Array = NDArray[np.float64]
 
 SPAN = 2.0
 """Length of a motion in s."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
 from ....model import FlatModel, Variable
 from ....model.roles import measured_motion, spring_torque
@@ -22,8 +22,6 @@ from ....simulation.sampled_batch import PLANT, SampledSystem
 from ..adaptive.duty_and_directions import Duty, operating_points, push, spring_inertia
 from ..scheduling.angle_form import minimal_form
 from ..scheduling.scheduled import whole_contour
-
-Array = NDArray[np.float64]
 
 SERVO = "servo"
 BANDWIDTH = 25.0
