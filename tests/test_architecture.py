@@ -78,7 +78,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
         {"diagnose"},
     ),
-    "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
+    "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"parametric"}, {"jobs"}),
     "feedback.observer": ({"scheduling"}, {"certificates", "adaptive"}, {"spread"}),
     "feedback.control": ({"laws"}, {"closed_loop"}, {"evaluation"}, {"tuning"}),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "target", "modelica"}, {"ssp"}),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 # The server is a room mate of the session but must answer before any numerical library is loaded, so what
 # the session brings is imported when it is first asked for.
 if TYPE_CHECKING:
+    from ..design.parametric.question import TargetPoint
     from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
     from .background import WorkState
     from .edits import (
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from .gallery import GalleryCard, gallery_cards, gallery_question, question_of, question_of_deck
     from .live_design import LiveDesign
     from .live_snapshots import Snapshot
-    from .question import LiveQuestion, TargetPoint
+    from .question import LiveQuestion
     from .saved import SavedDesign, reopened
     from .work import (
         CloudAnswer,

@@ -11,20 +11,13 @@ from typing import Any, ClassVar
 
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
+from ..design.optimisation.limit_kinds import LIMIT_KINDS
+from ..design.parametric.question import ChosenMachine, TargetPoint
 from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
-from .limit_kinds import LIMIT_KINDS
 from .limit_words import in_words
-from .question import (
-    LARGEST_ANGLE,
-    LARGEST_TORQUE,
-    LEAST_STEP,
-    ChosenMachine,
-    LiveQuestion,
-    TargetPoint,
-    finite_in,
-)
+from .question import LARGEST_ANGLE, LARGEST_TORQUE, LEAST_STEP, LiveQuestion, finite_in
 
 _LONGEST_NAME = 200
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
 from ..design import CamDesign, Contour, DesignSettings, Limit, Target, design_cam
+from ..design.parametric.solver import ParametricDesign
 from ..foundation.errors import ConvergenceError, InfeasibleError
 from ..foundation.prefixes import prefixed
 from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
 from .limit_words import in_words
 from .question import LiveQuestion
-from .quick_design import QuickDesign
 from .views import not_kept, unkept, view_of
 
 STARTS = 8
@@ -86,7 +86,7 @@ def whole_design(
 
 
 def full_answer(
-    full: FullDesign, question: LiveQuestion, quick: LiveAnswer, solved: QuickDesign | None
+    full: FullDesign, question: LiveQuestion, quick: LiveAnswer, solved: ParametricDesign | None
 ) -> LiveAnswer:
     """Return the answer that replaces the quick one, with what differs between the two in its message.
 
@@ -126,7 +126,7 @@ def full_answer(
     return replace(quick, state="solved", source="full", message=message, design=view, conflicts=())
 
 
-def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> list[str]:
+def _differences(design: CamDesign, solved: ParametricDesign, quick: DesignView) -> list[str]:
     """Return in words where the quick answer was another optimum, or the finished assembly is another."""
     cost, largest, sentences = design.starts[design.taken].cost, design.target.largest, []
     was, there = (f"{prefixed(each)} rms" for each in (quick.rms_error, design.predicted_rms))

@@ -12,6 +12,8 @@ from ..components.assembly.deck_template import load_template
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
 from ..design import MaximumStrain, MaximumStress, contour_of_cam
+from ..design.optimisation.defaults import BREAKS
+from ..design.parametric.question import ChosenMachine, TargetPoint
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque
 from ..foundation.arrays import Array
@@ -19,8 +21,8 @@ from ..foundation.deck import Deck, deck_names, load_deck, read_deck, template_n
 from ..foundation.errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
-from .question import ChosenMachine, LiveQuestion, TargetPoint
-from .stretch import BREAKS, declared_strain
+from .question import LiveQuestion
+from .stretch import declared_strain
 
 MOST_DECK_BYTES = 400_000
 """Largest deck that is read."""
@@ -126,7 +128,7 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     ArrangementError
         If it has no cam spring, or none whose contour can be designed, or one that gives no torque.
     """
-    blank = LiveQuestion(title, ChosenMachine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
+    blank = LiveQuestion(ChosenMachine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)), title=title)
     cam = blank.cam
     if cam.last_angle is not None:
         last = blank.machine.model.values[cam.last_angle]

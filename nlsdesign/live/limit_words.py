@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
+from ..design.optimisation.limit_kinds import LIMIT_KINDS
+from ..design.parametric.question import LimitNumber
 from .answers import LimitMargin
-from .limit_kinds import LIMIT_KINDS
-from .question import LimitNumber, LiveQuestion
+from .question import LiveQuestion
 
 _OTHERS = {
     "MaximumTorqueError": "torque error that is allowed",

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ..design.parametric.solver import ParametricSolver
 from .full_design import FullDesign
 from .live_moment import LiveMoment, first_moment, next_moment, opened_moment, settled_moment
 from .question import LiveQuestion
-from .quick_design import QuickSolver
 
 MOST_UNDO = 200
 """Steps that can be undone."""
@@ -23,7 +23,7 @@ class LiveHistory:
     """
 
     def __init__(self, question: LiveQuestion, values: dict[str, float]) -> None:
-        self._solver = QuickSolver()
+        self._solver = ParametricSolver()
         self._grip: str | None = None
         self.past: list[LiveMoment] = []
         self.future: list[LiveMoment] = []

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+from ..design.parametric.solver import DesignedNumbers, ParametricDesign, ParametricSolver
 from .answers import LiveAnswer
 from .at_angle import AngleView
 from .full_design import FullDesign, angle_view_of, full_answer
 from .limit_words import holding
 from .question import LiveQuestion
-from .quick_design import DesignedNumbers, QuickDesign, QuickSolver
-from .views import controls_of, not_kept
+from .views import controls_of, not_kept, quick_view_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class LiveMoment:
 
     question: LiveQuestion
     answer: LiveAnswer
-    solved: QuickDesign | None
+    solved: ParametricDesign | None
     numbers: DesignedNumbers | None
     shown: AngleView | None
 
@@ -74,7 +74,7 @@ class LiveMoment:
         return replace(self, answer=answer, shown=shown)
 
 
-def first_moment(solver: QuickSolver, question: LiveQuestion, values: dict[str, float]) -> LiveMoment:
+def first_moment(solver: ParametricSolver, question: LiveQuestion, values: dict[str, float]) -> LiveMoment:
     """Return the moment with which a session begins.
 
     Parameters
@@ -89,7 +89,7 @@ def first_moment(solver: QuickSolver, question: LiveQuestion, values: dict[str, 
     return _answered(solver, question, None, None, values)
 
 
-def next_moment(solver: QuickSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
+def next_moment(solver: ParametricSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
     """Return the moment of a changed question, answered from the design of the one before.
 
     Parameters
@@ -105,7 +105,7 @@ def next_moment(solver: QuickSolver, question: LiveQuestion, before: LiveMoment)
 
 
 def opened_moment(
-    solver: QuickSolver, question: LiveQuestion, before: LiveMoment, values: dict[str, float]
+    solver: ParametricSolver, question: LiveQuestion, before: LiveMoment, values: dict[str, float]
 ) -> LiveMoment:
     """Return the moment of a question that was opened, answered as if nothing had been before.
 
@@ -123,7 +123,7 @@ def opened_moment(
     return _answered(solver, question, before, None, values)
 
 
-def settled_moment(solver: QuickSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
+def settled_moment(solver: ParametricSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
     """Return the moment with the whole design as its answer, beside which the next drag begins.
 
     Parameters
@@ -147,16 +147,21 @@ def settled_moment(solver: QuickSolver, moment: LiveMoment, full: FullDesign) ->
 
 
 def _answered(
-    solver: QuickSolver, question: LiveQuestion, before: LiveMoment | None, beside: QuickDesign | None,
+    solver: ParametricSolver,
+    question: LiveQuestion,
+    before: LiveMoment | None,
+    beside: ParametricDesign | None,
     values: dict[str, float],
-) -> LiveMoment:  # fmt: skip
+) -> LiveMoment:
     began = time.perf_counter()
     revision = before.answer.revision + 1 if before else 1
     solved, outcome = solver.answer(question, beside, values)
     shown = before.shown if before else None
     message = outcome.words
     if solved is not None:
-        shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.numbers.machine)
+        shown = AngleView(
+            quick_view_of(question, revision, solved), solved.contour, question.cam, solved.numbers.machine
+        )
         sentences = [*shown.view.beyond, *([] if shown.view.met else [missed(question, shown)])]
         message = "; ".join([*sentences, *not_kept(question, shown.view.margins)])
     controls = controls_of(question, can_undo=before is not None, can_redo=False)

@@ -14,11 +14,12 @@ import numpy as np
 from ..components.assembly.deck_writer import deck_text, declare
 from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_of
 from ..design.curves.numbers import plain
+from ..design.optimisation.limit_kinds import LIMIT_KINDS
+from ..design.parametric.question import ChosenMachine, TargetPoint
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
-from .limit_kinds import LIMIT_KINDS
-from .question import ChosenMachine, LiveQuestion, TargetPoint
+from .question import LiveQuestion
 
 _DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
 _MOST_VALUES = 200
@@ -120,7 +121,9 @@ def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
     limits, ranges = _limits_of(job.keep)
     machine = ChosenMachine(actuator, str(begin.get("material", ""))[:100])
     machine = replace(machine, designed=_contour_of(begin, machine))
-    question = LiveQuestion(str(begin.get("title", actuator.name))[:100], machine, points, limits, (), ranges)
+    question = LiveQuestion(
+        machine, points, limits, (), ranges, title=str(begin.get("title", actuator.name))[:100]
+    )
     given = [each for each in begin.get("points", []) if isinstance(each, list) and len(each) == 2]
     if len(given) == 2 and len(points) == 3:
         question = replace(question, points=(points[0], points[2]))

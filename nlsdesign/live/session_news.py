@@ -9,10 +9,10 @@ from typing import Any
 
 from ..components.materials.library import materials
 from ..components.materials.material_law import missing_law
+from ..design.optimisation.limit_kinds import LIMIT_KINDS
 from ..foundation.errors import NlsError
 from .answers import LiveAnswer, to_json
 from .gallery import gallery_cards
-from .limit_kinds import LIMIT_KINDS
 from .limit_words import in_words
 from .live_design import LiveDesign
 from .outbox import Outbox

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..design import CamDesign, LimitState
 from ..design.optimisation.result import DesignCurves
+from ..design.parametric.solver import ParametricDesign
 from ..foundation.arrays import Array
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
 from .limit_words import shown_value
@@ -153,6 +154,28 @@ def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignV
         rubber_volume=design.rubber_volume,
         strain_end=smallest(question.machine.strain_ends),
         beyond=stretched_beyond(question.machine.strain_ends, columns),
+    )
+
+
+def quick_view_of(question: LiveQuestion, revision: int, design: ParametricDesign) -> DesignView:
+    """Return what is shown of a quick design: its torque is that of the program's nodes."""
+    curves, limits, largest = design.curves, design.limits, question.target_size
+    columns, ends = curve_columns(curves, design.targets), question.machine.strain_ends
+    return DesignView(
+        revision=revision,
+        checked=False,
+        columns=columns,
+        rms_error=design.rms,
+        largest_error=float(np.max(np.abs(curves.torques - design.targets))),
+        relative_error=design.rms / largest,
+        met=design.rms <= ALLOWED * largest,
+        margins=margins_of(limits),
+        active=tuple(dict.fromkeys(state.limit for state in limits if state.active)),
+        numbers=shown_numbers(question, design.values),
+        contour=design.contour.points,
+        rubber_volume=design.rubber_volume,
+        strain_end=smallest(ends),
+        beyond=stretched_beyond(ends, columns),
     )
 
 

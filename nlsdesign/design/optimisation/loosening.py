@@ -19,6 +19,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.processes import parallel_map
 from ...foundation.quantity import parse_unit, with_unit
+from .defaults import BREAKS
 from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
 from .problem import contour_names
@@ -31,8 +32,6 @@ FEASIBLE = 1e-6
 _MOST = 1e3
 _MOST_RAISED = 10.0
 """Beyond this factor a give is no advice but another design."""
-_MOST_STRAIN = 5.0
-"""Nominal strain at which soft rubbers break: the tensile curve of PMC-770 ends there (Schepelmann 2014)."""
 _RANGE = 4.0
 """By what factor a size that is freed may leave its present value, either way."""
 
@@ -69,7 +68,7 @@ class Give:
     @property
     def sensible(self) -> bool:
         """Whether a designer could consider it: within ten times, and within what rubber can stretch."""
-        if self.bound.value == 0.0 or (self.bound.unit == "1" and self.moved > _MOST_STRAIN):
+        if self.bound.value == 0.0 or (self.bound.unit == "1" and self.moved > BREAKS):
             return False
         ratio = self.moved / self.bound.value
         return ratio <= _MOST_RAISED if self.bound.upper else ratio >= 1.0 / _MOST_RAISED

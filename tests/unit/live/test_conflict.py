@@ -7,10 +7,10 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from nlsdesign.design.optimisation.limit_kinds import LIMIT_KINDS
+from nlsdesign.design.parametric.program import SoftenedProgram
+from nlsdesign.design.parametric.rows import ProgramRows
 from nlsdesign.live import gallery_question
-from nlsdesign.live.limit_kinds import LIMIT_KINDS
-from nlsdesign.live.quick_conflict import SoftenedProgram
-from nlsdesign.live.quick_rows import QuickRows
 
 
 def test_a_slack_widens_its_limit_and_no_other() -> None:
@@ -21,7 +21,7 @@ def test_a_slack_widens_its_limit_and_no_other() -> None:
         question, limits={"MaximumCamRadius": 0.03, "PositiveStiffness": 0.1, **question.limits}
     )
     assert set(question.limits) == set(LIMIT_KINDS)
-    rows = QuickRows(question)
+    rows = ProgramRows(question)
     program = SoftenedProgram(rows).program
     count, values = len(rows.bounds), rows.numbers_of(question)
     given = ca.Function("rows", [program["x"], program["p"]], [program["g"], program["f"]])

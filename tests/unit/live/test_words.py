@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nlsdesign.design.optimisation.defaults import StrainEnd
+from nlsdesign.design.optimisation.limit_kinds import LIMIT_KINDS
 from nlsdesign.live import FreeNumber, HoldNumber, LiveQuestion, gallery_question
 from nlsdesign.live.answers import LimitMargin, LiveColumn
-from nlsdesign.live.limit_kinds import LIMIT_KINDS
 from nlsdesign.live.limit_words import holding, in_words
-from nlsdesign.live.stretch import StrainEnd, smallest, stretched_beyond
+from nlsdesign.live.stretch import smallest, stretched_beyond
 from nlsdesign.live.views import not_kept
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..design.curves.numbers import plain
-from ..design.optimisation.limits import (
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import parse_unit, with_unit
+from ..curves.numbers import plain
+from .limits import (
     Limit,
     MaximumCableTension,
     MaximumCamRadius,
@@ -14,8 +16,6 @@ from ..design.optimisation.limits import (
     MinimumRadiusOfCurvature,
     PositiveStiffness,
 )
-from ..foundation.errors import ValueRangeError
-from ..foundation.quantity import parse_unit, with_unit
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The quick answer: the design beside the previous one, from a program that is kept."""
+"""Designs from programs that are kept: each begins beside the one before."""
 
 from __future__ import annotations
 
@@ -10,29 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from ..components.assembly.named_parts import Assembly
-from ..design import (
-    CamDesign,
-    Contour,
-    LimitState,
-    MaximumCableTension,
-    MaximumStrain,
-    MaximumStress,
-    cam_from_profile,
-    contour_from_curvature,
-    contour_of_cam,
-)
-from ..design.optimisation.result import DesignCurves
-from ..foundation.arrays import Array
-from ..foundation.quantity import Quantity
-from ..model.derived_deck import derived
-from .answers import DesignView
-from .question import LiveQuestion
-from .quick_program import QuickProgram
-from .quick_rows import structure_of
-from .quick_search import QuickOutcome, QuickPoint
-from .stretch import smallest, stretched_beyond
-from .views import ALLOWED, curve_columns, margins_of, shown_numbers
+from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array
+from ...foundation.quantity import Quantity
+from ...model.derived_deck import derived
+from ..optimisation.limits import MaximumCableTension, MaximumStrain, MaximumStress
+from ..optimisation.result import CamDesign, DesignCurves, LimitState
+from ..statics.contour import Contour, contour_from_curvature
+from ..statics.declared_cam import cam_from_profile, contour_of_cam
+from .program import ParametricProgram, SearchOutcome, SearchPoint
+from .question import CamQuestion
+from .rows import structure_of
 
 _MOST_PROGRAMS = 4
 """Programs that are kept; one takes about 30 MB."""
@@ -60,7 +48,7 @@ class DesignedNumbers:
         Whether the contour was designed; otherwise it is that of the machine.
     """
 
-    question: LiveQuestion
+    question: CamQuestion
     values: dict[str, float]
     contour: Contour
     shaped: bool
@@ -88,7 +76,7 @@ class DesignedNumbers:
 
 
 @dataclass(frozen=True, eq=False)
-class QuickDesign:
+class ParametricDesign:
     """A solved question.
 
     Parameters
@@ -103,9 +91,9 @@ class QuickDesign:
         Sum of the goals there.
     """
 
-    program: QuickProgram
-    question: LiveQuestion
-    point: QuickPoint
+    program: ParametricProgram
+    question: CamQuestion
+    point: SearchPoint
     cost: float
 
     @cached_property
@@ -142,64 +130,57 @@ class QuickDesign:
         shaped = self.program.rows.problem.contour is not None
         return DesignedNumbers(self.question, chosen, self.contour, shaped)
 
-    def view(self, revision: int) -> DesignView:
-        """Return what is shown of it.
+    @property
+    def rms(self) -> float:
+        """Rms torque error in N·m."""
+        return float(np.sqrt(max(self._numbers["mean_square"][0], 0.0)))
 
-        Parameters
-        ----------
-        revision
-            Of the question.
-        """
+    @property
+    def rubber_volume(self) -> float:
+        """Volume of all rubber in m³."""
+        return float(self._numbers["volume"][0])
+
+    @property
+    def targets(self) -> Array:
+        """Torque that is wanted at the nodes of the contour, in N·m."""
+        return self._numbers["wanted"]
+
+    @property
+    def curves(self) -> DesignCurves:
+        """What cam and rubber do at the nodes of the contour."""
         rows = self._numbers
         pieces = list(self.program.rows.problem.design.strains)
         strains, stresses = (rows[key].reshape(len(pieces), -1) for key in ("strains", "stresses"))
-        curves = DesignCurves(
+        return DesignCurves(
             angles=rows["angle"], lever_arms=rows["lever_arm"], radii=rows["radius"],
             radii_of_curvature=rows["radius_of_curvature"], torques=rows["torque"],
             stiffnesses=rows["stiffness"], extensions=rows["extension"], forces=rows["force"],
             strains=dict(zip(pieces, strains, strict=True)),
             stresses=dict(zip(pieces, stresses, strict=True)),
         )  # fmt: skip
-        states = self._limits(rows)
-        rms, largest = float(np.sqrt(max(rows["mean_square"][0], 0.0))), self.question.target_size
-        columns, ends = curve_columns(curves, rows["wanted"]), self.question.machine.strain_ends
-        return DesignView(
-            revision=revision,
-            checked=False,
-            columns=columns,
-            rms_error=rms,
-            largest_error=float(np.max(np.abs(rows["torque"] - rows["wanted"]))),
-            relative_error=rms / largest,
-            met=rms <= ALLOWED * largest,
-            margins=margins_of(states),
-            active=tuple(dict.fromkeys(each.limit for each in states if each.active)),
-            numbers=shown_numbers(self.question, self.values),
-            contour=self.contour.points,
-            rubber_volume=float(rows["volume"][0]),
-            strain_end=smallest(ends),
-            beyond=stretched_beyond(ends, columns),
-        )
 
-    def _limits(self, rows: dict[str, Array]) -> list[LimitState]:
+    @property
+    def limits(self) -> tuple[LimitState, ...]:
+        """How it stands to all limits, kept or only shown."""
         states = []
         for i, (bound, wanted) in enumerate(
             zip(self.program.rows.shown_bounds, self.program.rows.values_of(self.question), strict=True)
         ):
-            values = rows[f"bound {i}"]
+            values = self._numbers[f"bound {i}"]
             value = float(values.max() if bound.upper else values.min())
             active = abs(value - wanted) <= _ACTIVE * (abs(wanted) or 1.0)
             states.append(LimitState(bound.limit, bound.of, value, wanted, bound.upper, bound.unit, active))
-        return states
+        return tuple(states)
 
 
-class QuickSolver:
+class ParametricSolver:
     """The programs of one session, the latest first out last."""
 
     def __init__(self) -> None:
-        self._programs: OrderedDict[tuple[Any, ...], QuickProgram] = OrderedDict()
-        self._contradicted: QuickProgram | None = None
+        self._programs: OrderedDict[tuple[Any, ...], ParametricProgram] = OrderedDict()
+        self._contradicted: ParametricProgram | None = None
 
-    def program(self, question: LiveQuestion) -> QuickProgram:
+    def program(self, question: CamQuestion) -> ParametricProgram:
         """Return the program of a question, made where there is none yet.
 
         Parameters
@@ -209,14 +190,14 @@ class QuickSolver:
         """
         key = structure_of(question)
         if key not in self._programs or not self._programs[key].rows.fits(question):
-            self._programs[key] = QuickProgram(question)
+            self._programs[key] = ParametricProgram(question)
             self._programs[key].prepare()
         self._programs.move_to_end(key)
         while len(self._programs) > _MOST_PROGRAMS:
             self._programs.popitem(last=False)
         return self._programs[key]
 
-    def keeps(self, design: QuickDesign) -> bool:
+    def keeps(self, design: ParametricDesign) -> bool:
         """Tell whether the program of a design is still kept.
 
         Parameters
@@ -227,8 +208,8 @@ class QuickSolver:
         return any(each is design.program for each in self._programs.values())
 
     def answer(
-        self, question: LiveQuestion, last: QuickDesign | None, values: Mapping[str, float] = _NO_VALUES
-    ) -> tuple[QuickDesign | None, QuickOutcome]:
+        self, question: CamQuestion, last: ParametricDesign | None, values: Mapping[str, float] = _NO_VALUES
+    ) -> tuple[ParametricDesign | None, SearchOutcome]:
         """Return the design for a question, and how it was come by.
 
         Parameters
@@ -262,9 +243,9 @@ class QuickSolver:
         if outcome.state != "solved" or outcome.point is None:
             words = f"not solved yet: {outcome.words}{_unlimited(question)}"
             return None, replace(outcome, state="not solved", words=words)
-        return QuickDesign(program, question, outcome.point, outcome.cost), outcome
+        return ParametricDesign(program, question, outcome.point, outcome.cost), outcome
 
-    def beside_design(self, question: LiveQuestion, design: CamDesign) -> QuickDesign | None:
+    def beside_design(self, question: CamQuestion, design: CamDesign) -> ParametricDesign | None:
         """Return the quick design at a finished one, for the next drag to begin from.
 
         Parameters
@@ -276,7 +257,7 @@ class QuickSolver:
         """
         return self.beside_values(question, values_of_design(self.program(question), design))
 
-    def beside_values(self, question: LiveQuestion, values: dict[str, float]) -> QuickDesign | None:
+    def beside_values(self, question: CamQuestion, values: dict[str, float]) -> ParametricDesign | None:
         """Return the quick design at numbers of another; ``None`` where there is none.
 
         Parameters
@@ -290,9 +271,9 @@ class QuickSolver:
         outcome = program.from_values(question, program.outputs.scaled_values(values))
         if outcome.state != "solved" or outcome.point is None:
             return None
-        return QuickDesign(program, question, outcome.point, outcome.cost)
+        return ParametricDesign(program, question, outcome.point, outcome.cost)
 
-    def _tried(self, begin: _Beginning, last: QuickDesign | None) -> QuickOutcome:
+    def _tried(self, begin: _Beginning, last: ParametricDesign | None) -> SearchOutcome:
         program, question = begin.program, begin.question
         known = last is not None and last.program is program
         if last is not None and known:
@@ -319,8 +300,8 @@ class _Beginning:
         Of the last good design in SI by name; empty where there is none.
     """
 
-    program: QuickProgram
-    question: LiveQuestion
+    program: ParametricProgram
+    question: CamQuestion
     numbers: Mapping[str, float]
 
     @cached_property
@@ -334,7 +315,7 @@ class _Beginning:
         return self.program.rows.completed(self.question, self.values)
 
 
-def _unlimited(question: LiveQuestion) -> str:
+def _unlimited(question: CamQuestion) -> str:
     """Return what to do where nothing limits how far a search may stretch the rubber."""
     limited = {MaximumStrain.__name__, MaximumStress.__name__, MaximumCableTension.__name__}
     pretension = question.cam.pretension
@@ -346,7 +327,7 @@ def _unlimited(question: LiveQuestion) -> str:
     )
 
 
-def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:
+def values_of_design(program: ParametricProgram, design: CamDesign) -> dict[str, float]:
     """Return the variables of a finished design in SI by name.
 
     Parameters

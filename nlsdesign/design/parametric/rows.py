@@ -1,11 +1,12 @@
-"""Unknowns and rows of the quick program of one structure, and the numbers that a question gives them.
+"""Unknowns, rows and parameters of the program of one structure.
 
 Points of the target are parameters; numbers of limits are bounds of rows; numbers that are held are variables
-whose bounds meet. So a drag changes numbers only, and all expressions stand.
+whose bounds meet. So a question changes numbers only, and all expressions stand.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from functools import cached_property
@@ -13,17 +14,103 @@ from typing import Any, cast
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
-from ..design import Target
-from ..design.optimisation.limits import Bound
-from ..design.optimisation.problem import SymbolicTarget, design_problem
-from ..design.optimisation.solve import GOALS
-from ..design.optimisation.variables import DesignVariable, VariableScale, scale_of, scaled
-from ..design.statics.equilibrium import elastic_law
-from ..design.statics.rounding import has_corners
-from ..foundation.arrays import Array
-from .movable_target import MovableTarget
-from .question import LiveQuestion
+from ...foundation.arrays import Array
+from ...foundation.symbolic import Expression
+from ..curves.target import TabulatedTorque, Target
+from ..optimisation.limits import Bound
+from ..optimisation.problem import SymbolicTarget, design_problem
+from ..optimisation.solve import GOALS
+from ..optimisation.variables import DesignVariable, VariableScale, scale_of, scaled
+from ..statics.equilibrium import elastic_law
+from ..statics.rounding import has_corners
+from .question import CamQuestion
+
+
+class MovableTarget:
+    """The curve of :class:`~nlsdesign.design.TabulatedTorque` with its pieces as symbols.
+
+    It has what the design problem asks of a target, and is none itself: it has no numbers.
+
+    Parameters
+    ----------
+    pieces
+        Number of pieces between the points.
+    last_angle
+        In rad, from which bounds and starts of variables follow.
+    """
+
+    def __init__(self, pieces: int, last_angle: float) -> None:
+        self.symbols = ca.SX.sym("target", 5 * pieces + 3)
+        self._breaks = self.symbols[: pieces + 1]
+        self._rows = ca.reshape(self.symbols[pieces + 1 : 5 * pieces + 1], 4, pieces)
+        self.largest: Expression = self.symbols[5 * pieces + 1]
+        self._energy: Expression = self.symbols[5 * pieces + 2]
+        self.end: Expression = self._breaks[pieces]
+        self._pieces = pieces
+        self.last_angle = last_angle
+
+    def energy(self, angle: float) -> Expression:
+        """Return the energy below the whole curve.
+
+        Parameters
+        ----------
+        angle
+            The last one.
+        """
+        return self._energy
+
+    def torque_law(self, angle: Expression) -> Expression:
+        """Return the torque; beyond the ends the outer pieces go on.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        """
+        passed = [angle >= self._breaks[k] for k in range(1, self._pieces)]
+
+        def picked(row: Expression) -> Expression:
+            steps = [there * (row[k + 1] - row[k]) for k, there in enumerate(passed)]
+            return sum(steps, start=row[0])
+
+        local, result = angle - picked(self._breaks), ca.SX(0)
+        for row in range(4):
+            result = result * local + picked(self._rows[row, :])
+        return result
+
+    def weight_law(self, angle: Expression) -> Expression:
+        """Return one: the error counts alike everywhere.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        """
+        return 0.0 * angle + 1.0
+
+    def numbers(self, target: TabulatedTorque) -> Array:
+        """Return the numbers of the symbols for a curve with as many pieces.
+
+        Parameters
+        ----------
+        target
+            The curve.
+        """
+        return _numbers_of(target)
+
+
+@functools.lru_cache(maxsize=8)
+def _numbers_of(target: TabulatedTorque) -> Array:
+    """Return the numbers of a curve; the same array where it is asked for again, so it cannot be changed."""
+    curve = PchipInterpolator(target.angles, target.torques)
+    # The curve is monotone between its points, so the largest torque is that of a point.
+    ends = [max(target.torques), float(curve.integrate(0.0, target.last_angle))]
+    numbers: Array = np.concatenate([curve.x, curve.c.T.ravel(), ends])
+    numbers.flags.writeable = False
+    return numbers
+
 
 ROUNDING = 0.003
 """Width over which knots of a rubber's law are rounded, relative to its stretch, as a design begins."""
@@ -31,7 +118,7 @@ _RESCALED = 8.0
 """Factor of torque times angle from which the variables are scaled anew."""
 
 
-class QuickRows:
+class ProgramRows:
     """Unknowns, rows and parameters of one structure: see :func:`structure_of`.
 
     Parameters
@@ -40,7 +127,7 @@ class QuickRows:
         One of its questions, whose sizes scale the variables.
     """
 
-    def __init__(self, question: LiveQuestion) -> None:
+    def __init__(self, question: CamQuestion) -> None:
         machine, cam = question.machine, question.cam
         # Held here: structures are told apart by the identity of their machine.
         self.machine = machine
@@ -91,7 +178,7 @@ class QuickRows:
             "p": self.target.symbols,
         }
 
-    def fits(self, question: LiveQuestion) -> bool:
+    def fits(self, question: CamQuestion) -> bool:
         """Tell whether the variables are scaled for a target as large as that of a question.
 
         Parameters
@@ -102,7 +189,7 @@ class QuickRows:
         ratio = question.target_size * question.target.last_angle / self._size
         return 1.0 / _RESCALED < ratio < _RESCALED
 
-    def limits_of(self, question: LiveQuestion, room: Array | float = 0.0) -> tuple[Array, Array]:
+    def limits_of(self, question: CamQuestion, room: Array | float = 0.0) -> tuple[Array, Array]:
         """Return the bounds of the rows.
 
         Parameters
@@ -122,7 +209,7 @@ class QuickRows:
             high.append(np.full(size, at if bound.upper else np.inf))
         return np.concatenate(low), np.concatenate(high)
 
-    def values_of(self, question: LiveQuestion) -> list[float]:
+    def values_of(self, question: CamQuestion) -> list[float]:
         """Return the number of each bound, the kept ones first, as a question has it.
 
         Parameters
@@ -132,7 +219,7 @@ class QuickRows:
         """
         return [question.limit_values[bound.limit].value for bound in self.shown_bounds]
 
-    def ranges_of(self, question: LiveQuestion) -> tuple[Array, Array]:
+    def ranges_of(self, question: CamQuestion) -> tuple[Array, Array]:
         """Return the bounds of the variables: what is held has no room.
 
         Parameters
@@ -171,7 +258,7 @@ class QuickRows:
     def _scales_of_variables(self) -> dict[str, VariableScale]:
         return {variable.name: scale_of(variable) for variable in self.chosen}
 
-    def numbers_of(self, question: LiveQuestion) -> Array:
+    def numbers_of(self, question: CamQuestion) -> Array:
         """Return the numbers of the target.
 
         Parameters
@@ -181,7 +268,7 @@ class QuickRows:
         """
         return self.target.numbers(question.target)
 
-    def completed(self, question: LiveQuestion, values: Mapping[str, float]) -> Array:
+    def completed(self, question: CamQuestion, values: Mapping[str, float]) -> Array:
         """Return the unknowns that follow from some of them, with held numbers as the question has them.
 
         Parameters
@@ -210,7 +297,7 @@ class QuickRows:
         return ca.Function("states", given, [self.problem.states]), ca.Function("errors", given, [errors])
 
 
-def structure_of(question: LiveQuestion) -> tuple[Any, ...]:
+def structure_of(question: CamQuestion) -> tuple[Any, ...]:
     """Return what two questions must share for one program: equal keys, one program.
 
     Parameters
