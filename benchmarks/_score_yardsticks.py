@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
@@ -24,9 +23,8 @@ from nlsdesign.bench.identification.equation_error.filter_choice import rate_spa
 from nlsdesign.bench.identification.records.measurement import Record
 from nlsdesign.bench.identification.statistics.filters import derivative
 from nlsdesign.components import Assembly
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.model import flatten
-
-Array = NDArray[np.float64]
 
 OPEN = 1.4
 """Mean square over the floor from which BIC and pysindy take a block to lack something."""

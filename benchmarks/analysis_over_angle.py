@@ -21,7 +21,7 @@ from nlsdesign.feedback.analysis import (
     Stability,
     rest_points,
 )
-from nlsdesign.feedback.analysis.noise_assumptions import declared_deviation
+from nlsdesign.feedback.analysis.kalman import declared_deviation
 from nlsdesign.model.linear import jacobian_function
 
 COUNT, LAST, STEP, HORIZON = 2001, 0.9, 1e-3, 0.1

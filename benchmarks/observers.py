@@ -34,7 +34,7 @@ from nlsdesign.feedback.observer import (
     verify,
 )
 from nlsdesign.feedback.observer.certificates import co_design
-from nlsdesign.feedback.observer.certificates.semidefinite import Inequality, minimised
+from nlsdesign.feedback.observer.certificates.co_design import Inequality, minimised
 from nlsdesign.simulation.sampled_batch import PLANT
 
 DECKS = ("austin2015_figure_consistent", "austin2015_as_printed")

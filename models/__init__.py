@@ -1,10 +1,10 @@
 """Systems, declared in Python with the numbers of a deck. Each function returns an Assembly."""
 
-from models.cam_rubber import cam_rubber_actuator
-from models.elastomer_specimen import elastomer_specimen
-from models.linear import linear_spring_actuator
-from models.one_sided_cable_drive import one_sided_cable_drive
-from models.positioning_drive import positioning_drive
+from .cam_rubber import cam_rubber_actuator
+from .elastomer_specimen import elastomer_specimen
+from .linear import linear_spring_actuator
+from .one_sided_cable_drive import one_sided_cable_drive
+from .positioning_drive import positioning_drive
 
 __all__ = [
     "cam_rubber_actuator",

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from .bench.discrepancy.blocks.shown_values import shown_values
 from .bench.identification import Record, RecordSet
@@ -33,6 +32,7 @@ from .feedback.observer import (
     observe,
 )
 from .feedback.observer.scheduling.scheduled import whole_contour
+from .foundation.arrays import Array
 from .foundation.errors import MeasurementError, NlsError
 from .foundation.processes import parallel_map
 from .foundation.quantity import three_digits, with_unit
@@ -41,8 +41,6 @@ from .model.readings import reading_of
 from .model.roles import measured_motion, series_spring
 from .model.structure import SpringNames
 from .simulation import Trace
-
-Array = NDArray[np.float64]
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""

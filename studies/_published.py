@@ -11,14 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import CurrentSensor, ForceSensor, InextensibleCable, Through
 from nlsdesign.components.assembly.deck_writer import deck_digest
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import ParentDeck
-
-Array = NDArray[np.float64]
 
 FIG6_SAMPLE = 0.4e-3  # s; distance of the points of Fig. 6 on its time axis
 _HERE = Path(__file__).parent

@@ -16,7 +16,8 @@ import nlsdesign as nls
 from nlsdesign.bench.discrepancy import Verdict
 from nlsdesign.bench.identification import Shots, Weights, coloured_sigma
 from nlsdesign.presentation.report import PublishedNumber, TableSection, comparison_table, verdict_sections
-from studies._measured import data_folder, named_effects, write_diagnosis, write_skipped
+
+from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
 
 MAPPING = Path(__file__).with_name("emps_records.toml")
 SHORT, LONG = 1.0, 3.1  # s; windows of prediction

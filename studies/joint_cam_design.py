@@ -21,7 +21,8 @@ from nlsdesign.components import (
 )
 from nlsdesign.design import CamDesign, DesignSettings, Limit
 from nlsdesign.presentation.report import Chapter, TableSection, design_sections
-from studies._published import declared_actuator
+
+from ._published import declared_actuator
 
 TARGET = nls.ExponentialTorque(maximum=5.0, angle=nls.degrees(53.0), shape=1.0)
 CAM, RUBBER = ("spring.cam.contour", "spring.pretension"), ("spring.rubber.area", "spring.rubber.rest_length")

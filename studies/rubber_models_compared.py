@@ -29,15 +29,10 @@ from nlsdesign.components import (
     kelvin_voigt,
     maxwell,
 )
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.presentation.report import FigureSection, TableSection
-from studies._published import (
-    FIG6_SAMPLE,
-    Array,
-    bench_records,
-    declared_actuator,
-    element_loop,
-    with_bench_sensors,
-)
+
+from ._published import FIG6_SAMPLE, bench_records, declared_actuator, element_loop, with_bench_sensors
 
 EXTENSION, FORCE = "grip.position", "rubber.force"
 FITTED = ("modulus", "viscosity", "c1", "c2", "c3")

@@ -43,8 +43,9 @@ from nlsdesign.presentation.report import (
     design_sections,
     tolerance_sections,
 )
-from studies._designed import with_machined_contour
-from studies._published import declared_actuator
+
+from ._designed import with_machined_contour
+from ._published import declared_actuator
 
 BODY_MASS = nls.quantity(75.0, "kg")
 SHARE = 0.05

@@ -17,7 +17,8 @@ from nlsdesign.bench.discrepancy import Verdict
 from nlsdesign.components import FlowingChains, NeoHooke
 from nlsdesign.foundation.deck import Deck
 from nlsdesign.presentation.report import TableSection, verdict_sections
-from studies._measured import data_folder, named_effects, write_diagnosis, write_skipped
+
+from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
 
 MAPPING = Path(__file__).with_name("vhb4910_records.toml")
 FORCE = "load_cell.reading"

@@ -13,17 +13,16 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 import nlsdesign as nls
 from nlsdesign.components import Assembly, LoadFriction, tie
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import FlatModel
 from nlsdesign.presentation.report import TableSection
-from studies._measured import data_folder, write_skipped
 
-Array = NDArray[np.float64]
+from ._measured import data_folder, write_skipped
 
 MAPPING = Path(__file__).with_name("xl330_records.toml")
 GAIN_PER_KP = 8.517 / 400.0  # V/rad for each unit of kp

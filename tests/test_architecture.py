@@ -80,7 +80,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
     "feedback.observer": ({"scheduling"}, {"certificates", "adaptive"}, {"spread"}),
-    "feedback.control": ({"laws"}, {"loop"}, {"evaluation"}, {"tuning"}),
+    "feedback.control": ({"laws"}, {"closed_loop"}, {"evaluation"}, {"tuning"}),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "target", "modelica"}, {"ssp"}),
 }  # fmt: skip
 

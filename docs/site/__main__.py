@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from docs.site import check, listings, stage
+from . import check, listings, stage
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import nlsdesign
-from docs.site import markup
+
+from . import markup
 
 _ROW = re.compile(r"^\| `nls\.(\w+)` \|", re.M)
 

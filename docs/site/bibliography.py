@@ -6,8 +6,9 @@ import re
 from html import escape
 from pathlib import Path
 
-from docs.site import markup
 from nlsdesign.foundation.bibliography import Reference, cited, origins, references
+
+from . import markup
 
 
 def pages(root: Path, folder: Path) -> dict[str, str]:

@@ -11,10 +11,11 @@ from html import escape
 from pathlib import Path
 
 import nlsdesign.design as design
-from docs.site import bibliography, markup
 from nlsdesign.bench.discrepancy.effects import ALL, Effect
 from nlsdesign.bench.discrepancy.effects.plain_names import capitalised, title
 from nlsdesign.design.jobs.job_file import kinds
+
+from . import bibliography, markup
 
 _BASES: Mapping[str, tuple[type, str]] = {
     "targets": (design.Target, "The torque curve that a spring shall have."),

@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
-from docs.site import markup
 from nlsdesign.cli.main import program
+
+from . import markup
 
 
 def pages(root: Path, folder: Path) -> dict[str, str]:

@@ -6,8 +6,9 @@ import re
 from html import escape
 from pathlib import Path
 
-from docs.site import collect, markup
 from nlsdesign.cli.studies import claims, load_study, study_names
+
+from . import collect, markup
 
 
 def pages(root: Path, folder: Path) -> dict[str, str]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import nlsdesign as nls
-from docs.site import markup
 from nlsdesign.design import contour_of_cam
 from nlsdesign.presentation.figures import cam_motion_of, cam_positions
 from nlsdesign.presentation.figures.svg import inline_svg
+
+from . import markup
 
 DECK = "austin2015_figure_consistent"
 

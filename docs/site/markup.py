@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from html import escape
 
-from docs.site import formula
+from . import formula
 
 _SECTION = re.compile(r"^(Parameters|Returns|Raises|Examples|Yields|Notes)\n-+\n", re.M)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from docs.site import bibliography, markup
 from nlsdesign.components.materials import library
+
+from . import bibliography, markup
 
 
 def pages(root: Path, folder: Path) -> dict[str, str]:

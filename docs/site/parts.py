@@ -9,8 +9,6 @@ from concurrent.futures import ProcessPoolExecutor
 from html import escape
 from pathlib import Path
 
-from docs.site import bibliography, formula, markup, part_figures
-from docs.site.rooms import room_of
 from nlsdesign.components import Part
 from nlsdesign.components.assembly.deck_reader import component_classes
 from nlsdesign.components.assembly.deck_writer import deck_text
@@ -20,6 +18,9 @@ from nlsdesign.foundation.quantity import Quantity, typeset_unit
 from nlsdesign.presentation.figures.svg import inline_svg
 from tests.parts import examples
 from tests.parts.systems import around
+
+from . import bibliography, formula, markup, part_figures
+from .rooms import room_of
 
 ROOMS = {
     "core": ("Springs, dampers, combinations", "What any network is made of."),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from docs.site import (
+from . import (
     api,
     bibliography,
     catalogue,

@@ -10,9 +10,10 @@ from docutils.utils import math
 from docutils.utils.math import latex2mathml
 from sphinx.util import logging
 
-from docs.site import formula
-from docs.site.rooms import room_of
 from nlsdesign.components.assembly.deck_reader import component_classes
+
+from . import formula
+from .rooms import room_of
 
 _LOG = logging.getLogger(__name__)
 

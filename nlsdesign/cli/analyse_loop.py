@@ -17,9 +17,9 @@ from .units import Number
 
 if TYPE_CHECKING:
     from ..feedback.control import ClosedLoop, LimitCycleOnset, LoopMargins, SineResponse
-    from ..feedback.control.evaluation.impedance import CoupledStability, OutputImpedance
+    from ..feedback.control.evaluation.margins import CoupledStability, OutputImpedance
+    from ..feedback.control.evaluation.onset import SaturationLine
     from ..feedback.control.evaluation.responses import HeldTorque, ZeroTorque
-    from ..feedback.control.evaluation.saturation import SaturationLine
 
 GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
 """Number of the controller whose onset of limit cycling is looked for, by law."""

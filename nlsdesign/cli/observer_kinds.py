@@ -133,7 +133,7 @@ def _kalman(plant: FlatModel, measured: str, sample_time: float) -> GainRule:
     import numpy as np
 
     from ..feedback.analysis import NoiseAssumptions
-    from ..feedback.analysis.noise_assumptions import declared_deviation
+    from ..feedback.analysis.kalman import declared_deviation
     from ..feedback.analysis.rest_points import rest_points
     from ..feedback.observer import SteadyStateKalman
     from ..feedback.observer.scheduling.scheduled import whole_contour

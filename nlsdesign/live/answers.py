@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.quantity import parse_unit, with_unit
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +29,7 @@ class LiveColumn:
     name: str
     unit: str
     description: str
-    values: Floats
+    values: Array
 
 
 @dataclass(frozen=True)
@@ -173,7 +171,7 @@ class DesignView:
     margins: tuple[LimitMargin, ...]
     active: tuple[str, ...]
     numbers: tuple[ShownNumber, ...]
-    contour: Floats
+    contour: Array
     rubber_volume: float
     strain_end: float = math.inf
     beyond: tuple[str, ...] = ()
@@ -259,11 +257,11 @@ class Mechanism:
     """
 
     angle: float
-    halves: tuple[Floats, ...]
-    cables: tuple[Floats, ...]
-    contacts: tuple[Floats, ...]
-    guides: tuple[Floats, ...]
-    rubbers: tuple[Floats, ...]
+    halves: tuple[Array, ...]
+    cables: tuple[Array, ...]
+    contacts: tuple[Array, ...]
+    guides: tuple[Array, ...]
+    rubbers: tuple[Array, ...]
     extent: tuple[float, float]
     remark: str
 
@@ -282,8 +280,8 @@ class PoleGroup:
 
     mode: str
     words: str
-    real: Floats
-    imaginary: Floats
+    real: Array
+    imaginary: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,9 +325,9 @@ class LoopResponse:
         Which controller and observer, and what the response holds for.
     """
 
-    frequencies: Floats
-    magnitude: Floats
-    phase: Floats
+    frequencies: Array
+    magnitude: Array
+    phase: Array
     stable: bool
     mode: str
     words: str

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
 from ..design import Contour
 from ..feedback.analysis import Observability
 from ..feedback.analysis.rest_points import RestPoints, rest_points
+from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
@@ -29,8 +29,6 @@ from .answers import (
     SeenStates,
 )
 from .mechanism import mechanism_at
-
-Floats = NDArray[np.float64]
 
 _GRID = 21
 """Angles over which the typical sizes of states are taken, as observability is scaled by them."""
@@ -203,7 +201,7 @@ def pole_groups(points: RestPoints) -> tuple[PoleGroup, ...]:
 
 def loop_responses(
     stage: Callable[[str], None], machine: Assembly, last: float
-) -> tuple[Floats, list[LoopResponse]]:
+) -> tuple[Array, list[LoopResponse]]:
     """Return the torque loop of a machine over its angle, with controller and observer by default.
 
     Parameters

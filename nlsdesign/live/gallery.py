@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..components.assembly.deck_template import load_template
 from ..components.assembly.deck_writer import declare
@@ -15,14 +14,13 @@ from ..components.assembly.named_parts import Assembly
 from ..design import MaximumStrain, MaximumStress, contour_of_cam
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque
+from ..foundation.arrays import Array
 from ..foundation.deck import Deck, deck_names, load_deck, read_deck, template_names
 from ..foundation.errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
 from .question import ChosenMachine, LiveQuestion, TargetPoint
 from .stretch import BREAKS, declared_strain
-
-Floats = NDArray[np.float64]
 
 MOST_DECK_BYTES = 400_000
 """Largest deck that is read."""
@@ -146,7 +144,7 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     return question.with_points(points)
 
 
-def _stretch(machine: ChosenMachine, angles: Floats) -> dict[str, float]:
+def _stretch(machine: ChosenMachine, angles: Array) -> dict[str, float]:
     """Return the limit on the strain of rubber of which no strength is declared: by what its own cam does.
 
     Without any, a design may stretch it without end, to where its law has no value any more.

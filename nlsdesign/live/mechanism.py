@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design import Contour
 from ..design.statics.contour import turn
+from ..foundation.arrays import Array
 from .answers import Mechanism
-
-Floats = NDArray[np.float64]
 
 _CLEARANCE = 3e-3
 """Least distance in m between guide and clamp of the rubber, so that both can be seen."""
@@ -62,7 +60,7 @@ def mechanism_at(
     )
 
 
-def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Floats, Floats, Floats]:
+def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Array, Array, Array]:
     """Return the line of the cable up to its guide, its contact point and the guide."""
     touched = contour.points[contour.angles < abs(angle)]
     side = np.array([1.0, -1.0 if angle < 0.0 else 1.0])
@@ -74,8 +72,8 @@ def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Fl
     return np.vstack([wrapped, contact, end]), contact, end
 
 
-def _one_lip(contour: Contour, angle: float) -> Floats:
+def _one_lip(contour: Contour, angle: float) -> Array:
     """Return the sector between the lip and the centre, closed, in the resting frame."""
     points = contour.points
-    result: Floats = turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
+    result: Array = turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
     return result

@@ -6,13 +6,11 @@ import functools
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from ..design import TabulatedTorque
+from ..foundation.arrays import Array
 from ..foundation.symbolic import Expression
-
-Floats = NDArray[np.float64]
 
 
 class MovableTarget:
@@ -77,7 +75,7 @@ class MovableTarget:
         """
         return 0.0 * angle + 1.0
 
-    def numbers(self, target: TabulatedTorque) -> Floats:
+    def numbers(self, target: TabulatedTorque) -> Array:
         """Return the numbers of the symbols for a curve with as many pieces.
 
         Parameters
@@ -89,11 +87,11 @@ class MovableTarget:
 
 
 @functools.lru_cache(maxsize=8)
-def _numbers_of(target: TabulatedTorque) -> Floats:
+def _numbers_of(target: TabulatedTorque) -> Array:
     """Return the numbers of a curve; the same array where it is asked for again, so it cannot be changed."""
     curve = PchipInterpolator(target.angles, target.torques)
     # The curve is monotone between its points, so the largest torque is that of a point.
     ends = [max(target.torques), float(curve.integrate(0.0, target.last_angle))]
-    numbers: Floats = np.concatenate([curve.x, curve.c.T.ravel(), ends])
+    numbers: Array = np.concatenate([curve.x, curve.c.T.ravel(), ends])
     numbers.flags.writeable = False
     return numbers

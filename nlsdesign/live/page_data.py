@@ -6,8 +6,8 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
 from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
 from .at_angle import AngleView
@@ -84,7 +84,7 @@ def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, An
     return {"angle": angle, "mechanism": _lines(mechanism), "reason": ""}
 
 
-def short_numbers(values: NDArray[np.float64]) -> list[Any]:
+def short_numbers(values: Array) -> list[Any]:
     """Return numbers with seven digits; those that are not finite are ``None``.
 
     Parameters
@@ -114,10 +114,10 @@ def _lines(mechanism: Mechanism) -> dict[str, Any]:
     return {"angle": mechanism.angle, **lines, "extent": extent, "remark": mechanism.remark}
 
 
-def _fewer(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fewer(points: Array) -> Array:
     """Return a line with fewer points; its ends, and every corner of a short one, stay."""
     if points.ndim < 2 or len(points) <= _MOST_POINTS:
         return points
     kept = np.unique(np.round(np.linspace(0, len(points) - 1, _MOST_POINTS)).astype(int))
-    fewer: NDArray[np.float64] = points[kept]
+    fewer: Array = points[kept]
     return fewer

@@ -7,14 +7,12 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from .limit_kinds import LIMIT_KINDS
 from .question import LiveQuestion
 from .quick_rows import QuickRows
 from .quick_search import MOST_ITERATIONS, SOLVED, QuickOutcome, QuickPoint, interior_point
-
-Floats = NDArray[np.float64]
 
 _INVOLVED = 1e-3
 """Price from which a limit counts as part of a conflict, as in the whole design."""
@@ -34,7 +32,7 @@ class SoftenedProgram:
     def __init__(self, rows: QuickRows) -> None:
         self._rows = rows
 
-    def conflict(self, question: LiveQuestion, begin: Floats) -> QuickOutcome:
+    def conflict(self, question: LiveQuestion, begin: Array) -> QuickOutcome:
         """Find out whether any cam keeps all limits, and which are in conflict where none does.
 
         Parameters
@@ -93,7 +91,7 @@ class SoftenedProgram:
             "p": ca.vertcat(self._rows.target.symbols, prices),
         }
 
-    def _words(self, question: LiveQuestion, involved: Sequence[int], gives: Floats) -> str:
+    def _words(self, question: LiveQuestion, involved: Sequence[int], gives: Array) -> str:
         bounds = self._rows.bounds
         kinds = [LIMIT_KINDS[name] for name in dict.fromkeys(bounds[i].limit for i in involved)]
         rule = "contradict each other" if len(kinds) > 1 else "cannot be kept with what is free"

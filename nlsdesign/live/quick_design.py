@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
 from ..design import (
@@ -24,6 +23,7 @@ from ..design import (
     contour_of_cam,
 )
 from ..design.optimisation.result import DesignCurves
+from ..foundation.arrays import Array
 from ..foundation.quantity import Quantity
 from ..model.derived_deck import derived
 from .answers import DesignView
@@ -33,8 +33,6 @@ from .quick_rows import structure_of
 from .quick_search import QuickOutcome, QuickPoint
 from .stretch import smallest, stretched_beyond
 from .views import ALLOWED, curve_columns, margins_of, shown_numbers
-
-Floats = NDArray[np.float64]
 
 _MOST_PROGRAMS = 4
 """Programs that are kept; one takes about 30 MB."""
@@ -111,7 +109,7 @@ class QuickDesign:
     cost: float
 
     @cached_property
-    def _numbers(self) -> dict[str, Floats]:
+    def _numbers(self) -> dict[str, Array]:
         return self.program.outputs.columns(self.point.unknowns, self.question)
 
     @cached_property
@@ -182,7 +180,7 @@ class QuickDesign:
             beyond=stretched_beyond(ends, columns),
         )
 
-    def _limits(self, rows: dict[str, Floats]) -> list[LimitState]:
+    def _limits(self, rows: dict[str, Array]) -> list[LimitState]:
         states = []
         for i, (bound, wanted) in enumerate(
             zip(self.program.rows.shown_bounds, self.program.rows.values_of(self.question), strict=True)
@@ -331,7 +329,7 @@ class _Beginning:
         return self.program.outputs.scaled_values(self.numbers)
 
     @cached_property
-    def unknowns(self) -> Floats:
+    def unknowns(self) -> Array:
         """All unknowns of the program."""
         return self.program.rows.completed(self.question, self.values)
 

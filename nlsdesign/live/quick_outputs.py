@@ -7,12 +7,10 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from .question import LiveQuestion
 from .quick_rows import QuickRows
-
-Floats = NDArray[np.float64]
 
 
 class QuickOutputs:
@@ -27,7 +25,7 @@ class QuickOutputs:
     def __init__(self, rows: QuickRows) -> None:
         self._rows = rows
 
-    def columns(self, unknowns: Floats, question: LiveQuestion) -> dict[str, Floats]:
+    def columns(self, unknowns: Array, question: LiveQuestion) -> dict[str, Array]:
         """Return curves, sums and values of the limits by name.
 
         Parameters
@@ -41,7 +39,7 @@ class QuickOutputs:
         columns = function(unknowns, self._rows.numbers_of(question))
         return {name: np.array(c, dtype=float).ravel() for name, c in zip(names, columns, strict=True)}
 
-    def chosen_values(self, unknowns: Floats) -> dict[str, float]:
+    def chosen_values(self, unknowns: Array) -> dict[str, float]:
         """Return sizes and variables of the contour in SI by name.
 
         Parameters

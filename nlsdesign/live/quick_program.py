@@ -13,17 +13,15 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design.optimisation.program import PROVED_INFEASIBLE
 from ..design.optimisation.starts import start_values, starts
+from ..foundation.arrays import Array
 from .question import LiveQuestion
 from .quick_conflict import SoftenedProgram
 from .quick_outputs import QuickOutputs
 from .quick_rows import QuickRows
 from .quick_search import MOST_ITERATIONS, SOLVED, QuickOutcome, QuickPoint, interior_point
-
-Floats = NDArray[np.float64]
 
 _WARM = 20
 """Iterations at most of a search with the last multipliers; where they do not help one without takes over."""
@@ -109,7 +107,7 @@ class QuickProgram:
         """
         return self._solved(self._warm, question, last)
 
-    def from_point(self, question: LiveQuestion, point: QuickPoint, room: Floats | float) -> QuickOutcome:
+    def from_point(self, question: LiveQuestion, point: QuickPoint, room: Array | float) -> QuickOutcome:
         """Return the solution from unknowns that keep all limits, as far as they do there.
 
         Parameters
@@ -137,7 +135,7 @@ class QuickProgram:
         return self._solved(self._again, question, point)
 
     def _solved(
-        self, solver: ca.Function, question: LiveQuestion, begin: QuickPoint, room: Floats | float = 0.0
+        self, solver: ca.Function, question: LiveQuestion, begin: QuickPoint, room: Array | float = 0.0
     ) -> QuickOutcome:
         low, high = self.rows.ranges_of(question)
         rows_low, rows_high = self.rows.limits_of(question, room)

@@ -13,7 +13,6 @@ from typing import Any, cast
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design import Target
 from ..design.optimisation.limits import Bound
@@ -22,10 +21,9 @@ from ..design.optimisation.solve import GOALS
 from ..design.optimisation.variables import DesignVariable, VariableScale, scale_of, scaled
 from ..design.statics.equilibrium import elastic_law
 from ..design.statics.rounding import has_corners
+from ..foundation.arrays import Array
 from .movable_target import MovableTarget
 from .question import LiveQuestion
-
-Floats = NDArray[np.float64]
 
 ROUNDING = 0.003
 """Width over which knots of a rubber's law are rounded, relative to its stretch, as a design begins."""
@@ -104,7 +102,7 @@ class QuickRows:
         ratio = question.target_size * question.target.last_angle / self._size
         return 1.0 / _RESCALED < ratio < _RESCALED
 
-    def limits_of(self, question: LiveQuestion, room: Floats | float = 0.0) -> tuple[Floats, Floats]:
+    def limits_of(self, question: LiveQuestion, room: Array | float = 0.0) -> tuple[Array, Array]:
         """Return the bounds of the rows.
 
         Parameters
@@ -134,7 +132,7 @@ class QuickRows:
         """
         return [question.limit_values[bound.limit].value for bound in self.shown_bounds]
 
-    def ranges_of(self, question: LiveQuestion) -> tuple[Floats, Floats]:
+    def ranges_of(self, question: LiveQuestion) -> tuple[Array, Array]:
         """Return the bounds of the variables: what is held has no room.
 
         Parameters
@@ -173,7 +171,7 @@ class QuickRows:
     def _scales_of_variables(self) -> dict[str, VariableScale]:
         return {variable.name: scale_of(variable) for variable in self.chosen}
 
-    def numbers_of(self, question: LiveQuestion) -> Floats:
+    def numbers_of(self, question: LiveQuestion) -> Array:
         """Return the numbers of the target.
 
         Parameters
@@ -183,7 +181,7 @@ class QuickRows:
         """
         return self.target.numbers(question.target)
 
-    def completed(self, question: LiveQuestion, values: Mapping[str, float]) -> Floats:
+    def completed(self, question: LiveQuestion, values: Mapping[str, float]) -> Array:
         """Return the unknowns that follow from some of them, with held numbers as the question has them.
 
         Parameters
@@ -196,7 +194,7 @@ class QuickRows:
         low, high = self.ranges_of(question)
         parameters = self.numbers_of(question)
         wanted = [values.get(v.name, v.start) for v in self.problem.variables]
-        point: Floats = np.clip(np.array(wanted), low, high)
+        point: Array = np.clip(np.array(wanted), low, high)
         states, errors = self.problem.states.shape[0], self.problem.structure[-1].expression.shape[0]
         first = len(point) - errors - states
         follows, misses = self._following

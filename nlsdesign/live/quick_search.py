@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ..foundation.arrays import Array
 
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 """States of the solver that count as solved."""
@@ -28,15 +27,15 @@ _COMMON: dict[str, Any] = {
     "ipopt.mumps_permuting_scaling": 0,
     "ipopt.mumps_scaling": 0,
 }
-_NONE: Floats = np.zeros(0)
+_NONE: Array = np.zeros(0)
 
 
 class QuickPoint(NamedTuple):
     """Where a search begins or ended: unknowns and, where they are known, multipliers of one program."""
 
-    unknowns: Floats
-    of_bounds: Floats = _NONE
-    of_rows: Floats = _NONE
+    unknowns: Array
+    of_bounds: Array = _NONE
+    of_rows: Array = _NONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +64,7 @@ class QuickOutcome:
     point: QuickPoint | None = None
     cost: float = math.inf
     conflicts: tuple[str, ...] = ()
-    room: Floats | float = 0.0
+    room: Array | float = 0.0
 
 
 def interior_point(name: str, program: dict[str, Any], *, iterations: int, **options: Any) -> ca.Function:

@@ -7,15 +7,13 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design.statics.equilibrium import cam_function, elastic_law
+from ..foundation.arrays import Array
 from ..model import FlatModel
 from ..model.roles import series_cam
 from ..model.spring_structure import SpecimenNames
 from .answers import LiveColumn
-
-Floats = NDArray[np.float64]
 
 BREAKS = 5.0
 """Nominal strain at which soft rubbers break, for rubber of which nothing is stated: the tensile curve of
@@ -103,7 +101,7 @@ def stretched_beyond(ends: Mapping[str, StrainEnd], columns: Iterable[LiveColumn
     return tuple(sentences)
 
 
-def declared_strain(model: FlatModel, angles: Floats) -> float | None:
+def declared_strain(model: FlatModel, angles: Array) -> float | None:
     """Return the largest strain of rubber of the machine as it is declared; ``None`` without rubber.
 
     Parameters

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design import CamDesign, LimitState
 from ..design.optimisation.result import DesignCurves
+from ..foundation.arrays import Array
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
 from .limit_words import shown_value
 from .question import LiveQuestion
 from .stretch import smallest, stretched_beyond
-
-Floats = NDArray[np.float64]
 
 ALLOWED = 0.01
 """Rms error over the largest torque above which a design misses its target."""
@@ -53,7 +51,7 @@ def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> Li
     )
 
 
-def curve_columns(curves: DesignCurves, targets: Floats) -> tuple[LiveColumn, ...]:
+def curve_columns(curves: DesignCurves, targets: Array) -> tuple[LiveColumn, ...]:
     """Return what cam and rubber do over the angle as columns.
 
     Parameters

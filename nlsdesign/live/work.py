@@ -9,18 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
 from ..design import Target, ToleranceResult, tolerance_analysis
+from ..foundation.arrays import Array
 from ..foundation.errors import ValueRangeError
 from .answers import Lazy, LoopResponse
 from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
 from .full_design import whole_design
 from .question import LiveQuestion
-
-Floats = NDArray[np.float64]
 
 MOST_DRAWS = 2000
 _FEWEST_DRAWS = 20
@@ -233,7 +231,7 @@ class LiveWork:
             return Lazy("asked for later", revision)
         if state.state != "done":
             return Lazy(state.state, revision, None, state.message)
-        angles: Floats = state.value[0]
+        angles: Array = state.value[0]
         responses: list[LoopResponse] = state.value[1]
         nearest = int(np.argmin(np.abs(angles - abs(angle))))
         words = f"at {np.degrees(angles[nearest]):.1f}°, the nearest of {len(angles)} angles"
@@ -258,10 +256,10 @@ class CloudAnswer:
         Summary: pairs of text.
     """
 
-    angles: Floats
-    nominal: Floats
-    band: Floats
-    errors: Floats
+    angles: Array
+    nominal: Array
+    band: Array
+    errors: Array
     rows: tuple[tuple[str, str], ...]
 
 

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from .flat import FlatModel
 
 if TYPE_CHECKING:
     import control
-
-Matrix = NDArray[np.float64]
 
 
 class LinearModel(NamedTuple):
@@ -24,10 +22,10 @@ class LinearModel(NamedTuple):
     Shapes (n, n), (n, m), (r, n), (r, m).
     """
 
-    A: Matrix
-    B: Matrix
-    C: Matrix
-    D: Matrix
+    A: Array
+    B: Array
+    C: Array
+    D: Array
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -105,7 +103,7 @@ def linearise(model: FlatModel, state: Sequence[float], inputs: Sequence[float] 
 
 def rest_state(
     model: FlatModel, held: dict[str, float], inputs: Sequence[float] = (), *, tolerance: float = 1e-9
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the state in which all states but the held ones rest.
 
     Parameters

@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..foundation.arrays import Array
+
 Translate: TypeAlias = Callable[[ca.Function], ca.Function]
 """Takes a function and returns one with the same arguments and results, for instance compiled code."""
 

@@ -12,16 +12,14 @@ from typing import Protocol, runtime_checkable
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..model import Table
 from .buffered import Translate, as_it_is
 from .column_graph import ColumnGraph, NotByColumnsError, column_graph
 from .numpy_columns import NumpyColumns
 from .sample_writer import SampleWriter
 from .sampled_system import SampledSystem
-
-Array = NDArray[np.float64]
 
 CHUNK = 250
 """Samples that one call computes; between calls a run can be interrupted."""

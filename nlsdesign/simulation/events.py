@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from ..model.switching import Switch, Switching
-from .buffered import Array, Buffered
+from .buffered import Buffered
 
 LOCATED = 1e-12
 """Accuracy of an event time, as a share of the sample interval; at best four units in the last place."""

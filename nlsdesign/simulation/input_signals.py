@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import FlatModel
 from .signals import Sine
 
-Array = NDArray[np.float64]
 Drive: TypeAlias = Callable[[float], float] | Array | float
 
 

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from .buffered import Translate, as_it_is
@@ -20,8 +20,6 @@ from .input_signals import Drive, Drives, drives_of
 from .runge_kutta import TooStiffError, integrate_explicitly
 from .stiff import integrate_implicitly
 from .trace import Trace, range_warnings
-
-Array = NDArray[np.float64]
 
 RESIDUAL_LIMIT = 1e-6
 """Largest remainder of an implicit equation, relative to its terms and to 1 Pa, N or N·m."""

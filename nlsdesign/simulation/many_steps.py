@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array, Indices
 from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Translate
@@ -26,9 +26,6 @@ from .runge_kutta import (
     limited_by_stability,
     step_function,
 )
-
-Array = NDArray[np.float64]
-Places = NDArray[np.intp]
 
 
 class _OneColumn:
@@ -77,7 +74,7 @@ def _span(drives: Drives) -> float:
     return float(drives.times[-1] - drives.times[0])
 
 
-def _inputs(drives: Drives, intervals: Places, moments: Array) -> Array:
+def _inputs(drives: Drives, intervals: Indices, moments: Array) -> Array:
     """Return the inputs at moments in intervals between samples, shape (steps, moments, inputs)."""
     since = moments - drives.times[intervals][:, None]
     inputs = since[:, :, None] * drives.slopes.T[intervals][:, None] + drives.samples.T[intervals][:, None]
@@ -174,7 +171,7 @@ class ManySteps:
                 self._fail(column, str(error))
             self.state[:, column], self._modes[:, column] = stepper.state, modes.now
 
-    def _advance(self, going: Places) -> None:
+    def _advance(self, going: Indices) -> None:
         """Try one step of each column."""
         left = self._drives.times[self._interval[going] + 1] - self._now[going]
         # A very short last step would cost as much as a full one.
@@ -190,7 +187,7 @@ class ManySteps:
         self._keep(going[good], rate[:, good])
         self._check(going[self._done[going] > self._budget[going]])
 
-    def _tried(self, going: Places, length: Array) -> list[Array]:
+    def _tried(self, going: Indices, length: Array) -> list[Array]:
         """Return what a step of each column gives."""
         # Most columns stand at the same time, and a function of time need not be asked twice.
         steps = np.stack([self._now[going], length, self._interval[going]])
@@ -206,7 +203,7 @@ class ManySteps:
             ]
         )  # fmt: skip
 
-    def _move(self, columns: Places, lengths: tuple[Array, Array], error: Array) -> None:
+    def _move(self, columns: Indices, lengths: tuple[Array, Array], error: Array) -> None:
         """Move the time of the columns whose step is good enough; propose the next steps."""
         length, left = lengths
         with np.errstate(all="ignore"):
@@ -222,7 +219,7 @@ class ManySteps:
         moved = columns[good]
         self._now[moved] = np.where(whole[good], times[k[good] + 1], self._now[moved] + length[good])
 
-    def _keep(self, columns: Places, rate: Array) -> None:
+    def _keep(self, columns: Indices, rate: Array) -> None:
         """Project the rates that are held, where they have drifted."""
         if not np.any(self._holds):
             return
@@ -258,7 +255,7 @@ class ManySteps:
             self._fail(column, str(failed))
         self.state[:, column], self._modes[:, column] = stepper.state, modes.now
 
-    def _check(self, columns: Places) -> None:
+    def _check(self, columns: Indices) -> None:
         """Note the columns whose steps stability limits, and give the others a larger budget."""
         jumps = self._switching is not None and bool(self._switching.jumps)
         for column in columns[~self._gone[columns]].tolist():

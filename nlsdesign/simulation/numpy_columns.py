@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
+from ..foundation.arrays import Array, Mask
 from ..model import Table
 from .column_graph import Call, ColumnGraph, Operation, TableReading
 
-Array = NDArray[np.float64]
 _Task: TypeAlias = tuple[Callable[..., Any], tuple[Any, ...]]
 
 AT_ONCE = 1024
@@ -142,7 +142,7 @@ class _Program:
         self.graph, self._size = graph, size
         self.values: dict[int, Array] = {k: np.zeros(size) for k in given}
         self.values |= {k: np.full(size, value) for k, value in graph.constants.items()}
-        self._truths: dict[int, NDArray[np.bool_]] = {}
+        self._truths: dict[int, Mask] = {}
         self.once: list[_Task] = []
         self.tasks: list[_Task] = []
         self._numbers = {k for step in graph.steps for k in _as_numbers(step)}
@@ -235,7 +235,7 @@ def _results(body: _Program, places: Sequence[Array]) -> None:
         place[:] = body.values[number]
 
 
-def _selected(truth: NDArray[np.bool_], value: Array, result: Array) -> None:
+def _selected(truth: Mask, value: Array, result: Array) -> None:
     result.fill(0.0)
     np.copyto(result, value, where=truth)
 

@@ -12,16 +12,14 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
+from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Buffered, Translate, as_it_is
 from .events import LOCATED, Event, Modes, branch_of, locate_event
 from .input_signals import Drives
-
-Array = NDArray[np.float64]
 
 STAGES = int(DOP853.n_stages)
 NODES: Array = np.asarray(DOP853.C[:STAGES], dtype=float)

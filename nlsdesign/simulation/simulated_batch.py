@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array, Mask
 from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from ..model.transform import named
@@ -18,8 +18,6 @@ from .events import Event
 from .input_signals import Drive, Drives, drives_of
 from .integrate import RESIDUAL_LIMIT, checked_times, simulate
 from .many_steps import ManySteps
-
-Array = NDArray[np.float64]
 
 _NOT_SOLVED = "a state is not finite, or an implicit equation was not solved"
 _EVALUATED = 200
@@ -51,7 +49,7 @@ class SimulatedBatch:
     events: tuple[tuple[Event, ...], ...]
 
     @property
-    def done(self) -> NDArray[np.bool_]:
+    def done(self) -> Mask:
         """Whether each column was simulated to the end, shape (columns,)."""
         return np.array([i not in self.failures for i in range(len(self.events))])
 

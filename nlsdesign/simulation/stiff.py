@@ -9,13 +9,11 @@ from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .input_signals import Drives
-
-Array = NDArray[np.float64]
 
 _PLACES = (1.0 - np.cos(np.pi * np.arange(6) / 5)) / 2
 _TO_COEFFICIENTS = np.linalg.inv(np.vander(_PLACES, increasing=True))

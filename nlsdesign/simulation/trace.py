@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.data_frames import Axis, data_frame, data_set
 from ..foundation.errors import MeasurementError, unknown_name
 from ..foundation.quantity import parse_unit, with_unit
@@ -17,7 +17,6 @@ from ..foundation.writing import write_table
 from ..model import Variable
 from .events import Event
 
-Array = NDArray[np.float64]
 _ROUNDING = 1e-9
 """Excess over a range that is rounding, relative to the nominal size."""
 

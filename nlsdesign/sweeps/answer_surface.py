@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 
-Floats = NDArray[np.float64]
+from ..foundation.arrays import Array
+
 _FOLDS, _CELLS, _HIGHEST_DEGREE = 10, 41, 4
 _LEAST_EXPLAINED = 0.1
 
@@ -35,9 +35,9 @@ class AnswerSurface:
         How many points that were left out lay outside the hull of the others.
     """
 
-    across: Floats
-    up: Floats
-    values: Floats
+    across: Array
+    up: Array
+    values: Array
     method: str
     error: float
     deviation: float
@@ -57,7 +57,7 @@ class AnswerSurface:
         return 1.0 - (self.error / self.deviation) ** 2 if self.deviation > 0.0 else float("nan")
 
 
-def answer_surface(across: Floats, up: Floats, answer: Floats, *, others_vary: bool) -> AnswerSurface | str:
+def answer_surface(across: Array, up: Array, answer: Array, *, others_vary: bool) -> AnswerSurface | str:
     """Return an answer over two axes, or why there is none, as text.
 
     Where nothing else varies, it is linear between neighbouring points. Where further axes vary, points
@@ -104,11 +104,11 @@ def answer_surface(across: Floats, up: Floats, answer: Floats, *, others_vary: b
     )
 
 
-def _mesh(x: Floats, y: Floats) -> Floats:
+def _mesh(x: Array, y: Array) -> Array:
     return np.column_stack([each.ravel() for each in np.meshgrid(x, y)])
 
 
-def _grid(places: Floats) -> tuple[Floats, Floats] | None:
+def _grid(places: Array) -> tuple[Array, Array] | None:
     """Return the nodes of a grid, none where the points are not on one or most of it is empty."""
     x, y = np.unique(places[:, 0]), np.unique(places[:, 1])
     cells = len(x) * len(y)
@@ -116,7 +116,7 @@ def _grid(places: Floats) -> tuple[Floats, Floats] | None:
     return (x, y) if min(len(x), len(y)) > 1 and distinct and 2 * len(places) >= cells else None
 
 
-def _linear(hull: Delaunay, values: Floats, places: Floats) -> Floats:
+def _linear(hull: Delaunay, values: Array, places: Array) -> Array:
     """Return the linear interpolation; not a number outside the hull."""
     simplex = hull.find_simplex(places, tol=1e-9)
     transform = hull.transform[simplex]
@@ -126,7 +126,7 @@ def _linear(hull: Delaunay, values: Floats, places: Floats) -> Floats:
     return np.asarray(np.where(simplex < 0, np.nan, result))
 
 
-def _left_out(places: Floats, values: Floats) -> tuple[float, int]:
+def _left_out(places: Array, values: Array) -> tuple[float, int]:
     """Return the error on points that were left out by turns, and how many of them were outside the hull."""
     fold = np.random.default_rng(0).permutation(len(values)) % min(_FOLDS, len(values))
     wrong = np.full(len(values), np.nan)
@@ -142,8 +142,8 @@ def _left_out(places: Floats, values: Floats) -> tuple[float, int]:
     return error, int(np.sum(~seen))
 
 
-def _polynomial(unit: Floats, values: Floats, hull: Delaunay, low: Floats, width: Floats) -> AnswerSurface:
-    best: tuple[float, int, Floats] | None = None
+def _polynomial(unit: Array, values: Array, hull: Delaunay, low: Array, width: Array) -> AnswerSurface:
+    best: tuple[float, int, Array] | None = None
     for degree in range(_HIGHEST_DEGREE + 1):
         terms = _terms(unit, degree)
         if 2 * terms.shape[1] > len(values):
@@ -167,7 +167,7 @@ def _polynomial(unit: Floats, values: Floats, hull: Delaunay, low: Floats, width
     )  # fmt: skip
 
 
-def _terms(unit: Floats, degree: int) -> Floats:
+def _terms(unit: Array, degree: int) -> Array:
     """Return products of the two columns, centred, up to a degree."""
     centred = 2.0 * unit - 1.0
     columns = [np.ones(len(unit))]

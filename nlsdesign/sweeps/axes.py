@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..foundation.errors import ValueRangeError, brief, unknown_name
 from ..model import flatten
 from ..simulation.prior import LONGEST_ROW, declared_prior
@@ -142,7 +142,7 @@ class GridAxis(AxisSet):
                 next_step='take spacing = "even"',
             )  # fmt: skip
         space = np.geomspace if self.spacing == "ratio" else np.linspace
-        values: NDArray[np.float64] = space(lower, upper, self.count)
+        values: Array = space(lower, upper, self.count)
         if not np.all(np.diff(values) > 0.0):
             _distinct(self.name, values.tolist())
         return BoundAxes((column,), self.count, lambda number: (float(values[number]),))
@@ -210,13 +210,13 @@ class SobolSample(AxisSet):
         columns, lower, upper = _box(subject, self.ranges, "sobol")
 
         @functools.lru_cache(maxsize=2)
-        def block(number: int) -> NDArray[np.float64]:
+        def block(number: int) -> Array:
             from scipy.stats import qmc
 
             sampler = qmc.Sobol(len(columns), scramble=True, seed=np.random.default_rng(self.seed))
             if number:
                 sampler.fast_forward(number * _BLOCK)
-            unit: NDArray[np.float64] = sampler.random(_BLOCK)
+            unit: Array = sampler.random(_BLOCK)
             return unit
 
         def row(number: int) -> tuple[float, ...]:
@@ -323,7 +323,7 @@ class RandomDraws(AxisSet):
         return BoundAxes(tuple(columns), self.count, row)
 
 
-def _ends_of(ends: NDArray[np.float64], at: list[int], shapes: Any, without: float) -> NDArray[np.float64]:
+def _ends_of(ends: Array, at: list[int], shapes: Any, without: float) -> Array:
     return np.where(shapes, without, ends[at]) if len(ends) else np.full(len(at), without)
 
 
@@ -350,7 +350,7 @@ def _ends(column: SweepColumn, ends: tuple[Any, ...]) -> tuple[float, float]:
 
 def _box(
     subject: Subject, ranges: Mapping[str, tuple[Given, Given]], kind: str
-) -> tuple[tuple[SweepColumn, ...], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[tuple[SweepColumn, ...], Array, Array]:
     if not ranges:
         raise ValueRangeError(
             "sample", "has no ranges", next_step='write ranges = {"NAME" = ["1 mm", "2 mm"]}'

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
+from ..foundation.arrays import Array
+
 LEAST_CORRELATION: Final = 0.1
 _DEVIATIONS: Final = 4.0
 
 
-def codes(values: NDArray[Any]) -> NDArray[np.float64]:
+def codes(values: NDArray[Any]) -> Array:
     """Return numbers as they are, and words as the numbers of their place in the alphabet.
 
     Parameters

@@ -11,8 +11,8 @@ import numpy as np
 from ..components.assembly.named_parts import Assembly
 from ..feedback.analysis import Chart, Observability, Stability, over_angle
 from ..feedback.control import TorqueGains, encoder_loop, loop_margins, sine_response, torque_controller
+from ..feedback.control.closed_loop import ClosedLoop
 from ..feedback.control.evaluation.linear_loop import LinearLoop
-from ..feedback.control.loop.closed_loop import ClosedLoop
 from ..feedback.observer import CascadeGain, design_observer, observer_bench, observer_errors
 from ..foundation.errors import ArrangementError, ValueRangeError, brief
 from ..model import FlatModel, flatten

@@ -6,11 +6,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array, Mask
 from ..foundation.quantity import three_digits, with_unit
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,7 @@ class Preference(ABC):
     answer: str
 
     @abstractmethod
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return numbers of which the smaller is the better one; not a number stays so.
 
         Parameters
@@ -50,7 +48,7 @@ class Preference(ABC):
 class SmallerIsBetter(Preference):
     """The smaller, the better; minus ten is better than one."""
 
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return the values."""
         return np.asarray(values, dtype=float)
 
@@ -63,7 +61,7 @@ class SmallerIsBetter(Preference):
 class LargerIsBetter(Preference):
     """The larger, the better."""
 
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return the negative values."""
         return -np.asarray(values, dtype=float)
 
@@ -84,7 +82,7 @@ class NearIsBetter(Preference):
 
     value: float
 
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return the distances from the value."""
         return np.abs(np.asarray(values, dtype=float) - self.value)
 
@@ -109,7 +107,7 @@ class Requirement(ABC):
     value: float
 
     @abstractmethod
-    def kept(self, values: Floats) -> NDArray[np.bool_]:
+    def kept(self, values: Array) -> Mask:
         """Return which values keep it; one that is not a number does not.
 
         Parameters
@@ -133,7 +131,7 @@ class Requirement(ABC):
 class NotAbove(Requirement):
     """The answer is at most a value."""
 
-    def kept(self, values: Floats) -> NDArray[np.bool_]:
+    def kept(self, values: Array) -> Mask:
         """Return which values are at most this one."""
         return np.asarray(np.asarray(values, dtype=float) <= self.value)
 
@@ -146,7 +144,7 @@ class NotAbove(Requirement):
 class NotBelow(Requirement):
     """The answer is at least a value."""
 
-    def kept(self, values: Floats) -> NDArray[np.bool_]:
+    def kept(self, values: Array) -> Mask:
         """Return which values are at least this one."""
         return np.asarray(np.asarray(values, dtype=float) >= self.value)
 

@@ -6,14 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array, Indices, Mask
 from ..foundation.errors import ValueRangeError, unknown_name
 from .preferences import Preference, Requirement
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +27,7 @@ class RankedPoints:
     incomplete
         Points that keep all requirements, with an answer to compare that is no finite number.
     front
-        Rows of the points that no other betters in all preferences, the best in the first one first; empty
+        Indices of the points that no other betters in all preferences, the best in the first one first; empty
         without preferences.
     misses
         How many points miss each requirement, in their order.
@@ -42,7 +38,7 @@ class RankedPoints:
     failed: Mask
     missed: Mask
     incomplete: Mask
-    front: Rows
+    front: Indices
     misses: tuple[int, ...]
 
     @property
@@ -58,7 +54,7 @@ class RankedPoints:
 
 
 def rank_points(
-    answers: Mapping[str, Floats],
+    answers: Mapping[str, Array],
     done: Mask,
     *,
     preferences: Sequence[Preference] = (),
@@ -107,7 +103,7 @@ def rank_points(
     return RankedPoints(tuple(preferences), tuple(requirements), ~done, missed, incomplete, front, counts)
 
 
-def nondominated(costs: Floats) -> Rows:
+def nondominated(costs: Array) -> Indices:
     """Return the rows that no other row betters: at most as large in each column and smaller in one.
 
     Equal rows are kept together.

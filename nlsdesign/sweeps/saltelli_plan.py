@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..foundation.arrays import Array
 
 
 class SaltelliForm(NamedTuple):
@@ -27,7 +28,7 @@ class SaltelliForm(NamedTuple):
     second_order: bool
 
 
-def saltelli_plan(points: NDArray[np.float64]) -> SaltelliForm | None:
+def saltelli_plan(points: Array) -> SaltelliForm | None:
     """Return the form of the plan, none where the points are not one; a last block that is cut is left out.
 
     Parameters
@@ -45,7 +46,7 @@ def saltelli_plan(points: NDArray[np.float64]) -> SaltelliForm | None:
     return None
 
 
-def _exchanged(blocks: NDArray[np.float64], second_order: bool) -> bool:
+def _exchanged(blocks: Array, second_order: bool) -> bool:
     axes = blocks.shape[2]
     first, second = blocks[:, 0], blocks[:, -1]
     if np.all(first == second):

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..foundation.arrays import Mask
 from ..foundation.errors import ExportError, MeasurementError
 from ..foundation.writing import draft
 from .arrow_columns import arrow_column, give_back, libraries, numpy_column, read_columns
@@ -112,7 +113,7 @@ class Parts:
                 with contextlib.suppress(OSError):
                     path.rename(path.with_suffix(".damaged"))
 
-    def standing(self, count: int, *, with_failed: bool = True) -> NDArray[np.bool_]:
+    def standing(self, count: int, *, with_failed: bool = True) -> Mask:
         """Return which points stand in the parts.
 
         Parameters

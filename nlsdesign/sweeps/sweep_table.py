@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
+from ..foundation.arrays import Mask
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, MeasurementError, unknown_name
 from ..foundation.reading import is_there, text_of
@@ -73,9 +74,9 @@ class SweepTable:
         return tuple(column for column in self.columns if column.role == "answer")
 
     @property
-    def done(self) -> NDArray[np.bool_]:
+    def done(self) -> Mask:
         """Which points have answers."""
-        result: NDArray[np.bool_] = self.values["status"] == DONE
+        result: Mask = self.values["status"] == DONE
         return result
 
     def column(self, name: str) -> SweepColumn:

@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from nlsdesign.components import material
-from studies.alternative_rubber.candidates import candidates
-from studies.alternative_rubber.hysteresis import LOSSES, Hysteresis, hysteresis
-from studies.alternative_rubber.merits import HIGH, Merits, merits_of
-from studies.alternative_rubber.ranking import PUBLISHED, Ranking, rankings
-from studies.alternative_rubber.report import write
+
+from .candidates import candidates
+from .hysteresis import LOSSES, Hysteresis, hysteresis
+from .merits import HIGH, Merits, merits_of
+from .ranking import PUBLISHED, Ranking, rankings
+from .report import write
 
 IN_FAST = ("PMC-770", "natural_rubber_treloar")
 _SIZE = HIGH / np.sqrt(2.0)

@@ -8,9 +8,10 @@ import nlsdesign as nls
 from nlsdesign.components import KnownLoss, Material, flat_relaxation, loss_of, materials, relaxing_law_of
 from nlsdesign.design import AreaRange, CamDesign, DesignSettings, Target
 from nlsdesign.foundation.errors import ArrangementError
-from studies._designed import with_machined_contour
-from studies._published import declared_actuator
-from studies.austin2015.design import ANCHOR, FREE, LARGEST_RADIUS, LENGTHS
+
+from .._designed import with_machined_contour
+from .._published import declared_actuator
+from ..austin2015.design import ANCHOR, FREE, LARGEST_RADIUS, LENGTHS
 
 TARGET = nls.ExponentialTorque(maximum=5.0, angle=nls.degrees(53.0), shape=1.0)
 """Schepelmann, Geberth and Geyer, ICRA 2014, as in the study of the published actuator."""

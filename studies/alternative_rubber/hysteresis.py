@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nlsdesign.components import Material
-from studies.alternative_rubber.bench import Bench, Measured, Rubber, Run
-from studies.alternative_rubber.candidates import TARGET, designed, with_loss
-from studies.alternative_rubber.merits import AT, GAIN_MARGIN, HELD, HIGH, largest_gains
+from nlsdesign.foundation.arrays import Array
 
-Array = NDArray[np.float64]
+from .bench import Bench, Measured, Rubber, Run
+from .candidates import TARGET, designed, with_loss
+from .merits import AT, GAIN_MARGIN, HELD, HIGH, largest_gains
 
 LOSSES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3)
 """Loss tangents of the rubber."""

@@ -7,16 +7,15 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 import nlsdesign as nls
 from nlsdesign.design import CamDesign
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import ConvergenceError, NlsError
-from studies.alternative_rubber.bench import Bench, Rubber, Run
-from studies.alternative_rubber.candidates import Candidate, designed
 
-Array = NDArray[np.float64]
+from .bench import Bench, Rubber, Run
+from .candidates import Candidate, designed
 
 LOW, HIGH = 0.3, 2.8
 """Amplitudes of the torque in N·m: a tenth of, and all of, that of the published measurements."""

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.alternative_rubber.merits import METRICS, MORE_IS_BETTER, Merits
+from nlsdesign.foundation.arrays import Array
 
-Array = NDArray[np.float64]
+from .merits import METRICS, MORE_IS_BETTER, Merits
 
 DRAWS = 4000
 PUBLISHED = "PMC-770"

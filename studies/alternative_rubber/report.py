@@ -9,9 +9,10 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, TextSection
-from studies.alternative_rubber.hysteresis import ALLOWED, WRONG, Hysteresis
-from studies.alternative_rubber.merits import AT, GAIN_MARGIN, HELD, HIGH, METRICS, Merits
-from studies.alternative_rubber.ranking import PUBLISHED, RESOLUTION, Ranking
+
+from .hysteresis import ALLOWED, WRONG, Hysteresis
+from .merits import AT, GAIN_MARGIN, HELD, HIGH, METRICS, Merits
+from .ranking import PUBLISHED, RESOLUTION, Ranking
 
 MEAN_RANK = "mean rank, without the volume"
 _WAYS = {

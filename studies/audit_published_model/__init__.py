@@ -11,9 +11,10 @@ import sys
 from pathlib import Path
 
 import nlsdesign as nls
-from studies.audit_published_model import cam, drive, figures, law, observer, relaxation
-from studies.audit_published_model.finding import Finding, Results
-from studies.audit_published_model.report import rows, write_data, write_page
+
+from . import cam, drive, figures, law, observer, relaxation
+from .finding import Finding, Results
+from .report import rows, write_data, write_page
 
 CHAPTERS = {
     "The law of the rubber": law.findings,

@@ -7,9 +7,11 @@ import sympy as sp
 from scipy.optimize import least_squares
 
 import nlsdesign as nls
-from studies._published import Array, figure_points
-from studies.audit_published_model import paper as p
-from studies.audit_published_model.finding import (
+from nlsdesign.foundation.arrays import Array
+
+from .._published import figure_points
+from . import paper as p
+from .finding import (
     AGAINST_FIGURES,
     FAILS,
     HOLDS,

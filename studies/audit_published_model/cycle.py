@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies._published import Array
-from studies.audit_published_model import paper as p
+from nlsdesign.foundation.arrays import Array
+
+from . import paper as p
 
 SAMPLES = 4096
 _GRID = np.linspace(0.0, 20e-3, 40_001)

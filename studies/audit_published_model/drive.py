@@ -7,9 +7,10 @@ import math
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from studies._published import Array
-from studies.audit_published_model import paper as p
-from studies.audit_published_model.finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
+from nlsdesign.foundation.arrays import Array
+
+from . import paper as p
+from .finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
 
 RISE_TIMES = (16.0e-3, 18.3e-3)  # s, printed 2014
 PRINTED_INERTIA, NOTED_INERTIA = 8.83e-5, 5.97e-4  # kg·m²

@@ -7,9 +7,11 @@ import sympy as sp
 from matplotlib.figure import Figure
 
 import nlsdesign as nls
-from studies._published import FIG6_SAMPLE, Array, element_loop, figure_points
-from studies.audit_published_model import paper as p
-from studies.audit_published_model.finding import (
+from nlsdesign.foundation.arrays import Array
+
+from .._published import FIG6_SAMPLE, element_loop, figure_points
+from . import paper as p
+from .finding import (
     AGAINST_FIGURES,
     FAILS,
     HOLDS,

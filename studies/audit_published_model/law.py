@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 
 import nlsdesign as nls
 from nlsdesign.presentation.report import Section, TableSection
-from studies._published import element_loop
-from studies.audit_published_model import paper as p
-from studies.audit_published_model.finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
+
+from .._published import element_loop
+from . import paper as p
+from .finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
 
 # --- units ----------------------------------------------------------------------------------------
 

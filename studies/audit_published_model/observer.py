@@ -7,10 +7,11 @@ import math
 import numpy as np
 import sympy as sp
 
-from studies._published import Array
-from studies.audit_published_model import paper as p
-from studies.audit_published_model.cycle import CAMS, cycle, extension_of
-from studies.audit_published_model.finding import FAILS, HOLDS, NOTES, Finding, equal, step
+from nlsdesign.foundation.arrays import Array
+
+from . import paper as p
+from .cycle import CAMS, cycle, extension_of
+from .finding import FAILS, HOLDS, NOTES, Finding, equal, step
 
 
 def observability(a: sp.Matrix, c: sp.Matrix) -> sp.Matrix:

@@ -8,10 +8,12 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq, nnls
 
 import nlsdesign as nls
-from studies._published import Array, element_loop, figure_points
-from studies.audit_published_model import paper as p
-from studies.audit_published_model.cycle import CAMS, Cam, cycle, fig8_energy, loss
-from studies.audit_published_model.finding import (
+from nlsdesign.foundation.arrays import Array
+
+from .._published import element_loop, figure_points
+from . import paper as p
+from .cycle import CAMS, Cam, cycle, fig8_energy, loss
+from .finding import (
     AGAINST_FIGURES,
     FAILS,
     HOLDS,

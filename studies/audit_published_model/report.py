@@ -16,8 +16,9 @@ from nlsdesign.presentation.report import (
     Section,
     TableSection,
 )
-from studies.audit_published_model.finding import Finding, Results
-from studies.audit_published_model.law import unit_table
+
+from .finding import Finding, Results
+from .law import unit_table
 
 ABSTRACT = (
     "Each statement on the published cam-rubber actuator, of the paper or of the project's design "

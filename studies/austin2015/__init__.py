@@ -10,18 +10,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import nlsdesign as nls
-from studies._published import declared_actuator
-from studies.austin2015.design import design_spring
-from studies.austin2015.diagnosis import diagnose_bench
-from studies.austin2015.evaluation import evaluate_loop
-from studies.austin2015.figures import compare_with_figures
-from studies.austin2015.generated import Code, code_of_three_decks
-from studies.austin2015.observer import compare_observers, sweep_angle
-from studies.austin2015.report import write_page
-from studies.austin2015.results import ActuatorResults, Results
-from studies.austin2015.spread import over_spread
-from studies.austin2015.torque_loop import export_and_cosimulate
-from studies.austin2015.tracking import follow_sines
+
+from .._published import declared_actuator
+from .design import design_spring
+from .diagnosis import diagnose_bench
+from .evaluation import evaluate_loop
+from .figures import compare_with_figures
+from .generated import Code, code_of_three_decks
+from .observer import compare_observers, sweep_angle
+from .report import write_page
+from .results import ActuatorResults, Results
+from .spread import over_spread
+from .torque_loop import export_and_cosimulate
+from .tracking import follow_sines
 
 
 def main(out: Path, fast: bool = False) -> Results:

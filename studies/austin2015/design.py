@@ -6,7 +6,8 @@ from pathlib import Path
 
 import nlsdesign as nls
 from nlsdesign.design import DesignSettings, FerruleSeat, RestLengthRange
-from studies._designed import MadeCam, make_cam, with_machined_contour
+
+from .._designed import MadeCam, make_cam, with_machined_contour
 
 FREE = ("spring.cam.contour", "spring.pretension", "spring.rubber.area", "spring.rubber.rest_length")
 LARGEST_RADIUS = nls.quantity(20.0, "mm", source="Schepelmann et al. 2014: the cam is to be that small")

@@ -7,7 +7,8 @@ from pathlib import Path
 import nlsdesign as nls
 from nlsdesign.bench.discrepancy import Verdict
 from nlsdesign.foundation.progress import Progress
-from studies._published import bench_records, with_bench_sensors
+
+from .._published import bench_records, with_bench_sensors
 
 
 def diagnose_bench(actuator: nls.Assembly, out: Path, progress: Progress) -> Verdict:

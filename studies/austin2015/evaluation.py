@@ -20,7 +20,7 @@ from nlsdesign.feedback.control import (
     output_impedance,
     sine_response,
 )
-from nlsdesign.feedback.control.evaluation.impedance import OutputImpedance
+from nlsdesign.feedback.control.evaluation.margins import OutputImpedance
 from nlsdesign.feedback.observer import ObserverDesign
 
 AMPLITUDES = (0.8, 2.8)  # N·m; the small and the large sine of Fig. 10 of the paper

@@ -7,8 +7,9 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.presentation.figures.loop_evaluation import passivity_words
 from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
-from studies.austin2015.evaluation import AMPLITUDES, KP
-from studies.austin2015.results import ActuatorResults, Results
+
+from .evaluation import AMPLITUDES, KP
+from .results import ActuatorResults, Results
 
 
 def evaluation_sections(results: Results) -> list[Section]:

@@ -18,7 +18,8 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.bench.identification import rmse
 from nlsdesign.feedback.observer import choose_observer
-from studies.austin2015.torque_loop import FROM_ENCODER, TorqueLoop, export_and_cosimulate
+
+from .torque_loop import FROM_ENCODER, TorqueLoop, export_and_cosimulate
 
 AMPLITUDE, FREQUENCY = 2.0, 1.0  # N·m, Hz; slow enough for the second relaxation to show
 CYCLES = 5

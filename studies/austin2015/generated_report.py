@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import nlsdesign as nls
 from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
-from studies.austin2015.generated import AMPLITUDE, CYCLES, FREQUENCY, GeneratedCode
+
+from .generated import AMPLITUDE, CYCLES, FREQUENCY, GeneratedCode
 
 
 def generated_sections(generated: GeneratedCode) -> list[Section]:

@@ -6,8 +6,9 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
-from studies.austin2015.results import ActuatorResults, Results
-from studies.austin2015.tracking import AMPLITUDE, PROPORTIONAL, SETTLED
+
+from .results import ActuatorResults, Results
+from .tracking import AMPLITUDE, PROPORTIONAL, SETTLED
 
 _SHOWN = (45.0, 2.0)  # gain and Hz of the run that is drawn: the published actuator reaches its current limit
 

@@ -7,8 +7,9 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.foundation.quantity import three_digits
 from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, TextSection
-from studies.austin2015.observer import STIFFER, WIDER
-from studies.austin2015.results import ActuatorResults, Results
+
+from .observer import STIFFER, WIDER
+from .results import ActuatorResults, Results
 
 
 def observer_sections(results: Results) -> list[Section]:

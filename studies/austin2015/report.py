@@ -25,12 +25,13 @@ from nlsdesign.presentation.report import (
     tolerance_sections,
     verdict_sections,
 )
-from studies._designed import drawing_section
-from studies.austin2015.evaluation_report import evaluation_sections
-from studies.austin2015.generated_report import generated_sections
-from studies.austin2015.loop_report import loop_sections
-from studies.austin2015.observer_report import observer_sections
-from studies.austin2015.results import Results
+
+from .._designed import drawing_section
+from .evaluation_report import evaluation_sections
+from .generated_report import generated_sections
+from .loop_report import loop_sections
+from .observer_report import observer_sections
+from .results import Results
 
 ABSTRACT = (
     "Declared once, flattened once: the cam-rubber actuator of Austin, Schepelmann and Geyer (IROS 2015), "

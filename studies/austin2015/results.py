@@ -9,14 +9,15 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.bench.discrepancy import Verdict
 from nlsdesign.feedback.analysis import Chart
-from studies._designed import MadeCam
-from studies.austin2015.evaluation import LoopEvaluation
-from studies.austin2015.figures import FigureComparison
-from studies.austin2015.generated import GeneratedCode
-from studies.austin2015.observer import ObserverComparison
-from studies.austin2015.spread import ObserverOverSpread
-from studies.austin2015.torque_loop import TorqueLoop
-from studies.austin2015.tracking import Following, tracking_numbers
+
+from .._designed import MadeCam
+from .evaluation import LoopEvaluation
+from .figures import FigureComparison
+from .generated import GeneratedCode
+from .observer import ObserverComparison
+from .spread import ObserverOverSpread
+from .torque_loop import TorqueLoop
+from .tracking import Following, tracking_numbers
 
 
 @dataclass(frozen=True, eq=False)

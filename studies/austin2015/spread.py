@@ -23,7 +23,8 @@ from nlsdesign.feedback.observer import (
     write_certificate,
 )
 from nlsdesign.feedback.observer.certificates.certificate import hashes_of_code
-from studies.austin2015.observer import ObserverComparison
+
+from .observer import ObserverComparison
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.export import CSource, Wire
 from nlsdesign.feedback.control import joined
-from studies._published import Array
+from nlsdesign.foundation.arrays import Array
 
 READING = "plant.motor_encoder.reading"
 FROM_ENCODER = {"observer.motor.angle": READING, "controller.motor.angle": READING}

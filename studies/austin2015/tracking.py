@@ -13,7 +13,8 @@ from nlsdesign.bench.identification import rmse
 from nlsdesign.export import natively
 from nlsdesign.feedback.control import LoopVerdict, TorqueGains, sine_response
 from nlsdesign.feedback.observer import ObserverDesign
-from studies.austin2015.torque_loop import FROM_ENCODER
+
+from .torque_loop import FROM_ENCODER
 
 AMPLITUDE = 2.8  # N·m; the large sine of Fig. 10 of the paper
 FREQUENCIES = (2.0, 5.0, 11.0)  # Hz

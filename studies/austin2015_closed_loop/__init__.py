@@ -13,19 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from studies._published import figure_points
-from studies.austin2015_closed_loop import statements as stated
-from studies.austin2015_closed_loop.benches import DECKS, NONLINEAR, SOFT, STIFF
-from studies.austin2015_closed_loop.felt_torque import FeltTorque, felt_torque
-from studies.austin2015_closed_loop.followed_torque import (
+from .._published import figure_points
+from . import statements as stated
+from .benches import DECKS, NONLINEAR, SOFT, STIFF
+from .felt_torque import FeltTorque, felt_torque
+from .followed_torque import (
     GENTLE,
     LATE_TORQUE,
     FollowedTorque,
     followed_torque,
 )
-from studies.austin2015_closed_loop.report import write_page
-from studies.austin2015_closed_loop.scheduled_law import ScheduledLaw, scheduled_law
-from studies.austin2015_closed_loop.statement import Statement
+from .report import write_page
+from .scheduled_law import ScheduledLaw, scheduled_law
+from .statement import Statement
 
 DRAWS, FEW_DRAWS = 100, 20
 

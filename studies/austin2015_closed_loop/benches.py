@@ -6,9 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 import nlsdesign as nls
 from nlsdesign.components.assembly.moved_load import with_moved_load
 from nlsdesign.export import natively
@@ -24,9 +21,9 @@ from nlsdesign.feedback.control import (
     zero_torque,
 )
 from nlsdesign.feedback.observer import CascadeGain, GridByTolerance
-from studies.austin2015_closed_loop.late_torque import late_torque
+from nlsdesign.foundation.arrays import Array
 
-Array = NDArray[np.float64]
+from .late_torque import late_torque
 
 NONLINEAR, SOFT, STIFF = "nonlinear", "soft", "stiff"
 DECKS = {

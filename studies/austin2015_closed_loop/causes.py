@@ -7,7 +7,8 @@ from dataclasses import replace
 import nlsdesign as nls
 from nlsdesign.components import Backlash, Rounded, Tie
 from nlsdesign.feedback.control import LoopJudge, TorqueGains, with_fine_counts
-from studies.austin2015_closed_loop.benches import NONLINEAR, Bench, Cause, angle_of, linear_spring
+
+from .benches import NONLINEAR, Bench, Cause, angle_of, linear_spring
 
 FAST_VELOCITY = 100.0  # Hz; the largest that a loop of 1 kHz carries
 SLOW_VELOCITY = 15.0  # Hz

@@ -15,18 +15,11 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.feedback.control import TorqueGains, ZeroTorque
-from studies._published import figure_points
-from studies.austin2015_closed_loop.benches import (
-    DECKS,
-    FILES,
-    NONLINEAR,
-    POWER_LAW,
-    SOFT,
-    STIFF,
-    Array,
-    Bench,
-)
-from studies.austin2015_closed_loop.causes import ADDED, LATE
+from nlsdesign.foundation.arrays import Array
+
+from .._published import figure_points
+from .benches import DECKS, FILES, NONLINEAR, POWER_LAW, SOFT, STIFF, Bench
+from .causes import ADDED, LATE
 
 FIRST = 0.45  # Hz; below it the published torques are those of a few counts
 TO_TWO = (0.5, 1.0, 2.0)  # Hz

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from nlsdesign.feedback.control import SineResponse, TorqueGains
-from studies._published import figure_points
-from studies.austin2015_closed_loop.benches import DECKS, FILES, HIGH, LOW, Array, Bench
+from nlsdesign.foundation.arrays import Array
+
+from .._published import figure_points
+from .benches import DECKS, FILES, HIGH, LOW, Bench
 
 AMPLITUDES = {"low": LOW, "high": HIGH}
 

@@ -9,13 +9,14 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.presentation.figures import Figure, PointPanel
 from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, write_report
-from studies._published import figure_points
-from studies.austin2015_closed_loop.benches import DECKS, FILES, NONLINEAR, SOFT
-from studies.austin2015_closed_loop.felt_torque import FeltTorque
-from studies.austin2015_closed_loop.followed_torque import AMPLITUDES, GENTLE, LATE_TORQUE, FollowedTorque
-from studies.austin2015_closed_loop.scheduled_law import GOALS, ScheduledLaw
-from studies.austin2015_closed_loop.statement import Statement
-from studies.austin2015_closed_loop.statements import static_torque
+
+from .._published import figure_points
+from .benches import DECKS, FILES, NONLINEAR, SOFT
+from .felt_torque import FeltTorque
+from .followed_torque import AMPLITUDES, GENTLE, LATE_TORQUE, FollowedTorque
+from .scheduled_law import GOALS, ScheduledLaw
+from .statement import Statement
+from .statements import static_torque
 
 ACROSS = "frequency in Hz"
 NOT_PRINTED = (

@@ -9,7 +9,8 @@ import numpy as np
 from nlsdesign.export import natively
 from nlsdesign.feedback.control import LoopSpread, LoopVerdict, ScheduledTorque, loop_over_spread, tracking
 from nlsdesign.simulation import Sine
-from studies.austin2015_closed_loop.benches import HIGH, NONLINEAR, Bench
+
+from .benches import HIGH, NONLINEAR, Bench
 
 GOALS = {1.0: 0.05, 2.0: 0.09, 5.0: 0.19, 11.0: 0.29}
 """Error over desired torque, both root mean square, by frequency in Hz, at 2.8 N·m."""

@@ -9,8 +9,9 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.feedback.control import SineResponse, TorqueGains, loop_margins
 from nlsdesign.model.linear import rest_state
-from studies.austin2015_closed_loop import causes
-from studies.austin2015_closed_loop.benches import (
+
+from . import causes
+from .benches import (
     AS_IT_IS,
     DECKS,
     HIGH,
@@ -22,9 +23,9 @@ from studies.austin2015_closed_loop.benches import (
     Cause,
     angle_of,
 )
-from studies.austin2015_closed_loop.felt_torque import FeltTorque, held_motor
-from studies.austin2015_closed_loop.followed_torque import GENTLE, FollowedTorque
-from studies.austin2015_closed_loop.statement import (
+from .felt_torque import FeltTorque, held_motor
+from .followed_torque import GENTLE, FollowedTorque
+from .statement import (
     NOT_REPRODUCED,
     OTHERWISE,
     REPRODUCED,

@@ -15,19 +15,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import loss_of, material
 from nlsdesign.design import CamDesign
 from nlsdesign.feedback.control import LoopChoice, best_choices
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.foundation.quantity import three_digits
 from nlsdesign.presentation.report import FigureSection, TableSection
-from studies.alternative_rubber.bench import Bench, Rubber
-from studies.alternative_rubber.candidates import designed
-from studies.alternative_rubber.merits import HIGH, MOVED_AT, largest_gains, measured
-from studies.spring_and_gains.under_margins import (
+
+from ..alternative_rubber.bench import Bench, Rubber
+from ..alternative_rubber.candidates import designed
+from ..alternative_rubber.merits import HIGH, MOVED_AT, largest_gains, measured
+from .under_margins import (
     DECKS,
     DRAWS,
     LIMITS,
@@ -37,8 +38,6 @@ from studies.spring_and_gains.under_margins import (
     published,
     stiffness_felt,
 )
-
-Array = NDArray[np.float64]
 
 RUBBER = "PMC-770"
 ANGLES, SHAPES = (40.0, 53.0, 65.0), (0.2, 1.0, 2.5)

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components.assembly.moved_load import with_moved_load
@@ -31,10 +30,10 @@ from nlsdesign.feedback.control import (
     saturation_line,
 )
 from nlsdesign.feedback.observer import CascadeGain
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import InfeasibleError, ValueRangeError
-from studies.alternative_rubber.merits import HELD, MOVED_AT
 
-Array = NDArray[np.float64]
+from ..alternative_rubber.merits import HELD, MOVED_AT
 
 DECKS = {
     "nonlinear": "austin2015_figure_consistent",

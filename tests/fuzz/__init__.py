@@ -6,7 +6,7 @@ a fixed seed, and every case that was ever red by name.
 
 from __future__ import annotations
 
-from tests.fuzz.cases import Family
+from .cases import Family
 
 
 def family_names() -> tuple[str, ...]:
@@ -17,21 +17,21 @@ def family_names() -> tuple[str, ...]:
 def family_of(name: str) -> Family:
     """Return a kind of cases by its name; only its own libraries are loaded."""
     if name == "decks":
-        from tests.fuzz.decks import Decks
+        from .decks import Decks
 
         return Decks()
     if name == "records":
-        from tests.fuzz.records import Records
+        from .records import Records
 
         return Records()
     if name == "fmus":
-        from tests.fuzz.fmus import Fmus
+        from .fmus import Fmus
 
         return Fmus()
     if name == "commands":
-        from tests.fuzz.commands import Commands
+        from .commands import Commands
 
         return Commands()
-    from tests.fuzz.interrupts import Interrupts
+    from .interrupts import Interrupts
 
     return Interrupts()

@@ -16,9 +16,9 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from tests.fuzz import family_names, family_of
-from tests.fuzz.cases import Outcome
-from tests.fuzz.running import made_by, outcomes, shrunk
+from . import family_names, family_of
+from .cases import Outcome
+from .running import made_by, outcomes, shrunk
 
 _SHORT = 20.0
 """Cases that may take longer are not made smaller."""

@@ -14,8 +14,9 @@ import click
 
 from nlsdesign.cli.main import main, program
 from nlsdesign.foundation.written_files import LIST_NAME
-from tests.fuzz.cases import ACCEPTED, REFUSED, Case, Outcome, signature
-from tests.fuzz.records import _JOB, _MAPPING, _TARGET, Records
+
+from .cases import ACCEPTED, REFUSED, Case, Outcome, signature
+from .records import _JOB, _MAPPING, _TARGET, Records
 
 DECKS = (
     "dfki_pendulum",

@@ -12,8 +12,9 @@ from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.foundation.locations import folder
 from nlsdesign.model import flatten
-from tests.fuzz.cases import ACCEPTED, Case, Outcome
-from tests.fuzz.mutators import (
+
+from .cases import ACCEPTED, Case, Outcome
+from .mutators import (
     EVIL_NUMBERS,
     EVIL_TEXTS,
     EVIL_UNITS,

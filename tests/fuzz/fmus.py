@@ -13,10 +13,11 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import Stepping, cosimulate, export_fmu
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
-from tests.child_processes import children
-from tests.fuzz.cases import ACCEPTED, Case, Outcome, judged_by
-from tests.fuzz.mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_tokens
-from tests.hand_built import controller
+
+from ..child_processes import children
+from ..hand_built import controller
+from .cases import ACCEPTED, Case, Outcome, judged_by
+from .mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_tokens
 
 DESCRIPTION = "modelDescription.xml"
 FILE = "one.fmu"

@@ -14,9 +14,10 @@ from pathlib import Path
 
 from nlsdesign.export import export_fmu
 from nlsdesign.foundation.written_files import LIST_NAME
-from tests.fuzz.cases import ACCEPTED, REFUSED, Case, Outcome
-from tests.fuzz.records import Records
-from tests.hand_built import controller
+
+from ..hand_built import controller
+from .cases import ACCEPTED, REFUSED, Case, Outcome
+from .records import Records
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 2.0

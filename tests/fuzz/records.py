@@ -23,8 +23,9 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.locations import bundled
 from nlsdesign.foundation.locations import folder as distributed
 from nlsdesign.model import flatten
-from tests.fuzz.cases import ACCEPTED, Case, Outcome
-from tests.fuzz.mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_lines, damaged_tokens
+
+from .cases import ACCEPTED, Case, Outcome
+from .mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_lines, damaged_tokens
 
 ROWS = 120
 _HEADS = ("t_s", "theta_rad", "current_A", "force_N")

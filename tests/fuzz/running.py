@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from tests.fuzz.cases import Case, Family, Outcome, judged_by, mixed
+from .cases import Case, Family, Outcome, judged_by, mixed
 
 MEMORY = 6 * 2**30
 """Bytes of address space of a worker: a case that asks for more gets a MemoryError."""

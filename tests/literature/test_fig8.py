@@ -14,7 +14,8 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import rest_state
-from tests.literature.published import (
+
+from .published import (
     FIG_8_NONLINEAR,
     FIG_8_SOFT,
     MODEL_RELATIVE_ERROR,

@@ -19,7 +19,8 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import rest_state
 from nlsdesign.simulation import Trace, simulate
-from tests.literature.published import AREA, BRANCH, ENGAGING, FORCES, MODULI, REST_LENGTH, VISCOSITY
+
+from .published import AREA, BRANCH, ENGAGING, FORCES, MODULI, REST_LENGTH, VISCOSITY
 
 PRINTED, CONSISTENT = "austin2015_as_printed", "austin2015_figure_consistent"
 

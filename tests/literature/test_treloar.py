@@ -10,14 +10,15 @@ import pytest
 
 from nlsdesign.components import ExtendedTube, NeoHooke, Ogden
 from nlsdesign.components.materials.hyperelastic import Hyperelastic
-from tests.literature.published import (
+from tests.stretched import pulled, stress_at
+
+from .published import (
     EXTENDED_TUBE_FIT,
     KILOGRAM_FORCE_PER_SQUARE_CENTIMETRE,
     OGDEN_1972,
     TRELOAR_SHEAR_MODULUS,
     TRELOAR_TENSION,
 )
-from tests.stretched import pulled, stress_at
 
 UNIT = KILOGRAM_FORCE_PER_SQUARE_CENTIMETRE
 

@@ -24,7 +24,7 @@ from collections import defaultdict
 from dataclasses import asdict
 from pathlib import Path
 
-from tests.mutation.mutants import Mutant, broken, mutants_of
+from .mutants import Mutant, broken, mutants_of
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("nlsdesign", "models", "studies", "tests", "benchmarks", "docs", "requirements")

@@ -19,7 +19,8 @@ from nlsdesign.components import (
     TransportDelay,
     VoltageDrivenMotor,
 )
-from tests.physics.table import Row
+
+from .table import Row
 
 ROWS: tuple[Row, ...] = (
     Row(

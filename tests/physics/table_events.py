@@ -12,7 +12,8 @@ from nlsdesign.components import (
     Slack,
     StribeckFriction,
 )
-from tests.physics.table import Row
+
+from .table import Row
 
 _DRY, _CONTACT, _LUGRE = "test_dry_friction.py::", "test_stops_and_contact.py::", "test_lugre.py::"
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from nlsdesign.components import ConstantLoad, CoulombFriction, LinearDrive
-from tests.physics.table import Row
+
+from .table import Row
 
 _BY_HAND = "test_models_by_hand.py::test_the_drive_agrees_with_its_equation_typed_here"
 _BALANCE = "test_models_by_hand.py::test_work_put_into_the_drive_is_stored_or_lost"

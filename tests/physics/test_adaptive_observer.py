@@ -20,9 +20,9 @@ from nlsdesign.feedback.observer import (
     estimator_bound,
 )
 from nlsdesign.feedback.observer.adaptive.adaptive_step import _matrices, _Side
-from nlsdesign.feedback.observer.adaptive.directions import UncertainDirections, uncertain_directions
+from nlsdesign.feedback.observer.adaptive.duty_and_directions import UncertainDirections, uncertain_directions
 from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, within_a_count
-from nlsdesign.feedback.observer.scheduling.forms import minimal_form
+from nlsdesign.feedback.observer.scheduling.angle_form import minimal_form
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.transform import named

@@ -12,7 +12,6 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.feedback.observer import (
@@ -29,6 +28,7 @@ from nlsdesign.feedback.observer import (
     torque_bound,
     verify,
 )
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.model import FlatModel, flatten
@@ -39,7 +39,6 @@ DECKS = ("austin2015_as_printed", "austin2015_figure_consistent")
 VISCOSITY, MODULUS = "spring.rubber.relaxing.dashpot.viscosity", "spring.rubber.relaxing.spring.modulus"
 STRAIN = "spring.rubber.relaxing.dashpot.strain"
 TIME = 1e-3
-Array = NDArray[np.float64]
 
 
 def plant(deck: str, viscosity: float | None = None) -> FlatModel:

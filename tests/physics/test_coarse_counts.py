@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from nlsdesign.bench.discrepancy import Refit, predict, refit
@@ -28,11 +27,10 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import Assembly
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
-
-Array = NDArray[np.float64]
 
 TRUE = {"stage.inertia": 0.05, "viscous.damping": 0.08, "dry.sliding_effort": 0.06}
 FINE, TORQUE_NOISE = 1e-4, 0.01

@@ -25,6 +25,7 @@ from nlsdesign.feedback.observer import (
     write_certificate,
 )
 from nlsdesign.feedback.observer.certificates.error_system import hull
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.model import FlatModel, flatten
@@ -33,7 +34,6 @@ from tests import renamed as rn
 
 DECKS = ("austin2015_as_printed", "austin2015_figure_consistent")
 VISCOSITY, MODULUS = "spring.rubber.relaxing.dashpot.viscosity", "spring.rubber.relaxing.spring.modulus"
-Array = NDArray[np.float64]
 
 
 def plant(deck: str, viscosity: float | None = None) -> FlatModel:

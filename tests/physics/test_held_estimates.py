@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.feedback.observer import (
@@ -40,7 +39,6 @@ from nlsdesign.simulation.prior import declared_prior
 STRAIN = "spring.rubber.relaxing.dashpot.strain"
 GRID = FixedGrid(-1.1, 1.1, 45)
 RANGES = Assumptions((0.3, 0.32), 15.0, 4e-4)
-Array = NDArray[np.float64]
 
 
 def plant(deck: str = "austin2015_figure_consistent") -> FlatModel:

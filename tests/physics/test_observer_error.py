@@ -23,7 +23,7 @@ from nlsdesign.feedback.observer import (
     design_observer_with_details,
     observe,
 )
-from nlsdesign.feedback.observer.scheduling.check import error_matrices
+from nlsdesign.feedback.observer.scheduling.scheduled import error_matrices
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.paper_form import PaperFormNames

@@ -28,12 +28,14 @@ from nlsdesign.feedback.analysis import (
     empirical_gramian,
     least_damped,
     over_angle,
-    rank_drops,
     rest_points,
     sampled_poles,
 )
+from nlsdesign.feedback.analysis import (
+    observability as rank_drops,
+)
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
-from nlsdesign.feedback.observer.scheduling.check import error_matrices
+from nlsdesign.feedback.observer.scheduling.scheduled import error_matrices
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.locations import folder
 from nlsdesign.model import FlatModel, flatten

@@ -39,7 +39,8 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
-from tests.physics.fed_by_rate import Hardening
+
+from .fed_by_rate import Hardening
 
 DECKS = ("austin2015_as_printed", "austin2015_figure_consistent")
 

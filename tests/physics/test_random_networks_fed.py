@@ -22,7 +22,8 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import LinearModel, linearise, rest_state
-from tests.physics.fed_by_rate import FedSolid, Hardening
+
+from .fed_by_rate import FedSolid, Hardening
 
 FREQUENCIES = (0.07, 1.3, 21.0)
 Law = Callable[[complex], complex]

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
@@ -22,11 +21,11 @@ from nlsdesign.bench.identification.equation_error import evidence
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
 
-Array = NDArray[np.float64]
 Rate = Callable[[float, Array], list[float]]
 TEMPLATES = Path(__file__).parents[2] / "models" / "templates"
 FINE = {"motor_encoder.quantum": 5e-6}

@@ -26,7 +26,8 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import jacobian_function
 from nlsdesign.simulation import simulate
-from tests.physics.fed_by_rate import BoucWen, Hardening
+
+from .fed_by_rate import BoucWen, Hardening
 
 KNOTS = np.array([0.0, 0.05, 0.2, 0.7])
 CORNERS = np.append(KNOTS, 1e6)

@@ -32,7 +32,8 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
-from tests.physics.fed_by_rate import BoucWen, FedSolid, Hardening
+
+from .fed_by_rate import BoucWen, FedSolid, Hardening
 
 CABLE = 5e4
 AREA, LENGTH = 1e-4, 0.0125

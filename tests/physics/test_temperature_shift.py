@@ -27,8 +27,9 @@ from nlsdesign.components import (
     series,
 )
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
-from tests.physics.test_networks import complex_modulus
 from tests.stretched import VOLUME, pulled, run
+
+from .test_networks import complex_modulus
 
 T_R = 253.15
 INSIDE: dict[str, Element] = {

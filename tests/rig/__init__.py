@@ -8,11 +8,11 @@ sliders, the step is fixed at 20 kHz.  Only numpy and the standard library are u
 >>> records = make_records(ACTUATORS["arm"], {"coulomb_friction": 1.0}, seed=3)
 """
 
-from tests.rig.actuators import ACTUATORS, Actuator, with_slack_cable
-from tests.rig.conditions import COUNTS, PLAIN, THREE_RECORDS, Conditions, mistaken
-from tests.rig.declaration import write_collection, write_declaration, write_records, write_set
-from tests.rig.effects import EFFECTS, LATER_EFFECTS, OUTSIDE_ANY_CATALOGUE, STRENGTHS, Hidden
-from tests.rig.records import make_records, truth
+from .actuators import ACTUATORS, Actuator, with_slack_cable
+from .conditions import COUNTS, PLAIN, THREE_RECORDS, Conditions, mistaken
+from .declaration import write_collection, write_declaration, write_records, write_set
+from .effects import EFFECTS, LATER_EFFECTS, OUTSIDE_ANY_CATALOGUE, STRENGTHS, Hidden
+from .records import make_records, truth
 
 __all__ = [
     "ACTUATORS",

@@ -12,8 +12,8 @@ step sees F* as  softness · F*(y − set).
 
 from __future__ import annotations
 
-from tests.rig.actuators import Rubber
-from tests.rig.effects import Hidden
+from .actuators import Rubber
+from .effects import Hidden
 
 
 class Aging:

@@ -22,11 +22,11 @@ from math import exp, sin
 
 import numpy as np
 
-from tests.rig.actuators import Actuator, Cam, Drivetrain
-from tests.rig.commands import STEP, Command
-from tests.rig.effects import Hidden
-from tests.rig.faults import acting_current, capstan
-from tests.rig.rubber import pull_of
+from .actuators import Actuator, Cam, Drivetrain
+from .commands import STEP, Command
+from .effects import Hidden
+from .faults import acting_current, capstan
+from .rubber import pull_of
 
 SERVO_BANDWIDTH = 75.0  # rad/s
 SERVO_DAMPING = 0.8

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.rig.bench import prox
-from tests.rig.published import PUBLISHED, RUBBER
+from .bench import prox
+from .published import PUBLISHED, RUBBER
 
 STEP = 1.0e-4  # s: slow motions, no contact
 GRID = 5.0e-4  # rad

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.rig.actuators import Actuator, Sensors
+from .actuators import Actuator, Sensors
 
 COUNTS = (512, 1024, 2048)
 THREE_RECORDS = ("sine_45deg_0.5Hz", "sine_25deg_2.0Hz", "multisine")

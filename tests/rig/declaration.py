@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.rig.actuators import Actuator
+from .actuators import Actuator
 
 _RIG = """\
 # The actuator as its makers declare it. The records beside this file were measured on the real one.

@@ -61,7 +61,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.rig.actuators import Actuator
+from .actuators import Actuator
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Callable
 from math import atan, exp
 
-from tests.rig.commands import STEP
-from tests.rig.effects import Hidden
+from .commands import STEP
+from .effects import Hidden
 
 
 def acting_current(hidden: Hidden) -> Callable[[float], float] | None:

@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.rig.actuators import Sensors
-from tests.rig.bench import friction_level, prox
-from tests.rig.commands import STEP, Command, sines, steps
-from tests.rig.conditions import PLAIN, Conditions
-from tests.rig.effects import Hidden, applied
-from tests.rig.faults import acting_current
+from .actuators import Sensors
+from .bench import friction_level, prox
+from .commands import STEP, Command, sines, steps
+from .conditions import PLAIN, Conditions
+from .effects import Hidden, applied
+from .faults import acting_current
 
 FRICTIONS = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "position_dependent_friction")
 DRIVES = (

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import BSpline
 
-from tests.rig.actuators import Actuator, Cam, Drivetrain, Rubber, Sensors
-from tests.rig.records import make_records
+from .actuators import Actuator, Cam, Drivetrain, Rubber, Sensors
+from .records import make_records
 
 HIDDEN = {"coulomb_friction": 0.07, "second_relaxation": 1.0}
 """The declared dry friction (0.02 N·m), and a second relaxation of the rubber that nobody declared."""

@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from tests.rig.actuators import Actuator, Sensors, as_built
-from tests.rig.bench import History, Servo, simulate
-from tests.rig.commands import RECORDS, STEP, Command, commands
-from tests.rig.conditions import PLAIN, Conditions
-from tests.rig.effects import Hidden, hidden_effects
+from .actuators import Actuator, Sensors, as_built
+from .bench import History, Servo, simulate
+from .commands import RECORDS, STEP, Command, commands
+from .conditions import PLAIN, Conditions
+from .effects import Hidden, hidden_effects
 
 # Streams of random numbers, one for each purpose: with the same seed the actuator, the commands and the noise
 # are the same whatever is hidden.

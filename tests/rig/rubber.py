@@ -22,9 +22,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tests.rig.actuators import Rubber
-from tests.rig.aging import Aging
-from tests.rig.effects import Hidden
+from .actuators import Rubber
+from .aging import Aging
+from .effects import Hidden
 
 GRID = 1.0e-5  # m, spacing of the table of F*; the knots of the rubber lie on it
 LOWEST, HIGHEST = -0.01, 0.04  # m, ends of that table

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError
 from ...model import FlatModel
 from ...model.roles import driven_body
@@ -22,7 +22,6 @@ from ...model.structure import MovingBody
 from ...simulation import Prior
 from .bench_test import WEIGHT
 
-Array = NDArray[np.float64]
 BALANCE = "balance of the drive"
 
 

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from ...foundation.arrays import Array, Mask
 from .bench_response import BALANCE, BenchCourse, BenchResponse
-
-Array = NDArray[np.float64]
 
 _LEAST_SAMPLES, _LONGEST = 13, 0.25
 """Samples and seconds of a window at least and at most."""
@@ -193,7 +192,7 @@ class RecordedRun(NamedTuple):
     course: BenchCourse
     measured: Array
     noise: SampleNoise
-    masked: NDArray[np.bool_]
+    masked: Mask
 
 
 def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRows]:
@@ -245,14 +244,14 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRo
     return rows
 
 
-def _row(channel: str, centres: NDArray[np.int64], use: NDArray[np.bool_], *parts: Array) -> BenchRows:
+def _row(channel: str, centres: NDArray[np.int64], use: Mask, *parts: Array) -> BenchRows:
     error, sigma, slope, shown, compared = parts
     size = float(np.sqrt(np.mean(compared**2)))
     floor = np.maximum(sigma, 1e-6 * size + 1e-12)
     return BenchRows(channel, centres[use], error[use], floor[use], slope[use], shown[use], size)
 
 
-def _in_motion(course: BenchCourse, noise: SampleNoise, view: SmoothWindows) -> NDArray[np.bool_]:
+def _in_motion(course: BenchCourse, noise: SampleNoise, view: SmoothWindows) -> Mask:
     """Tell in which windows every sample moves, in one direction: only there dry friction is known."""
     factor = rate_of(course.motion, course.step, 0.5 * noise.window)[1]
     least = _MOVING * max(noise.motion, 1e-12) * factor
@@ -260,5 +259,5 @@ def _in_motion(course: BenchCourse, noise: SampleNoise, view: SmoothWindows) -> 
     fast = np.where(np.abs(course.rate) > least, np.sign(course.rate), 0.0)
     inside = view.mean.copy()
     inside.data = np.ones_like(inside.data)
-    result: NDArray[np.bool_] = np.abs(np.asarray(inside @ fast)).ravel() >= view.length - 0.5
+    result: Mask = np.abs(np.asarray(inside @ fast)).ravel() >= view.length - 0.5
     return result

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, MeasurementError, ValueRangeError, unknown_name
 from ...foundation.quantity import three_digits, with_unit
 from ...model import flatten
@@ -25,8 +25,6 @@ from ..identification.statistics.losses import huber_rows
 from .bench_rows import BenchRows
 from .bench_test import WEIGHT, CalibrationTest
 from .unknowns import BenchEvidence, Unknowns, recorded_bench
-
-Array = NDArray[np.float64]
 
 _HUBER = 3.0
 """Standard deviations beyond which a row counts as Huber says."""

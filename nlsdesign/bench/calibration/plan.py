@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, InfeasibleError, unknown_name
 from ...foundation.prefixes import shared_prefix, without_power
 from ...model import flatten
@@ -22,7 +22,6 @@ from .estimate import prior_of
 from .planned_run import drive_ratio, planned_bench, sweep_end
 from .unknowns import Unknowns
 
-Array = NDArray[np.float64]
 ErrorOf = Callable[[Prior], float]
 """Size of an error, in its unit, over what is known of the numbers."""
 

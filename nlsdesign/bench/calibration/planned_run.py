@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError
 from ...model import FlatModel
 from ...model.readings import reading_of
@@ -18,8 +18,6 @@ from .bench_response import BenchCourse, BenchResponse, bench_response
 from .bench_rows import RecordedRun, SampleNoise, window_length
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest
 from .unknowns import BenchEvidence, bench_evidence, bench_prior
-
-Array = NDArray[np.float64]
 
 _SAMPLES = 1000.0
 """Hz at which a bench is taken to log."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError
 from ...model import FlatModel
 from ...model.readings import reading_of
@@ -20,8 +20,6 @@ from ..identification.estimation.covariance import Piece
 from .bench_response import BALANCE, BenchCourse, BenchResponse, bench_response, shared_factors
 from .bench_rows import BenchRows, RecordedRun, SampleNoise, rate_of, rows_of, window_length
 from .bench_test import WEIGHT, CalibrationTest, HungWeightTest
-
-Array = NDArray[np.float64]
 
 LEAST_ROWS = 8
 """Rows of a channel on a record below which it says nothing."""

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
@@ -54,7 +55,7 @@ class QuasilinearRelaxation(Combination):
                 "there must be one relaxation time per share",
             )
 
-    def factor(self, frequency: NDArray[np.float64] | float) -> NDArray[np.complex128]:
+    def factor(self, frequency: Array | float) -> NDArray[np.complex128]:
         """Return the complex modulus over the tangent modulus at equilibrium, shape of the frequency.
 
         Parameters
@@ -91,9 +92,7 @@ class QuasilinearRelaxation(Combination):
         return total
 
 
-def relaxation_factor(
-    shares: NDArray[np.float64], times: NDArray[np.float64], frequency: NDArray[np.float64] | float
-) -> NDArray[np.complex128]:
+def relaxation_factor(shares: Array, times: Array, frequency: Array | float) -> NDArray[np.complex128]:
     """Return 1 + Σ gᵢ·iωτᵢ/(1 + iωτᵢ), the shape of the frequency.
 
     Parameters

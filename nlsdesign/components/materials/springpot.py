@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
@@ -76,7 +77,7 @@ class Springpot(Element):
         exact = self.modulus.number * (1j * band / self.reference.number) ** self.order.number
         return float(np.max(np.abs(self.complex_modulus(band) / exact - 1.0)))
 
-    def complex_modulus(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def complex_modulus(self, frequency: Array) -> NDArray[np.complex128]:
         """Return the complex modulus of the branches in Pa.
 
         Parameters

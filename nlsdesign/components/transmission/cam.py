@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression, uniform_spline, uniform_spline_integral
@@ -157,9 +157,7 @@ class TwoSidedCam(Cam):
         return uniform_spline(scope.row("lever_arm"), 0.0, self._spacing(scope), on_contour) * slope
 
 
-def control_values(
-    angles: NDArray[np.float64], lever_arms: NDArray[np.float64], count: int = 40
-) -> tuple[float, ...]:
+def control_values(angles: Array, lever_arms: Array, count: int = 40) -> tuple[float, ...]:
     """Return the control values of a uniform cubic B-spline through a tabulated lever arm.
 
     Parameters

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError, UnitError, nearest
 from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
 from ...foundation.reading import text_of
 from ...foundation.written_numbers import name_and_unit
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +34,7 @@ class ReadColumns:
     """
 
     file: str
-    values: Mapping[str, Floats]
+    values: Mapping[str, Array]
     units: Mapping[str, str]
     lines: tuple[int, ...]
 

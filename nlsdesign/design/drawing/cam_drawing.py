@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity
 from ...foundation.writing import write_text
@@ -24,8 +24,6 @@ from .dxf_drawing import contour_dxf, part_dxf
 from .machined_cam import MachinedCam
 from .step_solid import part_step
 from .svg_drawing import page, part_svg, path_data
-
-Floats = NDArray[np.float64]
 
 FORMATS = ("csv", "svg", "dxf")
 """Files that are written unless others are asked for."""
@@ -243,5 +241,5 @@ def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
     return contour_dxf(contour.outlines(cable_radius=cable_radius), lines=[*lines, note] if note else lines)
 
 
-def _polygon(points: Floats) -> ArcPath:
+def _polygon(points: Array) -> ArcPath:
     return ArcPath(points[:-1], np.zeros(len(points) - 1), closed=True)

@@ -6,14 +6,12 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity
 from .arc_path import ArcPath, biarc, clockwise_arc, joined, line
 from .lip_edge import LipEdge
-
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 
@@ -99,13 +97,13 @@ def one_sided_outline(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:
     return joined(lip.path, back, lead, closed=True)
 
 
-def _end_circle(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[Floats, float]:
+def _end_circle(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[Array, float]:
     radius = numbers["corner_radius"].number
     normal = np.array([math.sin(lip.last_direction), math.cos(lip.last_direction)])
     return lip.path.points[-1] - radius * normal, radius
 
 
-def _back(circles: list[tuple[Floats, float]], first: float, last: float) -> ArcPath:
+def _back(circles: list[tuple[Array, float]], first: float, last: float) -> ArcPath:
     """Return the convex cover, clockwise, from one direction of the normal to another.
 
     The middle circle is left out where the line between the others covers it.
@@ -126,7 +124,7 @@ def _back(circles: list[tuple[Floats, float]], first: float, last: float) -> Arc
     return joined(*(clockwise_arc(centre, size, first=a, last=b) for (centre, size), a, b in pieces))
 
 
-def _joining(one: tuple[Floats, float], other: tuple[Floats, float], after: float) -> float | None:
+def _joining(one: tuple[Array, float], other: tuple[Array, float], after: float) -> float | None:
     """Return the direction of the normal of the common outer tangent from one circle to another."""
     step, growth = other[0] - one[0], one[1] - other[1]
     size = math.hypot(*step)
@@ -136,7 +134,7 @@ def _joining(one: tuple[Floats, float], other: tuple[Floats, float], after: floa
     return after + (direction - after) % (2.0 * math.pi)
 
 
-def _relief(mouth: Floats, direction: float, wall: float, tool_radius: float) -> ArcPath:
+def _relief(mouth: Array, direction: float, wall: float, tool_radius: float) -> ArcPath:
     """Return the edge from the wall of the channel up to its mouth: two arcs the tool can cut."""
     depth = float(mouth[1]) - wall
     if depth < 1e-9:

@@ -13,15 +13,14 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from .arc_path import ArcPath
 from .cam_part import CamPart
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 # name -> (colour of AutoCAD's index, line type)
@@ -64,7 +63,7 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
     return _text(document)
 
 
-def contour_dxf(outlines: tuple[Floats, ...], *, lines: list[str]) -> str:
+def contour_dxf(outlines: tuple[Array, ...], *, lines: list[str]) -> str:
     """Return closed polygons on the layer ``CONTOUR``.
 
     Parameters

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ..statics.contour import Contour
 from .arc_path import ArcPath, biarc, clockwise_arc, joined
-
-Floats = NDArray[np.float64]
 
 ACCURACY = 0.5e-6
 """Largest distance between the arcs and the contour in m."""
@@ -87,11 +85,11 @@ def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> Li
     )
 
 
-def _normal(direction: float) -> Floats:
+def _normal(direction: float) -> Array:
     return np.array([math.sin(direction), math.cos(direction)])
 
 
-def _tangent(direction: float) -> Floats:
+def _tangent(direction: float) -> Array:
     return np.array([math.cos(direction), -math.sin(direction)])
 
 
@@ -114,13 +112,13 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
         )
 
 
-def _point(support: BPoly, direction: float, cable_radius: float) -> Floats:
+def _point(support: BPoly, direction: float, cable_radius: float) -> Array:
     p, slope = float(support(direction)), float(support(direction, 1))
-    result: Floats = (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
+    result: Array = (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
     return result
 
 
-def _arcs(support: BPoly, phi: Floats, cable_radius: float) -> tuple[ArcPath, float]:
+def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, float]:
     """Return as few biarcs as the accuracy allows, and their deviation."""
     share = np.arange(_REFINE) / _REFINE
     grid = np.append((phi[:-1, None] + share * np.diff(phi)[:, None]).ravel(), phi[-1])

@@ -6,13 +6,11 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from .arc_path import crossing, distance_to, inside_of
 from .cam_part import CamPart, Hole
-
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 _CHORD = 2e-6
@@ -79,7 +77,7 @@ def _check_edges(part: CamPart) -> None:
         _check_backs(part, lower)
 
 
-def _check_backs(part: CamPart, lower: Floats) -> None:
+def _check_backs(part: CamPart, lower: Array) -> None:
     """The material between channel and back, on the y axis where the channel is closest to it."""
     heights = [
         y0 + (y1 - y0) * x0 / (x0 - x1)
@@ -132,7 +130,7 @@ def _check_anchor(part: CamPart) -> None:
         )
 
 
-def _check_hole(hole: Hole, part: CamPart, polygons: list[Floats]) -> None:
+def _check_hole(hole: Hole, part: CamPart, polygons: list[Array]) -> None:
     wall = part.number("minimum_wall")
     away = _MM * math.hypot(*hole.centre)
     what = f"{hole.name} of {_MM * hole.diameter:.4g} mm at {away:.4g} mm from the axis"

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .arc_path import ArcPath
 from .cam_part import CamPart
-
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 _TEXT = 2.2

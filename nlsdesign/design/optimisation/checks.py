@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...model import FlatModel
 from ..curves.target import Target
 from ..statics.equilibrium import torque_function
 from .result import TorqueCheck
-
-Floats = NDArray[np.float64]
 
 _ANGLES = 801
 

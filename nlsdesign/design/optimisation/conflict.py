@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, InfeasibleError
 from .design_search import Search
 from .limits import Bound
 from .loosening import FEASIBLE, Freed, Give, Loosened
 from .program import PROVED_INFEASIBLE
 
-Floats = NDArray[np.float64]
-
 _INVOLVED = 1e-3
 """Price, in give of the whole per give of this limit, from which a limit counts as part of the conflict."""
 
 
-def feasible_point(search: Search, free: Sequence[str]) -> Floats:
+def feasible_point(search: Search, free: Sequence[str]) -> Array:
     """Return unknowns that keep all limits, or say why there are none.
 
     Every limit gets a slack, and the sum of the slacks, each relative to the size of its limit, is made as

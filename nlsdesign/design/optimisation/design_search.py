@@ -8,8 +8,8 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
@@ -22,8 +22,6 @@ from .problem import DesignProblem, design_problem, movable_numbers
 from .program import Program, Rows, Solution
 from .settings import DesignSettings
 from .starts import starts
-
-Floats = NDArray[np.float64]
 
 _ROUNDING = 0.003
 """Width over which the knots of a rubber's law are rounded at first, relative to its stretch."""
@@ -188,7 +186,7 @@ def row_of(bound: Bound, slack: Expression | float = 0.0) -> Rows:
     return Rows(distance - slack, -ca.inf, 0.0) if bound.upper else Rows(distance + slack, 0.0, ca.inf)
 
 
-def carried_over(source: Search, point: Floats, into: Search) -> Floats:
+def carried_over(source: Search, point: Array, into: Search) -> Array:
     """Return a point of one search as a start of another with other numbers free.
 
     Parameters

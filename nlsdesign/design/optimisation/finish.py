@@ -9,9 +9,9 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array
 from ...foundation.errors import NlsError
 from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
@@ -31,8 +31,6 @@ from .program import Solution
 from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
 from .size_ranges import size_ranges
-
-Floats = NDArray[np.float64]
 
 _ACTIVE = 1e-3
 _STIFFER = 0.1
@@ -342,7 +340,7 @@ def _remarks(search: Search) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _curves(problem: DesignProblem, point: Floats) -> DesignCurves:
+def _curves(problem: DesignProblem, point: Array) -> DesignCurves:
     design = problem.design
     columns = [
         design.angles, design.lever_arms, design.radii_of_curvature, design.radii, design.torques,
@@ -404,7 +402,7 @@ def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Conto
     return contour, fit
 
 
-def limit_state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitState:
     """Return how a design stands to a limit.
 
     Parameters

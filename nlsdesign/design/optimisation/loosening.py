@@ -15,8 +15,8 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.processes import parallel_map
 from ...foundation.quantity import parse_unit, with_unit
 from .design_search import Search, carried_over, row_of
@@ -25,8 +25,6 @@ from .problem import contour_names
 from .program import Program, Solution
 from .starts import starts
 from .variables import DesignVariable, scaled
-
-Floats = NDArray[np.float64]
 
 FEASIBLE = 1e-6
 """Relative give below which a limit counts as kept."""
@@ -126,7 +124,7 @@ class Loosened:
     """
 
     def __init__(
-        self, search: Search, free: Sequence[str], *, largest_error: float | None, best: Floats | None
+        self, search: Search, free: Sequence[str], *, largest_error: float | None, best: Array | None
     ) -> None:
         self.free, self.candidates = tuple(free), _candidates(search, free)
         self.open = search.question.search([*free, *self.candidates], search.rounding)
@@ -152,7 +150,7 @@ class Loosened:
         )
         return program.with_unknowns(slacks, 0.0, _MOST)
 
-    def least(self, names: Sequence[str], slacks: Sequence[int], start: Floats | None = None) -> Solution:
+    def least(self, names: Sequence[str], slacks: Sequence[int], start: Array | None = None) -> Solution:
         """Return where the sum of some slacks is least; the solution says whether it is one.
 
         Parameters
@@ -176,7 +174,7 @@ class Loosened:
         return min(outcomes, key=lambda outcome: (not outcome.solved, outcome.cost))
 
     def several(
-        self, questions: Sequence[tuple[Sequence[str], Sequence[int]]], start: Floats | None = None
+        self, questions: Sequence[tuple[Sequence[str], Sequence[int]]], start: Array | None = None
     ) -> list[Solution]:
         """Return the answers to several questions, side by side on the cores.
 
@@ -236,7 +234,7 @@ class Loosened:
         """
         return Give(self.bounds[index], float(outcome.point[self.count + index]) * self.bounds[index].scale)
 
-    def _box(self, names: Sequence[str]) -> tuple[Floats, Floats]:
+    def _box(self, names: Sequence[str]) -> tuple[Array, Array]:
         """Return the bounds of all unknowns with these candidates freed and the others held."""
         lower, upper = self.program.lower.copy(), self.program.upper.copy()
         for i, variable in enumerate(self.open.problem.variables):

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError, unknown_name
 from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
@@ -24,8 +24,6 @@ from .program import Rows
 from .shape import ContourVariables, Shape, given, parallel, through_centre
 from .starts import Start, StartSizes, start_values
 from .variables import DesignVariable, scalar
-
-Floats = NDArray[np.float64]
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""
@@ -82,7 +80,7 @@ class DesignProblem:
         """The symbols as a column."""
         return ca.vertcat(*[v.symbol for v in self.variables])
 
-    def named(self, point: Floats) -> dict[str, float]:
+    def named(self, point: Array) -> dict[str, float]:
         """Return the variables in SI by name.
 
         Parameters
@@ -93,7 +91,7 @@ class DesignProblem:
         values = self.evaluate(ca.vertcat(*[v.value for v in self.variables]), point)
         return {v.name: float(value) for v, value in zip(self.variables, values, strict=True)}
 
-    def chosen(self, point: Floats) -> dict[str, float]:
+    def chosen(self, point: Array) -> dict[str, float]:
         """Return the scaled values by name, without states and torque errors, which follow from them.
 
         Parameters
@@ -109,7 +107,7 @@ class DesignProblem:
         """Number of variables from which the others follow."""
         return len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
 
-    def evaluate(self, expression: Expression, point: Floats) -> Floats:
+    def evaluate(self, expression: Expression, point: Array) -> Array:
         """Return the value of an expression of the variables.
 
         Parameters
@@ -119,12 +117,12 @@ class DesignProblem:
         point
             Shape (variables,), scaled.
         """
-        result: Floats = np.array(
+        result: Array = np.array(
             ca.Function("value", [self.vector], [expression])(point), dtype=float
         ).ravel()
         return result
 
-    def at(self, start: Start) -> Floats:
+    def at(self, start: Start) -> Array:
         """Return the point where a search begins.
 
         Parameters
@@ -135,7 +133,7 @@ class DesignProblem:
         values = start_values(start, scalars=self.scalars, contour=self.contour, sizes=self.sizes)
         return self.completed(values)
 
-    def completed(self, values: dict[str, float]) -> Floats:
+    def completed(self, values: dict[str, float]) -> Array:
         """Return a point at which the equations of states and torque errors hold.
 
         Parameters

@@ -9,12 +9,10 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.processes import parallel_map
 from ...foundation.symbolic import Expression
-
-Floats = NDArray[np.float64]
 
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 PROVED_INFEASIBLE = "Infeasible_Problem_Detected"
@@ -66,7 +64,7 @@ class Solution:
 
     solved: bool
     status: str
-    point: Floats
+    point: Array
     cost: float
     iterations: int
     prices: tuple[float, ...]
@@ -93,8 +91,8 @@ class Program:
     """
 
     unknowns: Expression
-    lower: Floats
-    upper: Floats
+    lower: Array
+    upper: Array
     cost: Expression
     rows: tuple[Rows, ...]
     parameters: Expression | None = None
@@ -120,11 +118,11 @@ class Program:
 
     def solve(
         self,
-        start: Floats,
+        start: Array,
         *,
-        lower: Floats | None = None,
-        upper: Floats | None = None,
-        parameters: Floats | None = None,
+        lower: Array | None = None,
+        upper: Array | None = None,
+        parameters: Array | None = None,
     ) -> Solution:
         """Solve from a starting point.
 
@@ -153,7 +151,7 @@ class Program:
         _ = self._solver
 
     def solve_all(
-        self, starts: Sequence[Floats], progress: Callable[[], None] = lambda: None
+        self, starts: Sequence[Array], progress: Callable[[], None] = lambda: None
     ) -> list[Solution]:
         """Solve from several starting points side by side on the cores; the order is kept.
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...foundation.arrays import Array
 from .design_search import Search
 from .loosening import Freed, Give, Loosened
-
-Floats = NDArray[np.float64]
 
 _ENOUGH = 1.0 + 1e-3
 
@@ -68,7 +64,7 @@ def _percent(error: float | None, largest: float) -> str:
 
 
 def find_remedies(
-    search: Search, free: Sequence[str], best: Floats, *, allowed: float, error: float, binding: Sequence[int]
+    search: Search, free: Sequence[str], best: Array, *, allowed: float, error: float, binding: Sequence[int]
 ) -> Remedies:
     """Return what would bring a design within its target.
 

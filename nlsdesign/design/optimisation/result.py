@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
 from ...foundation.prefixes import prefixed, without_power
 from ...foundation.quantity import Quantity, parse_unit, with_unit
@@ -19,8 +19,6 @@ from ..statics.contour import Contour
 from ..tolerance.tolerance_result import ToleranceResult
 from .remedies import Remedies
 from .size_ranges import SizeRange
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -71,13 +69,13 @@ class TorqueCheck:
         Of the squared error, shape (n,); all alike for ``None``.
     """
 
-    angles: Floats
-    torques: Floats
-    targets: Floats
-    weights: Floats | None = None
+    angles: Array
+    torques: Array
+    targets: Array
+    weights: Array | None = None
 
     @property
-    def errors(self) -> Floats:
+    def errors(self) -> Array:
         """Torque minus target."""
         return self.torques - self.targets
 
@@ -108,16 +106,16 @@ class DesignCurves:
         Of each piece of rubber by path.
     """
 
-    angles: Floats
-    lever_arms: Floats
-    radii_of_curvature: Floats
-    radii: Floats
-    torques: Floats
-    stiffnesses: Floats
-    extensions: Floats
-    forces: Floats
-    strains: Mapping[str, Floats]
-    stresses: Mapping[str, Floats]
+    angles: Array
+    lever_arms: Array
+    radii_of_curvature: Array
+    radii: Array
+    torques: Array
+    stiffnesses: Array
+    extensions: Array
+    forces: Array
+    strains: Mapping[str, Array]
+    stresses: Mapping[str, Array]
 
     @property
     def energy(self) -> float:

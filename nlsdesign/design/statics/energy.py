@@ -16,15 +16,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError, ValueRangeError
 from ...model import flatten
 from ..curves.target import Target
 from .equilibrium import ElasticLaw, elastic_law
-
-Floats = NDArray[np.float64]
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _CELLS = 600
@@ -56,11 +54,11 @@ class CamProfile:
         e₀.
     """
 
-    angles: Floats
-    extensions: Floats
-    lever_arms: Floats
-    forces: Floats
-    torques: Floats
+    angles: Array
+    extensions: Array
+    lever_arms: Array
+    forces: Array
+    torques: Array
     elements: float
     pretension: float
 
@@ -155,15 +153,15 @@ def _first_lever_arm(law: ElasticLaw, target: Target, elements: float, pretensio
     return float(np.sqrt(slope / (elements * stiffness))) if np.isfinite(stiffness) else 0.0
 
 
-def _work(law: ElasticLaw, start: Floats, end: Floats) -> Floats:
+def _work(law: ElasticLaw, start: Array, end: Array) -> Array:
     """Return ∫F de between pairs of extensions by Gauss's rule with eight points."""
     half = (end - start)[..., None] / 2
     places = start[..., None] + half * (1.0 + _GAUSS)
-    result: Floats = (law.force(places) * _WEIGHTS * half).sum(axis=-1)
+    result: Array = (law.force(places) * _WEIGHTS * half).sum(axis=-1)
     return result
 
 
-def _stretched(law: ElasticLaw, energies: Floats, pretension: float) -> Floats:
+def _stretched(law: ElasticLaw, energies: Array, pretension: float) -> Array:
     """Return the extensions beyond the pretension at which one element has taken up the given energies."""
     grid, stored = _stored(law, float(energies[-1]), pretension)
     cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
@@ -180,7 +178,7 @@ def _stretched(law: ElasticLaw, energies: Floats, pretension: float) -> Floats:
     return extensions
 
 
-def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Floats, Floats]:
+def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Array, Array]:
     longest = 1e-3
     while longest < _LONGEST:
         grid = longest * np.linspace(0.0, 1.0, _CELLS + 1) ** 2

@@ -9,8 +9,9 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ConvergenceError
 from ...foundation.symbolic import Expression, depends
 from ...model import FlatModel, Variable
@@ -51,11 +52,11 @@ class ElasticLaw:
         return tuple(piece.name for piece in self.cam.specimens)
 
     @property
-    def numbers(self) -> NDArray[np.float64]:
+    def numbers(self) -> Array:
         """Values of the parameters, shape (parameters,)."""
         return np.array([v.start for v in self.parameters])
 
-    def force(self, extension: ArrayLike) -> NDArray[np.float64]:
+    def force(self, extension: ArrayLike) -> Array:
         """Return the force at the numbers of the model.
 
         Parameters
@@ -70,7 +71,7 @@ class ElasticLaw:
         """
         return self._evaluated(extension, 0)
 
-    def stiffness(self, extension: ArrayLike) -> NDArray[np.float64]:
+    def stiffness(self, extension: ArrayLike) -> Array:
         """Return d(force)/d(extension) at the numbers of the model.
 
         Parameters
@@ -104,10 +105,10 @@ class ElasticLaw:
         results = [force, ca.jacobian(force, extension), *old[2:]]
         return replace(self, function=ca.Function("law", [extension, parameters], results))
 
-    def _evaluated(self, extension: ArrayLike, which: int) -> NDArray[np.float64]:
+    def _evaluated(self, extension: ArrayLike, which: int) -> Array:
         given = np.asarray(extension, dtype=float)
         values = self._with_numbers(given.reshape(1, -1))[which]
-        result: NDArray[np.float64] = np.array(values, dtype=float).reshape(given.shape)
+        result: Array = np.array(values, dtype=float).reshape(given.shape)
         return result
 
     @cached_property
@@ -210,7 +211,7 @@ def cam_function(model: FlatModel, spring: str | None = None) -> ca.Function:
     return ca.Function("cam", [angle, parameters], results)
 
 
-def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) -> NDArray[np.float64]:
+def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) -> Array:
     """Return the torque of a spring over its angle with all relaxation at rest.
 
     Parameters
@@ -236,7 +237,7 @@ def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) 
     """
     given = np.asarray(angles, dtype=float)
     torque = torque_function(model, spring)(given.reshape(1, -1), model.start(model.parameters))
-    result: NDArray[np.float64] = np.array(torque, dtype=float).reshape(given.shape)
+    result: Array = np.array(torque, dtype=float).reshape(given.shape)
     return result
 
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
 
 _CORNERS = (ca.OP_FMAX, ca.OP_FMIN, ca.OP_FABS)
@@ -29,7 +29,7 @@ def has_corners(function: ca.Function) -> bool:
     return any(function.instruction_id(k) in _CORNERS for k in range(function.n_instructions()))
 
 
-def rounded(function: ca.Function, samples: list[NDArray[np.float64]], share: float) -> ca.Function:
+def rounded(function: ca.Function, samples: list[Array], share: float) -> ca.Function:
     """Return a function of SX with all corners rounded.
 
     Parameters

@@ -8,12 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from ...foundation.arrays import Array
 from ...foundation.quantity import parse_unit, with_unit
-
-Floats = NDArray[np.float64]
 
 
 def shown_unit(unit: str) -> str:
@@ -47,7 +45,7 @@ class SpreadReading(ABC):
         """
 
     @abstractmethod
-    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+    def drawn(self, generator: np.random.Generator, count: int) -> Array:
         """Return deviations in units of the standard deviation, shape (count,).
 
         Parameters
@@ -59,7 +57,7 @@ class SpreadReading(ABC):
         """
 
     @abstractmethod
-    def at(self, shares: Floats) -> Floats:
+    def at(self, shares: Array) -> Array:
         """Return the deviations below which given shares of all lie, in units of the standard deviation.
 
         Parameters
@@ -82,13 +80,13 @@ class NormalSpread(SpreadReading):
         """Return the spread itself."""
         return spread
 
-    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+    def drawn(self, generator: np.random.Generator, count: int) -> Array:
         """Return standard normal numbers."""
         return generator.standard_normal(count)
 
-    def at(self, shares: Floats) -> Floats:
+    def at(self, shares: Array) -> Array:
         """Return quantiles of the standard normal distribution."""
-        result: Floats = ndtri(shares)
+        result: Array = ndtri(shares)
         return result
 
 
@@ -108,11 +106,11 @@ class UniformSpread(SpreadReading):
         """Return spread/√3."""
         return spread / math.sqrt(3.0)
 
-    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+    def drawn(self, generator: np.random.Generator, count: int) -> Array:
         """Return numbers between −√3 and √3."""
         return generator.uniform(-math.sqrt(3.0), math.sqrt(3.0), count)
 
-    def at(self, shares: Floats) -> Floats:
+    def at(self, shares: Array) -> Array:
         """Return quantiles between −√3 and √3."""
         return math.sqrt(3.0) * (2.0 * shares - 1.0)
 
@@ -206,7 +204,7 @@ class ProfileCause(Cause):
     numbers: tuple[tuple[str, float], ...]
 
 
-def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: SpreadReading) -> Floats:
+def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: SpreadReading) -> Array:
     """Return independent deviations in units of their standard deviations.
 
     Each cause draws from a generator of its own, seeded by the seed and its name, so that another cause more

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import bdtr
 
+from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
 from ...foundation.prefixes import prefixed, shared_prefix, without_power
 from ...foundation.quantity import parse_unit, with_unit
 from ..curves.target import Target
 from .causes import Cause
-
-Floats = NDArray[np.float64]
 
 SHARES = (0.5, 0.9, 0.95)
 """Shares of the made springs for which the largest error is stated."""
@@ -49,7 +47,7 @@ class QuantileEstimate:
         return f"{100 * self.share:g} % below {value} {unit} rms ({low} to {high} with 95 % confidence)"
 
 
-def quantile(errors: Floats, share: float) -> QuantileEstimate:
+def quantile(errors: Array, share: float) -> QuantileEstimate:
     """Return a quantile of independent draws with its confidence interval.
 
     The number of draws below the true quantile is binomial, whatever the distribution, so two of the ordered
@@ -121,9 +119,9 @@ class TrimEffect:
     name: str
     unit: str
     quantiles: tuple[QuantileEstimate, ...]
-    errors: Floats
-    settings: Floats
-    band: Floats
+    errors: Array
+    settings: Array
+    band: Array
 
     @property
     def needed(self) -> tuple[float, float]:
@@ -168,12 +166,12 @@ class ToleranceResult:
     """
 
     target: Target
-    angles: Floats
-    nominal: Floats
+    angles: Array
+    nominal: Array
     nominal_rms: float
-    errors: Floats
+    errors: Array
     quantiles: tuple[QuantileEstimate, ...]
-    band: Floats
+    band: Array
     causes: tuple[CauseEffect, ...]
     trims: tuple[TrimEffect, ...]
     without_effect: tuple[str, ...]

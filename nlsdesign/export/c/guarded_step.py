@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...model.flat import FlatModel
 from .c_text import DOUBLE, Real
 from .reading_guard import ReadingGuard, mover, reading_numbers
@@ -55,7 +55,7 @@ class GuardedModel:
 
     def __post_init__(self) -> None:
         model = self.model
-        self.state: NDArray[np.float64] = model.start(model.states)
+        self.state: Array = model.start(model.states)
         self.begun = False
         self._inputs = [min(max(v.start, v.minimum), v.maximum) for v in model.inputs]
         self._outputs = first_outputs(model, self.real)
@@ -111,7 +111,7 @@ class GuardedModel:
             resume = resume or again
         return status, resume
 
-    def _settled(self, state: NDArray[np.float64], which: int) -> NDArray[np.float64]:
+    def _settled(self, state: Array, which: int) -> Array:
         if self.model.begin is None:
             return state
         w = self.model.look_up(state.tolist(), self._inputs)

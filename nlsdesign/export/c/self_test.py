@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...model.flat import FlatModel, Variable
 from ..files import filled
 from .c_text import Real
@@ -22,7 +22,7 @@ FLOAT_TOLERANCE = 2e-4
 hundred operations, accumulated by stable poles over some ten samples, and still reveals a wrong term."""
 
 
-def sample_inputs(model: FlatModel, real: Real) -> NDArray[np.float64]:
+def sample_inputs(model: FlatModel, real: Real) -> Array:
     """Return an input sequence that sweeps each range, with NaN, infinities, excesses, a jump and a gap.
 
     A measured input moves over its usual range, and no faster than is believed.
@@ -55,7 +55,7 @@ def sample_inputs(model: FlatModel, real: Real) -> NDArray[np.float64]:
     return np.vectorize(real.round, otypes=[float])(columns) if columns.size else columns
 
 
-def _wave(variable: Variable, half: float, sample_time: float, number: int) -> NDArray[np.float64]:
+def _wave(variable: Variable, half: float, sample_time: float, number: int) -> Array:
     """Return a motion within ±0.9; a measured one is slow enough to be believed."""
     slow, fast = 0.071 * (number + 1), 0.39
     k = np.arange(SAMPLES, dtype=float)

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Table
 from .c_text import Real, wrapped
@@ -286,7 +286,7 @@ def _starts(each: IndexedTable, real: Real) -> tuple[list[int], int]:
     return min(trials, key=lambda pair: ((pair[1] - 1).bit_length(), len(pair[0])))
 
 
-def _parted(kept: NDArray[np.float64], each: IndexedTable, real: Real, parts: int) -> tuple[list[int], int]:
+def _parted(kept: Array, each: IndexedTable, real: Real, parts: int) -> tuple[list[int], int]:
     cells = len(kept) - 1
     edges = np.arange(-1, parts + 2) / _scale(each, real, parts) + kept[0]
     # Rounding may place an argument into the neighbouring part: one thousandth of a part is allowed for.

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...simulation.column_graph import Call, ColumnGraph, Operation, TableReading
 from ..files import filled, shell
 
@@ -73,7 +73,7 @@ class ColumnsInC(NamedTuple):
     """
 
     text: str
-    numbers: NDArray[np.float64]
+    numbers: Array
 
 
 class _Given:
@@ -100,7 +100,7 @@ class _Given:
         return first
 
     @property
-    def numbers(self) -> NDArray[np.float64]:
+    def numbers(self) -> Array:
         """All of them; at least one, so that there is something to point at."""
         return np.array(self._numbers or [0.0])
 

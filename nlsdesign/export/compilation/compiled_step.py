@@ -14,8 +14,8 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...foundation.writing import write_bytes
 from ...simulation.buffered import Translate, as_it_is
@@ -23,8 +23,6 @@ from ...simulation.column_graph import ColumnGraph
 from ...simulation.column_runs import ColumnRun
 from .columns_in_c import WIDTH, ColumnsInC, sampled_run_in_c
 from .cross_compiler import BASELINE, THIS_PROCESSOR, cache_folder, compile_library
-
-Array = NDArray[np.float64]
 
 _STEP_FLAGS = ("-std=c99", "-DGCC_HASCLASSVISIBILITY")
 """Without the definition the generated code does not export its functions."""

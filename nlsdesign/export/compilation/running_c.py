@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ..c.controller_code import CSource
 from ..c.structures import member_paths
 from ..files import filled
@@ -56,7 +56,7 @@ class CompiledStep:
         given = None if parameters is None else self._array(parameters)
         self.first_status = int(self._library.adapter_init(self._state, given))
 
-    def __call__(self, inputs: Sequence[float]) -> tuple[NDArray[np.float64], int]:
+    def __call__(self, inputs: Sequence[float]) -> tuple[Array, int]:
         """Advance by one sample.
 
         Parameters
@@ -89,7 +89,7 @@ class CompiledStep:
         return int(self._library.adapter_set_parameters(self._state, self._array(parameters)))
 
     @property
-    def states(self) -> NDArray[np.float64]:
+    def states(self) -> Array:
         """The states in the order of the model."""
         values = self._array([0.0] * len(self._source.model.states))
         self._library.adapter_states(self._state, values)
@@ -99,7 +99,7 @@ class CompiledStep:
         return (self._type * max(1, len(values)))(*[float(v) for v in values])
 
     @staticmethod
-    def _plain(values: Any, count: int) -> NDArray[np.float64]:
+    def _plain(values: Any, count: int) -> Array:
         return np.array(values[:count], dtype=float)
 
 

@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 
-Array = NDArray[np.float64]
 MOST_POINTS = 20_000_000
 """Communication points of one run; a run with a hundred signals then fills 16 GB."""
 _SAME = 1e-9

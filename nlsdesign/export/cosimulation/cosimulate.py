@@ -23,8 +23,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
 from ...simulation.signals import Sine
 from ...simulation.trace import Trace
@@ -37,7 +38,6 @@ from .master import Master
 from .run_plan import Given, Link, Plan, points_of
 from .wires import Wire, as_wire, check_wires, delay_of, ends, gain_to, split_name
 
-Array = NDArray[np.float64]
 _STEPS_OF_A_PERIOD = 4
 Signal: TypeAlias = Callable[[float], float] | tuple[ArrayLike, ArrayLike]
 """A function of time in s, or times and values between which it is linear and beyond which it is held."""

@@ -14,13 +14,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...foundation.progress import Progress, Quiet
 from .feeds import Curve
-
-Array = NDArray[np.float64]
 
 
 class Steppable(Protocol):

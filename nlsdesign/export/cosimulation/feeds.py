@@ -11,10 +11,8 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from ...foundation.arrays import Array
 
-Array = NDArray[np.float64]
 _ROUNDING = 1e-6
 """Part of a sample time by which a time may fall short of a sample."""
 

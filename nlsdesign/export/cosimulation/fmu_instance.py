@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ExportError
 from .fmu_description import FmuDescription, FmuScalar
 from .isolation import Activity, Watch
 from .loaded_fmu import LoadedFmu, why
 
-Array = NDArray[np.float64]
 _STEPPING = int(Activity.STEPPING)
 _WARNING = 1
 """The highest status with which both versions of FMI go on."""

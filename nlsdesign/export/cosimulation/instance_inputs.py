@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from .communication_points import rows_of, sample_times
 from .feeds import Curve, CurveFeed, Feed, GivenFeed, HeldFeed, LateFeed
 from .fmu_instance import FmuInstance
 from .run_plan import Link, Plan
 from .wires import split_name
-
-Array = NDArray[np.float64]
 
 
 class InstanceInputs:

@@ -25,15 +25,14 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...foundation import errors
+from ...foundation.arrays import Array
 from ...foundation.errors import ExportError, NlsError
 from ...foundation.processes import signals_held
 from ...foundation.progress import Progress
 from .foreign_text import fit_to_show
 
-Array = NDArray[np.float64]
 _LOOK = 0.05
 """Seconds between two looks at the process."""
 _GRACE = 1.0

@@ -11,16 +11,12 @@ from typing import Any
 import fmpy
 import fmpy.fmi2
 import fmpy.fmi3
-import numpy as np
 from fmpy.fmi1 import FMICallException
-from numpy.typing import NDArray
 
 from ...foundation.errors import ConvergenceError, ExportError
 from .fmu_description import FmuDescription
 from .foreign_text import fit_to_show
 from .isolation import Activity, Watch
-
-Array = NDArray[np.float64]
 
 
 class LoadedFmu:

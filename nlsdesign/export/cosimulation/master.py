@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError
 from .feeds import Curve
 from .fmu_instance import FmuInstance
@@ -23,7 +23,6 @@ from .isolation import Watch
 from .run_plan import Plan
 from .wires import split_name
 
-Array = NDArray[np.float64]
 Values = Callable[[InstanceInputs], list[float]]
 _ROUNDS = 50
 """Most rounds in which direct feedthrough between continuous instances settles."""

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...foundation.arrays import Array
 from .communication_points import communication_points
 from .coupling import Coupling
 from .fmu_description import FmuDescription
 from .wires import split_name
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

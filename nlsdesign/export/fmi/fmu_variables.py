@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Variable
 from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
@@ -284,11 +284,11 @@ def _named_once(model: FlatModel) -> tuple[list[Variable], list[Variable]]:
     return kept["output"], kept["signal"]
 
 
-def _probes(model: FlatModel, points: int = 5) -> dict[str, NDArray[np.float64]]:
+def _probes(model: FlatModel, points: int = 5) -> dict[str, Array]:
     """Return states, inputs, outputs and signals at several points, to find equal ones."""
     generator = np.random.default_rng(1)
     parameters = model.start(model.parameters)
-    samples: dict[str, list[NDArray[np.float64]]] = {"state": [], "input": [], "output": [], "signal": []}
+    samples: dict[str, list[Array]] = {"state": [], "input": [], "output": [], "signal": []}
     for _ in range(points):
         x, u = (_around(group, generator) for group in (model.states, model.inputs))
         _, y, s, _ = model.equations(0.0, x, u, parameters, model.look_up(x.tolist(), u.tolist()))
@@ -297,7 +297,7 @@ def _probes(model: FlatModel, points: int = 5) -> dict[str, NDArray[np.float64]]
     return {kind: np.array(values).T for kind, values in samples.items()}
 
 
-def _around(group: Sequence[Variable], generator: np.random.Generator) -> NDArray[np.float64]:
+def _around(group: Sequence[Variable], generator: np.random.Generator) -> Array:
     values = [v.start + 0.3 * v.nominal * generator.uniform(-1, 1) for v in group]
     limits = [(v.minimum, v.maximum) for v in group]
     return np.array(

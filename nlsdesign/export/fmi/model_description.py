@@ -78,7 +78,7 @@ def model_description(
         _element(structure, "EventIndicator", valueReference=each.reference)
     if not two and model.origin:
         notes = ElementTree.SubElement(root, "Annotations")
-        note = _element(notes, "Annotation", type="nlsdesign.foundation.deck")
+        note = _element(notes, "Annotation", type="nlsdesign.deck")
         _element(note, "deck", name=model.origin.deck, sha256=model.origin.digest)
     return _written(root)
 

@@ -24,8 +24,8 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...model.flat import FlatModel, Variable
 from ...model.structure import SpringNames
 
@@ -136,7 +136,7 @@ def _inside(spring: SpringNames) -> list[str]:
     return names
 
 
-_Point = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Point = tuple[Array, Array]
 
 
 def _points(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ..c.c_text import real_type
 from ..c.controller_code import CSource
@@ -44,7 +45,7 @@ class TargetRun:
 
     instructions: NDArray[np.int64]
     stack: NDArray[np.int64]
-    outputs: NDArray[np.float64]
+    outputs: Array
     status: NDArray[np.int64]
     same: bool
 
@@ -91,7 +92,7 @@ class TargetMeasurement:
 
 
 def measure_on_target(
-    source: CSource, processor: Processor = CORTEX_M4F, *, inputs: NDArray[np.float64] | None = None
+    source: CSource, processor: Processor = CORTEX_M4F, *, inputs: Array | None = None
 ) -> TargetMeasurement:
     """Measure what a controller costs on a processor, and whether it computes there what it computes here.
 
@@ -131,7 +132,7 @@ def _state_size(source: CSource, processor: Processor, folder: Path) -> int:
     return section_sizes(sized_object(source, processor, folder)).cleared
 
 
-def _run(source: CSource, processor: Processor, folder: Path, given: NDArray[np.float64]) -> TargetRun:
+def _run(source: CSource, processor: Processor, folder: Path, given: Array) -> TargetRun:
     real = real_type(source.real)
     u, y = member_paths(source.model.inputs).values(), member_paths(source.model.outputs).values()
     controller_object(source, processor, folder)

@@ -1,12 +1,17 @@
 """What can be said of a model before anything is built on it: observability, stability, best estimate."""
 
-from .empirical import EmpiricalGramian, empirical_gramian
-from .kalman import EstimateDeviation
-from .modes import PlantMode
-from .noise_assumptions import NoiseAssumptions
-from .observability import Observability, Unseen
-from .rank_drops import RankDrop, RankDrops, rank_drops
-from .rest_points import RestPoint, RestPoints, rest_points
+from .kalman import EstimateDeviation, NoiseAssumptions
+from .observability import (
+    EmpiricalGramian,
+    Observability,
+    RankDrop,
+    RankDrops,
+    Unseen,
+    empirical_gramian,
+    rank_drops,
+)
+from .rest import RangeAtRest, ranges_at_rest
+from .rest_points import PlantMode, RestPoint, RestPoints, rest_points
 from .sensor_ranking import (
     RankingAssumptions,
     SensorCandidate,
@@ -15,7 +20,6 @@ from .sensor_ranking import (
     rank_sensors,
 )
 from .stability import Stability, least_damped, sampled_poles
-from .stated_ranges import RangeAtRest, ranges_at_rest
 from .sweep import Chart, Columns, PointView, View, over_angle
 
 __all__ = [

@@ -15,20 +15,17 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import typeset_unit
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
 from ...model.transform import with_outputs
-from .kalman import best_covariances, deviation_of
-from .modes import limit_at_zero_speed
-from .noise_assumptions import NoiseAssumptions, declared_deviation
+from .kalman import NoiseAssumptions, best_covariances, declared_deviation, deviation_of
 from .rest import evaluate_rows
-from .rest_points import RestPoints, rest_points
+from .rest_points import RestPoints, limit_at_zero_speed, rest_points
 
-Array = NDArray[np.float64]
 Sizes = Callable[[str], float]
 
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...model import FlatModel, Variable
 from ...model.roles import spring_torque
-from .modes import PlantMode
-from .rest_points import RestPoints
+from .rest_points import PlantMode, RestPoints
 from .sweep import Columns, View
 
-Array = NDArray[np.float64]
 _STILL = 1e-9
 """Share of the size of an eigenvalue below which its real or imaginary part counts as zero."""
 
@@ -93,7 +92,7 @@ def sampled_poles(matrices: Array, sample_time: float) -> tuple[Array, tuple[Arr
     """Return spectral radius of sampled systems, and what :func:`least_damped` says of the same in time.
 
     For the error of an observer give the matrices that
-    :func:`~nlsdesign.feedback.observer.scheduling.check.error_matrices` takes from it. An eigenvalue z
+    :func:`~nlsdesign.feedback.observer.scheduling.scheduled.error_matrices` takes from it. An eigenvalue z
     counts as
     ln(z)/T; one at zero is gone after one sample, which counts as the decay to the rounding of a number.
 

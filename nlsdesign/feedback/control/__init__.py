@@ -1,37 +1,45 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
-from .evaluation.fine_counts import with_fine_counts
-from .evaluation.impedance import CoupledStability, OutputImpedance, coupled_stability, output_impedance
+from .closed_loop import ClosedLoop, encoder_loop, joined
 from .evaluation.linear_loop import LinearLoop, linear_loop
-from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant
-from .evaluation.loop_spread import LoopSpread, loop_over_spread
+from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
-from .evaluation.margins import LoopMargins, loop_margins
-from .evaluation.onset import LimitCycleOnset, linear_onset, onset_of_limit_cycling
+from .evaluation.margins import (
+    CoupledStability,
+    LoopMargins,
+    OutputImpedance,
+    coupled_stability,
+    loop_margins,
+    output_impedance,
+)
+from .evaluation.onset import (
+    LimitCycleOnset,
+    LoopSpread,
+    SaturationLine,
+    linear_onset,
+    loop_over_spread,
+    onset_of_limit_cycling,
+    saturation_line,
+)
 from .evaluation.responses import (
     HeldTorque,
     SineResponse,
+    StepResponse,
     Tracking,
     ZeroTorque,
     held_torque,
     sine_response,
+    step_response,
+    torque_resolution,
     tracking,
     zero_torque,
 )
-from .evaluation.saturation import SaturationLine, saturation_line
-from .evaluation.steps import StepResponse, step_response, torque_resolution
-from .laws.disturbance import DisturbanceObserver
-from .laws.largest_torque import TorqueLimit, check_torque, largest_torque, only_side, torque_limit
-from .laws.outer_laws import PidTorque, TorqueLaw
-from .laws.scheduled_torque import DesiredRate, FilteredDifference, GivenRate, ScheduledTorque
+from .laws.known_drive import TorqueLimit, check_torque, largest_torque, only_side, torque_limit
+from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
+from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
-from .laws.velocity_loop import FrictionCompensation, VelocityLoop
-from .laws.windup import AntiWindup, BackCalculation, ConditionalIntegration
-from .loop.closed_loop import ClosedLoop
-from .loop.encoder_wiring import encoder_loop
-from .loop.joined import joined
-from .tuning.largest_gain import LoopLimits, TunedLoop, largest_gain
-from .tuning.spring_trade_off import LoopChoice, bandwidth_against_impedance, best_choices
+from .laws.velocity_loop import DisturbanceObserver, FrictionCompensation, VelocityLoop
+from .tuning import LoopChoice, LoopLimits, TunedLoop, bandwidth_against_impedance, best_choices, largest_gain
 
 __all__ = [
     "AntiWindup",

@@ -1,9 +1,7 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
 from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
-from .adaptive.adaptive_settings import AdaptiveSettings, Trust
-from .adaptive.directions import UncertainDirections
-from .adaptive.duty import Duty
+from .adaptive.duty_and_directions import AdaptiveSettings, Duty, Trust, UncertainDirections
 from .adaptive.estimator_bound import EstimatorBound, SensedTorque, estimator_bound
 from .certificates import (
     Assumptions,
@@ -25,22 +23,18 @@ from .certificates import (
     verify,
     write_certificate,
 )
-from .scheduling.check import ErrorStability, check_stability
-from .scheduling.forms import Minimal, PaperForm, StateForm
-from .scheduling.gains import (
-    CascadeGain,
-    ConstantGain,
-    FittedGain,
-    GainRule,
-    PolePlacement,
-    SteadyStateKalman,
+from .scheduling.angle_form import Minimal, PaperForm, StateForm
+from .scheduling.measured_angle import observe
+from .scheduling.scheduled import (
+    ErrorStability,
+    ObserverDesign,
+    check_stability,
+    design_observer_with_details,
 )
-from .scheduling.run import observe
-from .scheduling.scheduled import ObserverDesign, design_observer_with_details
+from .scheduling.step import CascadeGain, ConstantGain, FittedGain, GainRule, PolePlacement, SteadyStateKalman
 from .scheduling.table import FixedGrid, Grid, GridByTolerance, TableTorqueError
 from .scheduling.torque_grid import GridByTorqueError
-from .spread.choice import ObserverOfChoice, choose_observer, design_observer
-from .spread.least_error import least_torque_error
+from .spread.choice import ObserverOfChoice, choose_observer, design_observer, least_torque_error
 from .spread.observer_bench import ObserverBench, observer_bench
 from .spread.spread_errors import SpreadErrors, observer_errors
 

@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from .style import HOLDS, INK, described, legend, panels, styled
-from .sweep_points import Floats, PointKinds, ShownColumn, scatter_points
+from .sweep_points import PointKinds, ShownColumn, scatter_points
 
 MOST_PANELS = 4
 
@@ -63,6 +64,6 @@ def answers_against(
     return described(figure, words)
 
 
-def _joined(panel: Axes, across: Floats, up: Floats) -> None:
+def _joined(panel: Axes, across: Array, up: Array) -> None:
     order = np.argsort(across, kind="stable")
     panel.plot(across[order], up[order], color=HOLDS.light, linewidth=1.0, alpha=0.6, zorder=1)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_unit
 from .lines import thinned
@@ -30,8 +30,7 @@ from .style import (
     styled,
 )
 
-Floats = NDArray[np.float64]
-Curve = tuple[Floats, Floats]
+Curve = tuple[Array, Array]
 
 UNCHANGED = "refitted model"
 """What stands in place of ``before`` where nothing was added, so that there is no ``after``."""
@@ -157,10 +156,10 @@ class HeldOut:
         Above the upper panel.
     """
 
-    time: Floats
-    measured: Floats
-    before: Floats
-    after: Floats
+    time: Array
+    measured: Array
+    before: Array
+    after: Array
     quantity: str
     unit: str
     noise: float = 0.0

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from .lines import Floats
 from .style import described, legend, log_axis, look, panels, styled
 
-Curve = tuple[Floats, Floats]
+Curve = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)

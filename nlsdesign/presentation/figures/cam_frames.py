@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from .cam_motion import CamMotion
 from .number_text import significant
 from .style import BLUE, VERMILLION, described, panels, styled
-
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 _POINTS = 24
@@ -110,15 +108,15 @@ def torque_curve(motion: CamMotion, *, at: int) -> Figure:
     )
 
 
-def _places(curve: Figure, motion: CamMotion) -> Floats:
+def _places(curve: Figure, motion: CamMotion) -> Array:
     """Return where the marker stands at each angle, in points of the SVG, y downwards."""
     curve.draw_without_rendering()
     pixels = curve.axes[0].transData.transform(np.column_stack([np.degrees(motion.angles), motion.torques]))
-    places: Floats = pixels * [1.0, -1.0] * 72.0 / curve.dpi
+    places: Array = pixels * [1.0, -1.0] * 72.0 / curve.dpi
     return places
 
 
-def _frame(motion: CamMotion, index: int, shift: Floats) -> dict[str, Any]:
+def _frame(motion: CamMotion, index: int, shift: Array) -> dict[str, Any]:
     cable = motion.cable(index)
     wrapped, contact, guide = cable[:-2], cable[-2], cable[-1]
     along = (guide - contact) / float(np.hypot(*(guide - contact)))
@@ -143,18 +141,18 @@ def _frame(motion: CamMotion, index: int, shift: Floats) -> dict[str, Any]:
     }
 
 
-def _reduced(points: Floats) -> Floats:
+def _reduced(points: Array) -> Array:
     """Return at most 96 of the points, including the first and the last."""
     if len(points) <= 2 * _POINTS + 1:
         return points
     kept = np.unique(np.round(np.linspace(0, len(points) - 1, 4 * _POINTS)).astype(int))
-    result: Floats = points[kept]
+    result: Array = points[kept]
     return result
 
 
-def _path(points: Floats) -> str:
+def _path(points: Array) -> str:
     return "M" + "L".join(f"{x:.2f} {y:.2f}" for x, y in points)
 
 
-def _rounded(values: Floats) -> list[float]:
+def _rounded(values: Array) -> list[float]:
     return [round(float(value), 2) + 0.0 for value in values]

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
-from numpy.typing import NDArray
 
 from ...design import Contour, elastic_law
 from ...design.statics.contour import turn
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...model import FlatModel
 from .style import (
@@ -29,8 +29,6 @@ from .style import (
     panels,
     styled,
 )
-
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 _CLEARANCE = 3e-3
@@ -67,10 +65,10 @@ class CamMotion:
     """
 
     contour: Contour
-    angles: Floats
-    extensions: Floats
-    forces: Floats
-    torques: Floats
+    angles: Array
+    extensions: Array
+    forces: Array
+    torques: Array
     rest_length: float
     pretension: float = 0.0
 
@@ -87,10 +85,10 @@ class CamMotion:
             )
 
     @property
-    def lever_arms(self) -> Floats:
+    def lever_arms(self) -> Array:
         """Lever arm in m at each angle; odd like the torque."""
         arms = np.interp(np.abs(self.angles), self.contour.angles, self.contour.lever_arms)
-        result: Floats = np.sign(self.angles) * arms
+        result: Array = np.sign(self.angles) * arms
         return result
 
     @property
@@ -121,7 +119,7 @@ class CamMotion:
         )
 
     @property
-    def halves(self) -> tuple[Floats, Floats]:
+    def halves(self) -> tuple[Array, Array]:
         """Lower and upper half of the cam at angle zero, closed polygons, also where a lip is not convex."""
         right = self.contour.points
         lower = np.vstack([right[::-1] * [-1.0, 1.0], right, right[-1:] * [-1.0, 1.0]])
@@ -154,7 +152,7 @@ class CamMotion:
         """
         return int(np.argmin(np.abs(self.angles - angle)))
 
-    def cable(self, index: int) -> Floats:
+    def cable(self, index: int) -> Array:
         """Return the right-hand cable from the centre of the cam to the guide, in the resting frame.
 
         Through the channel to the lip, along the lip to the contact point, straight to the guide. The
@@ -181,7 +179,7 @@ class CamMotion:
 
 def cam_motion(
     contour: Contour,
-    force: Callable[[Floats], Floats],
+    force: Callable[[Array], Array],
     *,
     elements: float = 2.0,
     rest_length: float,
@@ -320,7 +318,7 @@ def _draw(axes: Axes, motion: CamMotion, index: int) -> None:
     axes.margins(0.02, 0.06)
 
 
-def _lever_arm(axes: Axes, contact: Floats, guide: Floats) -> None:
+def _lever_arm(axes: Axes, contact: Array, guide: Array) -> None:
     along = (guide - contact) / float(np.hypot(*(guide - contact)))
     foot = contact - along * float(contact @ along)
     axes.plot([0.0, foot[0]], [0.0, foot[1]], color=GREEN.light, linewidth=1.4, linestyle=(0, (2, 1)))

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from .lines import Floats, thinned
+from .lines import thinned
 from .style import described, legend, log_axis, look, panels, styled
 
-Curve = tuple[Floats, Floats]
+Curve = tuple[Array, Array]
 
 
 @styled

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ...design import CamDesign, Contour, LimitState
 from ...design.statics.contour import turn
+from ...foundation.arrays import Array
 from ...foundation.quantity import parse_unit, with_unit
 from .style import (
     AFTER,
@@ -26,8 +26,6 @@ from .style import (
     panels,
     styled,
 )
-
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 
@@ -150,13 +148,13 @@ def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
     axes.grid(visible=False)
 
 
-def _end_of_cable(contour: Contour, reach: float) -> Floats:
+def _end_of_cable(contour: Contour, reach: float) -> Array:
     """Return where the drawn cable ends: at its anchor, or a little outside the cam where it is parallel."""
     near = np.isfinite(contour.anchor_distance) and contour.anchor_distance < 5.0 * reach
     return np.array([contour.anchor_distance if near else 1.9 * reach, 0.0])
 
 
-def _halves(contour: Contour, parallel: bool) -> list[Floats]:
+def _halves(contour: Contour, parallel: bool) -> list[Array]:
     if not parallel:
         return list(contour.outlines())
     # Of a cam with a parallel cable only the lip is designed; the body behind it is closed over the centre.
@@ -164,12 +162,12 @@ def _halves(contour: Contour, parallel: bool) -> list[Floats]:
     return [np.vstack([points, [[0.0, 0.0]], points[:1]])]
 
 
-def _contact(contour: Contour, angle: float) -> Floats:
+def _contact(contour: Contour, angle: float) -> Array:
     point = np.array([[np.interp(angle, contour.angles, column) for column in contour.points.T]])
     return np.asarray(turn(point, angle)[0], dtype=float)
 
 
-def _rubber(axes: Axes, design: CamDesign, place: Floats, side: float, angle: float) -> None:
+def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: float) -> None:
     """Draw one element behind the end of the cable: as long as it is, as high as a square of its section."""
     pieces = _pieces(design)
     if not pieces:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from ...foundation.arrays import Array, Indices
 
 COLUMNS, ROWS = 700, 400
 """Finest grid that a full-width panel can show on paper and on screen."""
 
 
-def thinned(x: ArrayLike, y: ArrayLike, *, columns: int = COLUMNS) -> tuple[Floats, Floats]:
+def thinned(x: ArrayLike, y: ArrayLike, *, columns: int = COLUMNS) -> tuple[Array, Array]:
     """Return a line with fewer points that looks the same.
 
     Over an ascending x each of ``columns`` intervals keeps its first, last, lowest and highest point, so no
@@ -41,7 +41,7 @@ def thinned(x: ArrayLike, y: ArrayLike, *, columns: int = COLUMNS) -> tuple[Floa
     return abscissa[keep], ordinate[keep]
 
 
-def _envelope(x: Floats, y: Floats, columns: int) -> NDArray[np.intp]:
+def _envelope(x: Array, y: Array, columns: int) -> Indices:
     edges = np.searchsorted(x, np.linspace(x[0], x[-1], columns + 1)[1:-1])
     parts = [part for part in np.split(np.arange(len(x)), edges) if len(part)]
     kept: set[int] = set()
@@ -54,13 +54,13 @@ def _envelope(x: Floats, y: Floats, columns: int) -> NDArray[np.intp]:
     return np.array(sorted(kept), dtype=np.intp)
 
 
-def _cells(x: Floats, y: Floats) -> NDArray[np.intp]:
+def _cells(x: Array, y: Array) -> Indices:
     columns = [_cell(x, COLUMNS), _cell(y, ROWS)]
     moved = np.any(np.diff(np.array(columns), axis=1) != 0, axis=0)
     return np.flatnonzero(np.concatenate([[True], moved]))
 
 
-def _cell(values: Floats, count: int) -> NDArray[np.int64]:
+def _cell(values: Array, count: int) -> NDArray[np.int64]:
     low, span = np.nanmin(values), np.ptp(values[np.isfinite(values)]) or 1.0
     share = np.nan_to_num((values - low) / span, nan=-1.0)
     return np.asarray(np.round(share * count), dtype=np.int64)

@@ -8,10 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...feedback.control.evaluation.impedance import CoupledStability, OutputImpedance
-from ...feedback.control.evaluation.margins import LoopMargins
+from ...feedback.control.evaluation.margins import CoupledStability, LoopMargins, OutputImpedance
+from ...feedback.control.evaluation.onset import SaturationLine
 from ...feedback.control.evaluation.responses import SineResponse
-from ...feedback.control.evaluation.saturation import SaturationLine
 from .number_text import significant
 from .style import DASHES, HOLDS, INK, LIMIT, MUTED, described, legend, log_axis, look, panels, styled
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_unit
 from ...simulation import Trace
@@ -17,11 +17,9 @@ from .lines import thinned
 from .number_text import root_mean_square, significant
 from .style import AFTER, DASHES, INK, LIMIT, MUTED, PURPLE, described, legend, log_axis, look, panels, styled
 
-Floats = NDArray[np.float64]
-
 
 @styled
-def observer_error(time: Floats, true: Floats, estimates: Mapping[str, Floats]) -> Figure:
+def observer_error(time: Array, true: Array, estimates: Mapping[str, Array]) -> Figure:
     """Draw true and estimated torque, and the errors below.
 
     Parameters
@@ -62,7 +60,7 @@ def observer_error(time: Floats, true: Floats, estimates: Mapping[str, Floats]) 
 
 
 @styled
-def over_time(time: Floats, curves: Mapping[str, Floats], *, quantity: str, unit: str) -> Figure:
+def over_time(time: Array, curves: Mapping[str, Array], *, quantity: str, unit: str) -> Figure:
     """Draw signals of one kind over time.
 
     Parameters
@@ -107,11 +105,11 @@ class ClosedLoopRun:
         In A; infinite for none.
     """
 
-    time: Floats
-    desired: Floats
-    true: Floats
-    estimated: Floats
-    current: Floats
+    time: Array
+    desired: Array
+    true: Array
+    estimated: Array
+    current: Array
     current_limit: float = float("inf")
 
 
@@ -149,7 +147,7 @@ def closed_loop_of(
 def closed_loop(
     run: ClosedLoopRun,
     *,
-    differences: Mapping[str, Floats] | None = None,
+    differences: Mapping[str, Array] | None = None,
     bound: float | None = None,
     unit: str = "N*m",
 ) -> Figure:
@@ -199,7 +197,7 @@ def closed_loop(
 
 
 def _differences(
-    axes: Axes, time: Floats, differences: Mapping[str, Floats], scale: tuple[float | None, str]
+    axes: Axes, time: Array, differences: Mapping[str, Array], scale: tuple[float | None, str]
 ) -> None:
     bound, unit = scale
     for number, (label, values) in enumerate(differences.items()):
@@ -226,7 +224,7 @@ def _finish(axes: Axes, ordinate: str, title: str) -> None:
     legend(axes)
 
 
-def _same_length(time: Floats, signals: Mapping[str, Floats]) -> None:
+def _same_length(time: Array, signals: Mapping[str, Array]) -> None:
     for name, values in signals.items():
         if values.shape != time.shape:
             raise ValueRangeError(f"signal '{name}'", f"has {values.shape} samples, time has {time.shape}")

@@ -10,11 +10,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_unit
 from .number_text import compact
 from .style import INK, MUTED, SURFACE, described, legend, panels, styled
-from .sweep_points import Floats, PointKinds, ShownColumn, in_lines, links, shortened
+from .sweep_points import PointKinds, ShownColumn, in_lines, links, shortened
 
 MOST_COORDINATES = 12
 _MOST_NAMES = 8
@@ -79,7 +80,7 @@ def parallel_coordinates(
     return described(figure, words)
 
 
-def _scaled(axes: Axes, number: int, column: ShownColumn) -> Floats:
+def _scaled(axes: Axes, number: int, column: ShownColumn) -> Array:
     """Draw the scale of one column and return the places of its values, from 0 to 1."""
     values = column.numbers()
     finite = values[np.isfinite(values)]
@@ -117,7 +118,7 @@ def _ends(column: ShownColumn, low: float, high: float, span: float) -> list[tup
     return [(0.0, compact(low)), (1.0, f"{compact(high)} {unit}".strip())]
 
 
-def _segment(places: Floats) -> Floats:
+def _segment(places: Array) -> Array:
     """Return the line of one point up to its first value that is no finite number."""
     missing = np.flatnonzero(~np.isfinite(places))
     count = int(missing[0]) if len(missing) else len(places)

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from .number_text import compact
 from .style import AFTER, INK, described, panels, styled
-from .sweep_points import Floats, PointKinds, ShownColumn, scatter_points
+from .sweep_points import PointKinds, ShownColumn, scatter_points
 
 _STEPS = 7
 
@@ -38,8 +39,8 @@ class SurfacePanel(NamedTuple):
     across: ShownColumn
     up: ShownColumn
     kinds: PointKinds
-    nodes: tuple[Floats, Floats] | None
-    values: Floats | None
+    nodes: tuple[Array, Array] | None
+    values: Array | None
 
 
 @styled
@@ -79,7 +80,7 @@ def response_surfaces(surfaces: Sequence[SurfacePanel], *, words: str) -> Figure
     return described(figure, words)
 
 
-def _contours(panel: Axes, across: Floats, up: Floats, values: Floats) -> None:
+def _contours(panel: Axes, across: Array, up: Array, values: Array) -> None:
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if not high - low > 1e-9 * max(abs(low), abs(high)):
         return

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from .style import INK, MUTED
-
-Floats = NDArray[np.float64]
 
 THICK, THIN = 1.0, 0.45
 """Widths of lines in points: visible edges, and all others."""
@@ -41,7 +39,7 @@ class Sheet:
         self.axes.set(xlim=(0.0, width), ylim=(0.0, height))
         self.axes.set_axis_off()
 
-    def line(self, *points: Sequence[float] | Floats, width: float = THIN, **look: Any) -> None:
+    def line(self, *points: Sequence[float] | Array, width: float = THIN, **look: Any) -> None:
         """Draw straight lines through points.
 
         Parameters
@@ -82,7 +80,7 @@ class Sheet:
         """
         self.line((x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y))
 
-    def area(self, points: Floats, **look: Any) -> Polygon:
+    def area(self, points: Array, **look: Any) -> Polygon:
         """Draw a closed area and return it.
 
         Parameters
@@ -96,7 +94,7 @@ class Sheet:
         self.axes.add_patch(patch)
         return patch
 
-    def measure(self, start: Floats, end: Floats, *, text: str, away: float, upright: bool = False) -> None:
+    def measure(self, start: Array, end: Array, *, text: str, away: float, upright: bool = False) -> None:
         """Draw a dimension between two points, level or upright.
 
         Parameters
@@ -137,7 +135,7 @@ class Sheet:
             side, place = ("left", 0.9) if away > max(start[0], end[0]) else ("right", -0.9)
             self.text(middle[0] + place, middle[1], text=text, ha=side, va="center", rotation=90)
 
-    def pointer(self, tip: Floats, corner: Sequence[float], *, text: str) -> None:
+    def pointer(self, tip: Array, corner: Sequence[float], *, text: str) -> None:
         """Draw an arrow from a text to what it speaks of.
 
         Parameters
@@ -193,7 +191,7 @@ class Sheet:
         self.box(x, top - len(rows) * row, width=sum(widths), height=len(rows) * row)
         return top - len(rows) * row
 
-    def _arrow(self, tip: Floats, direction: Floats) -> None:
+    def _arrow(self, tip: Array, direction: Array) -> None:
         """Draw the head of an arrow whose line goes from the tip along the direction."""
         across = np.array([-direction[1], direction[0]]) * _ARROW / 6.0
         self.axes.fill(

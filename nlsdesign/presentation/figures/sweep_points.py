@@ -11,12 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from ...foundation.arrays import Array, Indices, Mask
 from ...foundation.errors import visible
 from ...foundation.quantity import typeset_unit
 from .style import AFTER, DASHES, HOLDS, LIMIT, MUTED, PURPLE
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _LINES = 6
 
 
@@ -48,7 +47,7 @@ class ShownColumn(NamedTuple):
         unit = typeset_unit(self.unit or "1")
         return shortened(self.name, 60) + (f" in {unit}" if unit else "")
 
-    def numbers(self) -> Floats:
+    def numbers(self) -> Array:
         """Return the values, words as the number of their place in the alphabet."""
         if not self.words:
             return self.values.astype(float)
@@ -103,7 +102,7 @@ class PointGroup(NamedTuple):
     """
 
     label: str
-    rows: NDArray[np.intp]
+    rows: Indices
     color: str
     dash: Any
     marker: str
@@ -121,7 +120,7 @@ def links(points: NDArray[np.int64]) -> list[str]:
     return [f"#point-{number}" for number in points.tolist()]
 
 
-def scatter_points(axes: Axes, across: Floats, up: Floats, *, kinds: PointKinds, small: bool = False) -> None:
+def scatter_points(axes: Axes, across: Array, up: Array, *, kinds: PointKinds, small: bool = False) -> None:
     """Draw points in their kinds, each a link; those without a finite place are left out.
 
     Parameters

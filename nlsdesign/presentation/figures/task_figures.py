@@ -6,13 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ...design import MotorCycle, TaskCurve
+from ...foundation.arrays import Array
 from .number_text import significant
 from .style import AFTER, BEFORE, DASHES, INK, MUTED, described, legend, panels, styled
-
-Floats = NDArray[np.float64]
 
 _LABELS = ("rigid", "best linear spring", "this curve")
 _DASHES = (DASHES[2], DASHES[1], DASHES[0])
@@ -27,7 +25,7 @@ def motor_over_task(curve: TaskCurve) -> Figure:
     curve
         For a task.
     """
-    rows: tuple[tuple[str, str, Callable[[MotorCycle], Floats]], ...] = (
+    rows: tuple[tuple[str, str, Callable[[MotorCycle], Array]], ...] = (
         ("Motor torque", "torque in N·m", lambda motor: motor.torque),
         ("Motor speed", "speed in rad/s", lambda motor: motor.speed),
         ("Power at the motor shaft", "power in W", lambda motor: motor.power),

@@ -7,18 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from ...bench.identification.statistics.metrics import Agreement
 from ...design import Target
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.prefixes import shared_prefix
 from .lines import thinned
 from .number_text import root_mean_square, significant
 from .style import AFTER, DASHES, GRID, INK, MUTED, described, legend, look, panels, styled
 
-Floats = NDArray[np.float64]
-Curve = tuple[Floats, Floats]
+Curve = tuple[Array, Array]
 """Angles in rad and torques in N·m, shape (n,) each."""
 
 
@@ -162,7 +161,7 @@ def metric_note(agreement: Agreement, unit: str = "N·m") -> str:
     return f"{significant(agreement.relative)} %, {significant(agreement.rmse, 2)} {unit} rms"
 
 
-def loop_area(angle: Floats, torque: Floats) -> float:
+def loop_area(angle: Array, torque: Array) -> float:
     """Return ∮τ dθ of a loop that is closed by a straight line, in J.
 
     Positive for a passive spring: the torque leads the angle.
@@ -176,7 +175,7 @@ def loop_area(angle: Floats, torque: Floats) -> float:
     return float(np.sum(np.diff(x) * (y[1:] + y[:-1]) / 2))
 
 
-def _degrees(curve: Curve) -> tuple[Floats, Floats]:
+def _degrees(curve: Curve) -> tuple[Array, Array]:
     return thinned(np.degrees(curve[0]), curve[1])
 
 

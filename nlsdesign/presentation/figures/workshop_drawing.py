@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from numpy.typing import NDArray
 
 from ...design import CamPart
+from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity, with_unit
 from .sheet import THICK, THIN, Sheet
 from .style import GRID, MUTED, SURFACE, VERMILLION, described, styled
-
-Floats = NDArray[np.float64]
 
 _MM = 1e3
 _WIDTH, _HEIGHT, _BORDER = 297.0, 210.0, 8.0
@@ -170,9 +168,9 @@ class _View:
             np.array([left + right, lower + upper]) / 2 - self.scale * _MM * (self.low + self.high) / 2
         )
 
-    def at(self, points: Floats) -> Floats:
+    def at(self, points: Array) -> Array:
         """Return places on the page of points of the part."""
-        result: Floats = self.origin + self.scale * _MM * np.asarray(points)
+        result: Array = self.origin + self.scale * _MM * np.asarray(points)
         return result
 
 
@@ -237,7 +235,7 @@ def _edge_ends(page: Sheet, view: _View) -> None:
 def _named_holes(page: Sheet, view: _View) -> None:
     """Diameters above the view: the rightmost to the right, the others to the left, the leftmost lowest."""
     part = view.part
-    named: list[tuple[Floats, float, str]] = []
+    named: list[tuple[Array, float, str]] = []
     bolts = [hole for hole in part.holes if hole.name.startswith("bolt")]
     if bolts:
         chosen = max(bolts, key=lambda hole: float(hole.centre @ [1.0, 1.2]))
@@ -395,17 +393,17 @@ def _column(
         )
 
 
-def _circle(page: Sheet, centre: Floats, radius: float, **look: Any) -> None:
+def _circle(page: Sheet, centre: Array, radius: float, **look: Any) -> None:
     style: dict[str, Any] = {"facecolor": "none", "edgecolor": "#1c2127", **look}
     page.axes.add_patch(Circle((float(centre[0]), float(centre[1])), radius, **style))
 
 
-def _cross(page: Sheet, centre: Floats, reach: float) -> None:
+def _cross(page: Sheet, centre: Array, reach: float) -> None:
     for step in (np.array([reach, 0.0]), np.array([0.0, reach])):
         page.line(centre - step, centre + step, color=MUTED.light, width=0.3)
 
 
-def _clipped(points: Floats, reach: float) -> Floats:
+def _clipped(points: Array, reach: float) -> Array:
     """Return a line whose first and last piece end at a distance from the axis."""
     result = points.copy()
     for end, before in ((0, 1), (-1, -2)):
@@ -418,7 +416,7 @@ def _clipped(points: Floats, reach: float) -> Floats:
     return result
 
 
-def _rectangle(x: float, y: float, width: float, height: float) -> Floats:
+def _rectangle(x: float, y: float, width: float, height: float) -> Array:
     return np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...bench.discrepancy.effects.plain_names import title
 from ...design.statics.equilibrium import torque_function
+from ...foundation.arrays import Array
 from ...foundation.errors import NlsError, ValueRangeError
 from ...foundation.quantity import Quantity, three_digits, with_error, with_unit
 from ...model import FlatModel
@@ -20,7 +20,6 @@ from .page import write_report
 from .sections import FigureSection, Section, TableSection, TextSection
 from .tables import value_in_words
 
-Floats = NDArray[np.float64]
 _NONE = "–"
 _ANGLES = 121
 _HALF_TURN = 0.5 * np.pi
@@ -171,7 +170,7 @@ def _table(
     return TableSection(heading, columns, cells, caption=caption)
 
 
-def torque_at_rest(model: FlatModel) -> tuple[Floats, Floats]:
+def torque_at_rest(model: FlatModel) -> tuple[Array, Array]:
     """Return angles in rad, to the end of the contour, and the torque of the spring at rest in N·m.
 
     Parameters

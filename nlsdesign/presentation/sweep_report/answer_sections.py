@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...foundation.quantity import three_digits, typeset_unit, with_unit
 from ...sweeps.answer_quantiles import BoundedQuantile, answer_quantiles
 from ...sweeps.sensitivity import AnswerSensitivity
@@ -122,7 +122,7 @@ def _bound(value: float) -> float | str:
     return "–" if np.isnan(value) else value
 
 
-def _not_finite(name: str, values: NDArray[np.float64]) -> str:
+def _not_finite(name: str, values: Array) -> str:
     missing, infinite = int(np.sum(np.isnan(values))), int(np.sum(np.isinf(values)))
     parts = [f"{missing} times not a number"] if missing else []
     parts += [f"{infinite} times infinite (in the quantiles, not in the bars)"] if infinite else []

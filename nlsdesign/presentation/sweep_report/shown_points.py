@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Indices, Mask
 from ...sweeps import SweepColumn, SweepTable
 from ...sweeps.ranked_points import RankedPoints
 from ..figures import PointKinds, ShownColumn
@@ -30,7 +30,7 @@ class ShownPoints(NamedTuple):
         How they were chosen, as text; empty where all are shown.
     """
 
-    rows: NDArray[np.intp]
+    rows: Indices
     kinds: PointKinds
     rule: str
 
@@ -46,9 +46,7 @@ def shown_unit(unit: str) -> tuple[str, float]:
     return _UNITS.get(unit, (unit, 1.0))
 
 
-def shown_column(
-    table: SweepTable, column: SweepColumn, rows: NDArray[np.intp] | slice = slice(None)
-) -> ShownColumn:
+def shown_column(table: SweepTable, column: SweepColumn, rows: Indices | slice = slice(None)) -> ShownColumn:
     """Return a column as figures show it.
 
     Parameters
@@ -109,7 +107,7 @@ def shown_points(table: SweepTable, ranked: RankedPoints) -> ShownPoints:
     return ShownPoints(rows, kinds, rule.strip())
 
 
-def _ends(table: SweepTable) -> NDArray[np.bool_]:
+def _ends(table: SweepTable) -> Mask:
     """Return the points with the least and the largest number of each column."""
     mask = np.zeros(len(table), dtype=bool)
     for column in (*table.axes, *table.answers):

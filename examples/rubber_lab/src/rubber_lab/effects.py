@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from examples.rubber_lab.src.rubber_lab.laws import WireBundle
 from nlsdesign import Assembly, quantity, tie
 from nlsdesign.bench.discrepancy.effects import Edit, Effect, Form, Unknown
 from nlsdesign.bench.discrepancy.effects.places import turning_bodies
 from nlsdesign.bench.discrepancy.effects.sizes import efforts_on
+
+from .laws import WireBundle
 
 
 def _wires(assembly: Assembly, body: str) -> Iterator[Edit]:

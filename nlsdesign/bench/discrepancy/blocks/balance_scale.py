@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.symbolic import Expression, depends
 
 _NEAR_ZERO = 1e-9
@@ -53,7 +53,7 @@ class BalanceTerms(NamedTuple):
     state: Expression
     readings: Expression
     parameter: Expression
-    declared: NDArray[np.float64]
+    declared: Array
 
 
 def scaled_balance(

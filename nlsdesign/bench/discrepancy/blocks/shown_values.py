@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....model import FlatModel
 from ....model.readings import reading_of
 from ...identification.records.measurement import Record
-
-Array = NDArray[np.float64]
 
 
 def shown_values(model: FlatModel, record: Record, signal: str) -> Array:

@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import lsq_linear
 
 from ....components import Assembly, Element, Parallel, UnnamedFriction, UnnamedSpring
 from ....components.core.domain import Domain
+from ....foundation.arrays import Array, Indices
 from ....foundation.errors import ArrangementError
 from ....foundation.quantity import Quantity, significant, with_unit
 from ....foundation.symbolic import depends
@@ -40,8 +40,6 @@ from ..blocks.tearing import blocks_of
 from .candidate import Candidate, Unknown, wrapped
 from .friction import tied
 from .places import stretched
-
-Array = NDArray[np.float64]
 
 EFFECT = "unnamed"
 """Name of the candidate in verdicts: what it is, is not known."""
@@ -269,7 +267,7 @@ class _Fold(NamedTuple):
     """Part and rows of it that are left out together."""
 
     part: int
-    rows: NDArray[np.intp]
+    rows: Indices
 
 
 def _folds(parts: Sequence[_Part]) -> list[list[_Fold]]:

@@ -10,11 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from .machine_limits import MachineLimits
-
-Array = NDArray[np.float64]
 
 _SIZES = (1.0, 0.3)
 """Amplitudes, as shares of what the limits allow."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError
 from ....model import FlatModel
 from ....model.readings import reading_of
@@ -15,8 +15,6 @@ from ....model.structure import MovingBody, body_moved_by
 from ....simulation import Trace, simulate
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.records.measurement import Record
-
-Array = NDArray[np.float64]
 
 _ROUNDS, _CLOSE = 6, 1e-3
 """Corrections of a drive, and the share of it below which a further one changes nothing that is measured."""

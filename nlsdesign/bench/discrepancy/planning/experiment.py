@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, MeasurementError
 from ....foundation.processes import parallel_map
 from ....foundation.quantity import parse_unit, with_unit
@@ -32,8 +32,6 @@ from .candidate_commands import Command, commands
 from .expected_record import Machine, MeasuredSignals, check_command, measured_signals
 from .machine_limits import MachineLimits, limits_seen
 from .separation import ReadyHypothesis, Values, apart, made_ready
-
-Array = NDArray[np.float64]
 
 _LEAST_ROWS = 20
 _REACH = 1.02

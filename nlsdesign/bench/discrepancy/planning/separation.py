@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
@@ -30,7 +30,6 @@ from ...identification.records.measurement import Record
 from ..effects.candidate import Unknown
 from ..selection.hypothesis import Hypothesis
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 _OPEN = 0.3
@@ -337,8 +336,8 @@ def _once(
     return Apart(total, best.block, best.row)
 
 
-def _outlying(response: BlockResponse) -> NDArray[np.bool_]:
+def _outlying(response: BlockResponse) -> Mask:
     if not (response.driven.stiff and response.slope.shape[1]):
         return np.zeros(len(response.residual), dtype=bool)
-    rows: NDArray[np.bool_] = np.abs(response.slope).max(axis=1) > _OUTLYING_SLOPE
+    rows: Mask = np.abs(response.slope).max(axis=1) > _OUTLYING_SLOPE
     return rows

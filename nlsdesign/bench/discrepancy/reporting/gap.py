@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....model import flatten
 from ...identification.equation_error.filter_choice import rate_span
 from ...identification.statistics.filters import derivative
@@ -90,7 +90,7 @@ def _shapes(hypothesis: Hypothesis, comparison: Comparison, block: str) -> dict[
     judged = [e for e in comparison.judged(hypothesis) if e.block.name == block]
     error = np.concatenate([e.error for e in judged])
 
-    def gathered(signal: str, order: int) -> NDArray[np.float64]:
+    def gathered(signal: str, order: int) -> Array:
         span = rate_span(bench.records.records, signal) if order else 0.0
         rows = [
             derivative(e.record.trace[signal], e.record.step, order=order, span=span)[e.floor.places]

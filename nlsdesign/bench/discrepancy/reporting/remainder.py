@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.quantity import with_unit
 from ...identification.equation_error.filter_choice import rate_span
 from ...identification.records.measurement import RecordSet
 from ...identification.statistics.filters import derivative
 from ..selection.comparison import Judged
 from .sparse_formula import Formula, sparse_formula
-
-Array = NDArray[np.float64]
 
 _ENOUGH = 0.4
 """A shape is reported if it explains this share of the remainder on records that it was not taken from."""

@@ -11,11 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.quantity import typeset_unit
 
-Array = NDArray[np.float64]
 Part = tuple[Array, Mapping[str, Array], bool]
 
 _MOST_TERMS = 5

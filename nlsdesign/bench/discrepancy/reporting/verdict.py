@@ -7,10 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ....components.assembly.named_parts import Assembly
+from ....foundation.arrays import Array
 from ....foundation.quantity import significant, three_digits, typeset_unit
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
@@ -23,8 +21,6 @@ from .fitted_numbers import fitted_numbers
 from .named_effect import NamedEffect as NamedEffect
 from .remainder import Remainder
 from .suspicion import CONTRADICTION, LET_GO, as_sentence
-
-Array = NDArray[np.float64]
 
 HEADLINES: Mapping[str, str] = {
     "none": "Nothing is missing",

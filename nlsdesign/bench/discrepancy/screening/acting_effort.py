@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....model import FlatModel
 from ....model.readings import reading_of
 from ...identification.equation_error.block import Block
@@ -16,8 +16,6 @@ from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench
 from ...identification.statistics.filters import derivative
 from ..selection.comparison import Judged
-
-Array = NDArray[np.float64]
 
 
 class Acting:

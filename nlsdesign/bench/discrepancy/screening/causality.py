@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ....components.assembly.named_parts import Assembly
+from ....foundation.arrays import Array
 from ....foundation.symbolic import depends
 from ....model import FlatModel, flatten
 from ....model.readings import reading_of
@@ -19,8 +19,6 @@ from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.loop_work import Loop, loop_of
 from ..blocks.shown_values import shown_values
-
-Array = NDArray[np.float64]
 
 _QUICK_OVER_SLOW = 3.0
 _SPANS = 50

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....components.assembly.named_parts import Assembly
+from ....foundation.arrays import Array
 from ....model import FlatModel, flatten
 from ....model.readings import ReadingNames, reading_of
 from ....model.structure import MovingBody, top_part
@@ -97,14 +97,14 @@ def _enlarge(sizes: dict[str, float], values: Mapping[str, float]) -> None:
         sizes[name] = max(abs(value), sizes.get(name, 0.0))
 
 
-def _large(values: NDArray[np.float64]) -> tuple[float, int]:
+def _large(values: Array) -> tuple[float, int]:
     """Return how large a signal becomes but for single samples, and a sample at which it is that large."""
     size = np.abs(values)
     level = float(np.quantile(size, _USUAL))
     return level, int(np.argmin(np.abs(size - level)))
 
 
-def _rate(motion: NDArray[np.float64], step: float, span: float) -> NDArray[np.float64]:
+def _rate(motion: Array, step: float, span: float) -> Array:
     """Return the rate of a motion; at both ends of a record, where the filter reaches beyond, that beside."""
     rate, reach = derivative(motion, step, order=1, span=span), max(2, round(0.5 * span / step) + 1)
     if len(rate) > 2 * reach:
@@ -112,7 +112,7 @@ def _rate(motion: NDArray[np.float64], step: float, span: float) -> NDArray[np.f
     return rate
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 

@@ -7,10 +7,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ....components.assembly.named_parts import Assembly
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, unknown_name
 from ....foundation.processes import parallel_map
 from ....foundation.quantity import Quantity
@@ -25,8 +23,6 @@ from ..effects.candidate import Candidate, Unknown
 from .cross_validation import Folds, by_pieces, by_records
 from .hypothesis import Hypothesis
 from .hypothesis_fit import FreeBlock, HypothesisFit
-
-Array = NDArray[np.float64]
 
 _LONGEST_ROW = 12
 """Points of a row of numbers beyond which it is the table of a shape, of which no point is refitted alone."""

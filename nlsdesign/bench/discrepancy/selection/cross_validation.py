@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
 from ...identification.equation_error.evidence import Evidence
 from ...identification.estimation.least_squares import Fit, StackedRows
@@ -29,8 +30,6 @@ from ...identification.estimation.levenberg_marquardt import ENOUGH, minimise
 from ...identification.estimation.parameters import box
 from ...identification.statistics.residuals import effective_size
 from ..fitting.unpredictable import Key, Tally
-
-Array = NDArray[np.float64]
 
 SEGMENTS = 6
 """Pieces of a record whose sums of squares are kept apart: their scatter is the standard error of a sum."""

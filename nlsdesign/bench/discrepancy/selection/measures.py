@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-Array = NDArray[np.float64]
+from ....foundation.arrays import Array
 
 DECLARED = "declared numbers"
 """Name of the block that stands for the declared numbers: refitted numbers should lie in their ranges."""

@@ -9,9 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import scipy.special
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ....foundation.arrays import Array
 
 _CHUNK = 250
 _COLUMNS = 4096

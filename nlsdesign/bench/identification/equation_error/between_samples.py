@@ -19,9 +19,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
 from ....simulation import Trace
 from ..records.clocks import Resolution
@@ -29,8 +29,6 @@ from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..statistics.filters import Smoothing, kernel
 from .block_response import DrivenBlock
-
-Array = NDArray[np.float64]
 
 _RESOLVED = 0.05
 """Mean square of the change of a residual, in that of its noise, by twice as many samples: below it none are
@@ -76,7 +74,7 @@ def refined(record: Record, times: int) -> Record:
     )
 
 
-def _between(clock: Array, values: Array, masked: NDArray[np.bool_], finer: Array) -> Array:
+def _between(clock: Array, values: Array, masked: Mask, finer: Array) -> Array:
     """Return a signal between its samples; those that are masked have no part in it."""
     kept = ~masked
     result: Array = make_interp_spline(clock[kept], values[kept], k=5)(finer)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError, unknown_name
 from ....foundation.symbolic import Expression, depends
 from ..records.measurement import Record
@@ -17,8 +17,6 @@ from .batch import ChainFunction, ColumnFunction, PointFunction
 from .block import Block
 from .late_signals import advanced, free_delay, late_drives
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, placed, rosenbrock_step, stages_of
-
-Array = NDArray[np.float64]
 
 _PROBES = 50
 """Samples at which it is looked how fast a block is."""
@@ -419,7 +417,7 @@ def _sensitivities(e: _Equations) -> tuple[Expression, Expression]:
     return ca.project(slope, acting), ca.vertcat(e.state, ca.vec(slope))
 
 
-def _pattern(value: Expression, of: Expression) -> NDArray[np.bool_]:
+def _pattern(value: Expression, of: Expression) -> Mask:
     """Return which items of a column contain which symbols, shape (items, symbols)."""
     return np.asarray(ca.DM(ca.jacobian_sparsity(value, of), 1.0).full() > 0.0)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
 from ....simulation import Trace
@@ -24,8 +25,6 @@ from .block_response import DrivenBlock, Samples
 from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces, rectified
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
-
-Array = NDArray[np.float64]
 
 _NOISY, _SMEARED = 5.0, 0.027
 """A moving block says nothing where its speed is below so many times the noise of the speed, and so much of
@@ -130,15 +129,15 @@ def _on_clock(floor: Floor, width: float, times: int) -> Floor:
     return replace(floor, filter=refined_filter(floor.filter, width, times), raw_sigma=raw)
 
 
-def _in_motion(matrix: Smoothing, still: NDArray[np.bool_]) -> Smoothing:
+def _in_motion(matrix: Smoothing, still: Mask) -> Smoothing:
     """Return the rows that hardly reach into what is still."""
     return matrix[np.flatnonzero(matrix @ still.astype(float) < _SLOW_SHARE)]
 
 
-def _reverses(rate: Array) -> NDArray[np.bool_]:
+def _reverses(rate: Array) -> Mask:
     """Tell which samples have a reversal beside them: when in between it happened, no sample tells."""
     between = rate[1:] * rate[:-1] < 0.0
-    beside: NDArray[np.bool_] = np.append(between, False) | np.append(False, between)
+    beside: Mask = np.append(between, False) | np.append(False, between)
     return beside
 
 

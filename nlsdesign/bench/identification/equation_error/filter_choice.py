@@ -29,15 +29,13 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError
 from ..records.measurement import Record
 from ..statistics.filters import derivative, filter_weights, filtered
 from .block import Block
 from .noise import Noise
-
-Array = NDArray[np.float64]
 
 READING, BALANCE = 0.1, 0.2
 """Least widths, as radians of the typical motion. A balance holds a second derivative."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError
 from .block import Block, Drive
-
-Array = NDArray[np.float64]
 
 
 def advanced(time: Array, signal: Array, delay: Array) -> tuple[Array, Array]:

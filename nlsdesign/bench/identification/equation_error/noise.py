@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ..records.measurement import Record, RecordSet
 from ..statistics.coloured import NoisePart, Stretch, colour_of, variance_behind
 
-Array = NDArray[np.float64]
 Evidence: TypeAlias = Literal["rest", "repetition", "white only"]
 """Where the colour of a noise is known from; ``white only`` where nothing shows it."""
 

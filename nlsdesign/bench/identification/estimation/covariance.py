@@ -16,11 +16,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ..statistics.residuals import autocorrelation
-
-Array = NDArray[np.float64]
 
 _SEGMENTS = 60
 """Segments of all records together that are aimed at: enough for a variance to a fifth."""

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
 from ..equation_error.evidence import Evidence
 from ..statistics.losses import bounded_total, huber_rows
@@ -18,8 +18,6 @@ from .levenberg_marquardt import Minimum, minimise
 from .parameters import Parameter as Parameter
 from .parameters import box
 from .parameters import declared_parameter as declared_parameter
-
-Array = NDArray[np.float64]
 
 _EVALUATIONS = 40
 """Bound of evaluations: a fit that has not ended by then is not going to."""

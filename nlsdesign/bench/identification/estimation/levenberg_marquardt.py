@@ -13,12 +13,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
 
-Array = NDArray[np.float64]
 Rows = Callable[[Array], tuple[Array, Array]]
 
 ENOUGH = 0.02
@@ -58,7 +57,7 @@ def minimise(
     evaluations: int,
     share: float = 0.0,
     least: float = 0.0,
-    logarithmic: NDArray[np.bool_] | None = None,
+    logarithmic: Mask | None = None,
 ) -> Minimum:
     """Return the minimum of half a sum of squares within bounds.
 
@@ -153,7 +152,7 @@ def _walls(x: Array, box: tuple[Array, Array]) -> tuple[Array, Array]:
     return np.maximum(box[0] - x, -_LONGEST), np.minimum(box[1] - x, _LONGEST)
 
 
-def _straight_walls(x: Array, box: tuple[Array, Array], logs: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _straight_walls(x: Array, box: tuple[Array, Array], logs: Mask) -> tuple[Array, Array]:
     """Return the least and the largest step, of logarithms as shares of the number."""
     usual = _walls(x, box)
     far = np.maximum(box[0] - x, -_LONGEST_STRAIGHT), np.minimum(box[1] - x, _LONGEST_STRAIGHT)

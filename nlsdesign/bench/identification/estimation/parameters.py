@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....model import Variable
-
-Array = NDArray[np.float64]
 
 _REACH = 2.0
 

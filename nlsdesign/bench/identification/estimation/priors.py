@@ -6,12 +6,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from .least_squares import Fit
 from .parameters import Parameter
-
-Array = NDArray[np.float64]
 
 _LEAST = 1e-12
 

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
 from .least_squares import Fit
-
-Array = NDArray[np.float64]
 
 _95 = 1.9207
 """Half of the 95 % quantile of χ² with one degree of freedom."""

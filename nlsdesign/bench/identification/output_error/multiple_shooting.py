@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
 from ....model import FlatModel
 from ..estimation.least_squares import Fit, covariance_of
@@ -26,8 +26,6 @@ from ..statistics.metrics import rmse
 from ..statistics.residuals import effective_size
 from .simulation_error import Linear, Point, Shots, SimulationError, Weights
 from .wiring import Wiring
-
-Array = NDArray[np.float64]
 
 _ITERATIONS = 60
 _GAIN, _JOINED = 1e-8, 1e-6

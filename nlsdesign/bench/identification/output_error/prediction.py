@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError
 from ....model import FlatModel
 from ..records.measurement import Record
 from ..statistics.metrics import rmse
 from .simulation_error import Shots, SimulationError
 from .wiring import Wiring
-
-Array = NDArray[np.float64]
 
 
 class Prediction(NamedTuple):

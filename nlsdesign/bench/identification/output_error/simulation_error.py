@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, ValueRangeError
 from ....model import FlatModel
 from ..estimation.least_squares import Fit
@@ -18,8 +18,6 @@ from ..estimation.priors import prior_rows
 from ..records.measurement import Record, from_sample
 from .windowed_simulation import Shooter, Shot, Windows
 from .wiring import Wiring, wired
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, unknown_name
 from ....foundation.symbolic import Expression
 from ....model import FlatModel
@@ -22,8 +22,6 @@ from ..equation_error.filter_choice import rate_span
 from ..records.measurement import Record
 from ..statistics.filters import derivative
 from .wiring import Wiring
-
-Array = NDArray[np.float64]
 
 
 class Shot(NamedTuple):

@@ -9,14 +9,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array, Indices, Mask
 from ..statistics.residuals import noise_of, quantum_of
 from .faulty_samples import LONGEST, Group, Surroundings, Witness, faulty_groups, repaired
 from .quality import Finding, rows_in_words
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _MANY = 0.01
 """A channel with a larger share of faulty samples is suspect: each takes 41 samples of a filter of 4 with
@@ -226,14 +223,14 @@ def _clipped(
         return
 
 
-def _changes(values: Array, run: NDArray[np.intp]) -> bool:
+def _changes(values: Array, run: Indices) -> bool:
     """Tell whether a channel goes on while another one rests: by more than its noise and counts."""
     thirds = np.array_split(values[run[0] : run[-1] + 1], 3)
     changes = float(np.ptp([part.mean() for part in thirds]))
     return bool(changes > _DRIFT * max(noise_of(values) / np.sqrt(len(thirds[-1])), quantum_of(values)))
 
 
-def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:
+def _cut_off(values: Array, run: Indices) -> bool:
     """Tell whether a signal approaches its extreme so fast that its peak must lie beyond it."""
     first, last = int(run[0]), int(run[-1])
     sides = values[max(first - _APPROACH, 0) : first + 1], values[last : last + _APPROACH + 1]
@@ -244,7 +241,7 @@ def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:
     return missing > _MISSING_COUNTS * max(quantum_of(values), noise_of(values))
 
 
-def _longest_run(mask: Mask) -> NDArray[np.intp]:
+def _longest_run(mask: Mask) -> Indices:
     places = np.flatnonzero(mask)
     runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
     return max(runs, key=len)

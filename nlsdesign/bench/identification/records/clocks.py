@@ -14,14 +14,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.signal import fftconvolve, firwin
 
+from ....foundation.arrays import Array, Indices
 from ....foundation.errors import MeasurementError, ValueRangeError
 from ..statistics.residuals import noise_of, quantum_of
-
-Array = NDArray[np.float64]
 
 _HALF_LENGTH, _KAISER = 10, 5.0
 """Half length of the low-pass in new samples, and the shape of its window."""
@@ -216,9 +214,9 @@ def _low_pass(name: str, values: Array, ratio: float) -> Array:
     return result
 
 
-def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
+def _nearest(time: Array, wanted: Array) -> Indices:
     right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    rows: NDArray[np.intp] = right - (wanted - time[right - 1] < time[right] - wanted)
+    rows: Indices = right - (wanted - time[right - 1] < time[right] - wanted)
     return rows
 
 

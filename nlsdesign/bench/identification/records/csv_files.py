@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, UnitError
 from ....foundation.quantity import parse_unit
-
-Array = NDArray[np.float64]
 
 _COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",")

@@ -15,13 +15,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from ....foundation.arrays import Array, Indices, Mask
 from ..statistics.residuals import noise_of, quantum_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LONGEST = 20
 """Samples that are at most interpolated: of the order of the filter through which a rate is measured."""
@@ -215,7 +212,7 @@ class _Course(NamedTuple):
     scatter: float
 
     @staticmethod
-    def through(values: Array, places: NDArray[np.intp], origin: int, order: int = 3) -> _Course:
+    def through(values: Array, places: Indices, origin: int, order: int = 3) -> _Course:
         """Return the polynomial through samples by least squares."""
         powers = np.vander((places - origin) / _SIDE, order + 1)
         coefficients: Array = np.asarray(
@@ -225,7 +222,7 @@ class _Course(NamedTuple):
         freedom = max(len(places) - order - 1, 1)
         return _Course(coefficients, origin, float(np.sqrt(left @ left / freedom)))
 
-    def __call__(self, places: NDArray[np.intp]) -> Array:
+    def __call__(self, places: Indices) -> Array:
         at = (places - self.origin) / _SIDE
         result: Array = np.asarray(np.polyval(self.coefficients, at), dtype=np.float64)
         return result
@@ -405,7 +402,7 @@ def _confirmed(first: int, behind: int, others: Sequence[Witness]) -> bool:
     return any(each.turns(first, behind, _REACH) for each in others)
 
 
-def _sum_of_squares(values: Array, places: NDArray[np.intp], order: int) -> float:
+def _sum_of_squares(values: Array, places: Indices, order: int) -> float:
     at = (places - places[0]) / max(places[-1] - places[0], 1)
     powers = np.vander(at, order + 1)
     left = values[places] - powers @ np.linalg.lstsq(powers, values[places], rcond=None)[0]

@@ -6,11 +6,9 @@ import hashlib
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....simulation import Trace
-
-Array = NDArray[np.float64]
 
 _SHARE = 3
 """One of so many records is held out."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError, nearest
 from ....foundation.quantity import parse_unit, same_dimension
 from ....simulation import Trace
@@ -17,9 +17,6 @@ from .lag import lag_between
 from .mapping import Align, Column, ColumnMap
 from .quality import Finding, check_columns, check_time
 from .table_files import RecordTable
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _LEAST_STEP, _SHORT_STEP, _LONG_STEP = 1e-8, 1e-5, 0.5
 """Steps in s below which a clock cannot be one of a bench, and outside which its unit is doubtful."""

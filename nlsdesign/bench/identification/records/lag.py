@@ -6,17 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import correlate, find_peaks
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError
 from ..statistics.residuals import autocorrelation, effective_size
 from .clocks import Channel, on_one_clock
-
-Array = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.7
 """At this correlation half of the variance of one channel is explained by the other."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Mask
 from ....foundation.errors import MeasurementError, nearest, unknown_name, visible
 from ....foundation.quantity import parse_unit
 from ....model import FlatModel
@@ -26,8 +26,6 @@ from .mapping import Inputs, check_signals, read_mapping
 from .quality import Finding
 from .table_files import RecordTable, read_table, table_files, unread_tables
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _COARSER = 3.0
 """Declared counts beyond which the smallest step in all records is no matter of chance."""
 Role = Literal["fit", "selection", "held_out"]

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array, Indices
 from ....foundation.errors import MeasurementError
-
-Array = NDArray[np.float64]
 
 _GAP = 1.5
 """A step this much longer than the usual one is a gap."""
@@ -134,12 +132,12 @@ def _slower(steps: Array, usual: float) -> str:
     return f", or put it on a slower clock: resample_Hz = {rate:g} in records.toml"
 
 
-def _first_run(indices: NDArray[np.intp]) -> NDArray[np.intp]:
+def _first_run(indices: Indices) -> Indices:
     ends = np.flatnonzero(np.diff(indices) > 1)
     return indices[: int(ends[0]) + 1] if len(ends) else indices
 
 
-def rows_in_words(indices: NDArray[np.intp], first_row: int) -> str:
+def rows_in_words(indices: Indices, first_row: int) -> str:
     """Return the rows of a run of samples, for messages.
 
     Parameters

@@ -12,14 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, missing_library
 from ....foundation.reading import is_there
 from .csv_files import read_csv
 from .mat_elements import check_mat
-
-Array = NDArray[np.float64]
 
 LEAST_ROWS = 50
 """Smallest number of rows of a record."""

@@ -17,10 +17,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-Array = NDArray[np.float64]
+from ....foundation.arrays import Array
 
 _DEGREE = 4
 """Degree of the polynomial that is taken from a stretch: what is slower is no noise that can be known."""

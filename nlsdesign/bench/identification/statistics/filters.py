@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 from scipy.signal import savgol_coeffs, savgol_filter
 
-Array = NDArray[np.float64]
+from ....foundation.arrays import Array, Mask
 
 _REACH = 5.0
 _NARROW = 0.3
@@ -221,7 +221,7 @@ class Smoothing:
         picked: Array = rows[(self.places - self.places[0]) // self.stride]
         return picked
 
-    def touched_by(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def touched_by(self, mask: Mask) -> Mask:
         """Tell for each row whether a sample of a mask is among those that it is made of.
 
         Parameters
@@ -230,10 +230,10 @@ class Smoothing:
             Shape (n,).
         """
         reach, count = len(self.weights) // 2, np.concatenate([[0], np.cumsum(mask)])
-        touched: NDArray[np.bool_] = count[self.places + reach + 1] > count[self.places - reach]
+        touched: Mask = count[self.places + reach + 1] > count[self.places - reach]
         return touched
 
-    def __getitem__(self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Smoothing:
+    def __getitem__(self, rows: NDArray[np.int64] | Mask | slice) -> Smoothing:
         """Return the filter with some of its rows."""
         return replace(self, places=self.places[rows])
 

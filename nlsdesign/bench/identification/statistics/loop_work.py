@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ....foundation.arrays import Array
 
 _BACK = 0.03
 """A path has come back where it is this near its beginning, as a share of its range."""

@@ -7,9 +7,8 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ....foundation.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ....foundation.arrays import Array
 
 _ORDERS, _PLAINLY = (4, 8, 12), 0.6
 _MEDIAN_OF_NORMAL = 0.6744897501960817

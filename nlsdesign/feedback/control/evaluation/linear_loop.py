@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import schur
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ....model.roles import series_spring
 from ....simulation.sampled_batch import PLANT, SampledSystem
-from ..laws.wired_names import DESIRED
-from ..loop.closed_loop import ClosedLoop
-from .fine_counts import with_fine_counts
+from ..closed_loop import ClosedLoop
+from ..laws.law_writer import DESIRED
 from .linear_parts import (
     LinearBlock,
     LinearMode,
@@ -32,9 +32,9 @@ from .linear_parts import (
     SlopedTables,
     TableSlope,
     linear_plant,
+    with_fine_counts,
 )
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _WITHOUT_ERROR = 6
@@ -70,7 +70,7 @@ class LinearLoop:
     angles: Array
     torque: Array
     current: Array
-    reached: NDArray[np.bool_]
+    reached: Mask
     sample_time: float
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -100,10 +100,10 @@ class LinearLoop:
         result: Array = np.max(np.abs(np.linalg.eigvals(self.a)), axis=1)
         return np.where(self.reached, result, np.nan)
 
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Return where the loop is stable, shape (n,)."""
         # A gain of zero leaves an integrator that nothing moves at exactly one.
-        result: NDArray[np.bool_] = self.radius() < 1.0 + 1e-9
+        result: Mask = self.radius() < 1.0 + 1e-9
         return result
 
     def response(self, output: str, given: str, frequencies: Sequence[float] | Array) -> Complex:
@@ -325,13 +325,13 @@ class _Assembler:
             if compared is not None:
                 self.open_values[goal] = values[compared].copy()
 
-    def _passes(self, after: Array, out: Array, block: str, wanted: list[int]) -> NDArray[np.bool_]:
+    def _passes(self, after: Array, out: Array, block: str, wanted: list[int]) -> Mask:
         """Return where the command follows what is wanted at all; at a limit it has no slope, shape (n,)."""
         own = slice(self.first[block], self.first[block] + after.shape[1])
         moved = np.exp(0.1j) * np.eye(after.shape[1]) - after[:, :, own]
         through = out[:, None, own] @ np.linalg.solve(moved, after[:, :, wanted]) + out[:, None, wanted]
         size = np.max(np.abs(through), axis=(1, 2))
-        passes: NDArray[np.bool_] = size > 1e-9 * np.max(size, initial=0.0)
+        passes: Mask = size > 1e-9 * np.max(size, initial=0.0)
         return passes
 
     def _moved(self, column: int, step: Array) -> None:

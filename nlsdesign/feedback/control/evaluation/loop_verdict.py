@@ -23,17 +23,15 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from ....foundation.arrays import Array, Indices
 from ....model import FlatModel
 from ....model.roles import measured_motion, series_spring
 from ....model.transform import named
 from ....simulation.sampled_batch import PLANT
 from ...analysis.rest import evaluate_rows, rate_state, rest_states
-from ..loop.closed_loop import ClosedLoop
-
-Array = NDArray[np.float64]
+from ..closed_loop import ClosedLoop
 
 SETTLED, LIMIT_CYCLE, UNSETTLED, DIVERGED = "settled", "limit cycle", "not settled", "diverged"
 NO_ANSWER = "no answer"
@@ -398,7 +396,7 @@ def _keeps_on(swings: Array) -> bool:
     )
 
 
-def _longest_even(gaps: NDArray[np.intp]) -> tuple[int, int]:
+def _longest_even(gaps: Indices) -> tuple[int, int]:
     """Return the longest stretch of gaps that differ from their median by at most half of it."""
     best, first = (0, 0), 0
     for i in range(1, len(gaps) + 1):

@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....model import FlatModel, Variable
 from ....model.declared_limits import with_declared_reading
-from .known_drive import KnownDrive
-from .law_writer import LawWriter
+from .known_drive import KnownDrive, voltage_is_limited
+from .law_writer import DESIRED, LawWriter
+from .law_writer import LoopNames as LoopNames
+from .law_writer import loop_names as loop_names
 from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
-from .supply import voltage_is_limited
 from .velocity_loop import VelocityLoop
-from .wired_names import DESIRED
-from .wired_names import LoopNames as LoopNames
-from .wired_names import loop_names as loop_names
 
 SHARE_OF_RATE = 0.06
 """Share of the sampling rate that the velocity loop of the default gains has at most: 60 Hz at 1 kHz."""
@@ -117,7 +115,7 @@ def torque_controller(
     plant
         Continuous, on the bench: load fixed or prescribed.
     law
-        Outer law, such as :class:`~nlsdesign.feedback.control.laws.scheduled_torque.ScheduledTorque`; a PID
+        Outer law, such as :class:`~nlsdesign.feedback.control.laws.outer_laws.ScheduledTorque`; a PID
         with the
         defaults of :class:`TorqueGains` if neither a law nor gains are given, its velocity loop at most at
         0.06 of the sampling rate.

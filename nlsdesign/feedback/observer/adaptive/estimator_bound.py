@@ -19,14 +19,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, unknown_name
 from ....model import FlatModel
 from ....model.transform import named
 from ....simulation.prior import Prior
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

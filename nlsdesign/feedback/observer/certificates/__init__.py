@@ -4,7 +4,6 @@
 It never trusts the solver: what is written is checked in exact or interval arithmetic.
 """
 
-from .box_bound import clamped_estimate_bound
 from .certificate import Certificate, certify, declared_assumptions
 from .certificate_file import Proof, certificate_text, read_certificate, write_certificate
 from .co_design import CertifiedGain
@@ -14,6 +13,7 @@ from .held_estimate import (
     HeldEstimateBound,
     HeldEstimateCertificate,
     certify_held_estimate,
+    clamped_estimate_bound,
     held_estimate_bound,
 )
 from .polytope import ErrorPolytope, error_polytope

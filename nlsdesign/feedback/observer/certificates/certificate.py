@@ -10,13 +10,13 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ConvergenceError, MeasurementError, ValueRangeError
 from ....foundation.prefixes import shared_prefix, without_power
 from ....model import FlatModel
-from ..scheduling.gains import ConstantGain
 from ..scheduling.scheduled import ObserverDesign
+from ..scheduling.step import ConstantGain
 from .co_design import fastest, lyapunov_function
 from .exact import (
     Matrix,
@@ -30,8 +30,6 @@ from .exact import (
 )
 from .polytope import ErrorPolytope, error_polytope
 from .torque_bound import Assumptions, TorqueErrorBound, torque_bound
-
-Array = NDArray[np.float64]
 
 LITERALS = 1e-5
 """Part of the contraction kept for numbers that the C code rounds: four roundings of a float in each entry of

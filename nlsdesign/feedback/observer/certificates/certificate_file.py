@@ -15,8 +15,8 @@ from ....foundation.errors import MeasurementError, NlsError
 from ....foundation.reading import text_of
 from ....foundation.writing import write_text
 from ....model.paper_form import PaperFormNames
-from ..scheduling.forms import Minimal, PaperForm
-from ..scheduling.gains import ConstantGain
+from ..scheduling.angle_form import Minimal, PaperForm
+from ..scheduling.step import ConstantGain
 from .certificate import Certificate
 from .continuous import ContinuousCertificate
 from .error_system import ErrorSystem

@@ -2,7 +2,7 @@
 
 With Y = P·M the inequality ρ²P ⪰ (A − MCA)ᵀP(A − MCA) is linear in P and Y, by Schur's complement, for every
 corner A = F(q)·Φ. What is found here is a proposal: a certificate checks it in exact arithmetic on the table.
-Source: Boyd et al. 1994, sec. 5.1.
+No other module knows the solver of semidefinite programs. Source: Boyd et al. 1994, sec. 5.1.
 """
 
 from __future__ import annotations
@@ -12,18 +12,73 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeVar
 
+import clarabel
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
-from ..scheduling.discretise import linear
-from ..scheduling.gains import ConstantGain
-from ..scheduling.plant import AngleScheduledPlant
+from ..scheduling.angle_form import AngleScheduledPlant
+from ..scheduling.step import ConstantGain, linear
 from .exact import corners
 from .polytope import friction_slopes, scaling
-from .semidefinite import Inequality, minimised
 
-Array = NDArray[np.float64]
+SOLVED = ("Solved", "AlmostSolved")
+
+
+@dataclass(frozen=True, eq=False)
+class Inequality:
+    """F₀ + Σ xᵢ Fᵢ ⪰ 0.
+
+    Parameters
+    ----------
+    constant
+        F₀, shape (n, n), symmetric.
+    factors
+        F, shape (unknowns, n, n), symmetric.
+    """
+
+    constant: Array
+    factors: Array
+
+
+def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
+    """Return the unknowns of least cost under matrix inequalities; ``None`` where there are none.
+
+    Parameters
+    ----------
+    cost
+        Shape (unknowns,).
+    inequalities
+        All have to hold.
+    """
+    rows, sides, cones = [], [], []
+    for each in inequalities:
+        n = len(each.constant)
+        row, column = _triangle(n)
+        weight = np.where(row == column, 1.0, math.sqrt(2.0))
+        rows.append(-(each.factors[:, row, column] * weight).T)
+        sides.append(each.constant[row, column] * weight)
+        cones.append(clarabel.PSDTriangleConeT(n))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    count = len(cost)
+    solver = clarabel.DefaultSolver(
+        sparse.csc_matrix((count, count)), np.asarray(cost, dtype=float), sparse.csc_matrix(np.vstack(rows)),
+        np.concatenate(sides), cones, settings,
+    )  # fmt: skip
+    solution = solver.solve()
+    x = np.array(solution.x)
+    return x if str(solution.status) in SOLVED and np.all(np.isfinite(x)) else None
+
+
+def _triangle(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows and columns of an upper triangle, column by column."""
+    pairs = np.array([(i, j) for j in range(n) for i in range(j + 1)])
+    return pairs[:, 0], pairs[:, 1]
+
+
 Sought = TypeVar("Sought")
 
 MARGIN = 1.02
@@ -260,7 +315,7 @@ class CertifiedGain:
             raise ValueRangeError(f"condition {self.condition:g}", "no matrix has a condition below 1")
 
     def fitted(self, plant: AngleScheduledPlant, sample_time: float, angles: Array) -> ConstantGain:
-        """Return the gain; see :class:`~nlsdesign.feedback.observer.scheduling.gains.FittedGain`.
+        """Return the gain; see :class:`~nlsdesign.feedback.observer.scheduling.step.FittedGain`.
 
         Parameters
         ----------

@@ -13,19 +13,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
 from ....model import FlatModel
 from ....model.roles import measured_motion, spring_torque
-from ..scheduling.forms import Minimal, PaperForm
+from ..scheduling.angle_form import Minimal, PaperForm
 from ..scheduling.scheduled import whole_contour
-from .co_design import MARGIN, GainAndLyapunov, fastest, noise_inequality
+from .co_design import MARGIN, GainAndLyapunov, Inequality, fastest, minimised, noise_inequality
 from .error_system import ErrorSystem, error_system
 from .exact import combined, exact, is_positive_definite, times, transposed
-from .semidefinite import Inequality, minimised
-
-Array = NDArray[np.float64]
 
 BANDWIDTH = 20.0
 """Hz; no faster decay is sought where none is asked for."""

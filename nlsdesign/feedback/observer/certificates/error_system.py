@@ -15,20 +15,17 @@ from fractions import Fraction
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ArrangementError, ConvergenceError
 from ....model import FlatModel
 from ....model.paper_form import GEOMETRIC, paper_form
 from ....model.transform import named, with_outputs, without_idle_states
-from ..scheduling.forms import Minimal, PaperForm
-from ..scheduling.plant import AngleScheduledPlant
+from ..scheduling.angle_form import AngleScheduledPlant, Minimal, PaperForm
 from .exact import Matrix, corners
 from .intervals import Bounds, enclose
 from .polytope import SPEED_LIMIT, scaling
-from .spring_view import NARROWEST
-
-Array = NDArray[np.float64]
+from .torque_bound import NARROWEST
 
 CELLS = 256
 REFINEMENTS, TOLERANCE = 24, 2e-3
@@ -138,11 +135,11 @@ def error_system(
     friction = ca.Function("friction", [theta, speed], [ca.densify(slopes[fast, fast])])
     still, whole = (np.zeros(1), np.zeros(1)), (np.array([angles[0]]), np.array([angles[1]]))
 
-    def by_angle(cells: Bounds) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def by_angle(cells: Bounds) -> tuple[Array, Array, Mask]:
         bounds = enclose(entries, [[cells], [still]])
         return bounds.outputs[0].lower, bounds.outputs[0].upper, bounds.undecided
 
-    def by_speed(cells: Bounds) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def by_speed(cells: Bounds) -> tuple[Array, Array, Mask]:
         bounds = enclose(friction, [[whole], [cells]])
         return bounds.outputs[0].lower, bounds.outputs[0].upper, np.zeros(len(cells[0]), dtype=bool)
 
@@ -201,9 +198,7 @@ def _slopes(
     return x[angle], x[speed], ca.densify(slopes)
 
 
-def hull(
-    ranges: Callable[[Bounds], tuple[Array, Array, NDArray[np.bool_]]], edges: Array
-) -> tuple[Array, Array]:
+def hull(ranges: Callable[[Bounds], tuple[Array, Array, Mask]], edges: Array) -> tuple[Array, Array]:
     """Return bounds of many functions over a range, from cells that are halved where they are too wide.
 
     Parameters
@@ -238,7 +233,7 @@ def hull(
     return low, high
 
 
-def _decided(bounds: tuple[Array, Array, NDArray[np.bool_]]) -> tuple[Array, Array]:
+def _decided(bounds: tuple[Array, Array, Mask]) -> tuple[Array, Array]:
     kept = ~bounds[2]
     return (
         np.min(bounds[0][kept], axis=0, initial=np.inf),

@@ -7,10 +7,8 @@ from fractions import Fraction
 from itertools import product
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
+from ....foundation.arrays import Array
 
-Array = NDArray[np.float64]
 Matrix: TypeAlias = list[list[Fraction]]
 
 

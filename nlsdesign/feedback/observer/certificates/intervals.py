@@ -14,11 +14,11 @@ from typing import TypeAlias
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ArrangementError
 
-Array = NDArray[np.float64]
 Bounds: TypeAlias = tuple[Array, Array]
 
 ELEMENTARY = 4
@@ -58,7 +58,7 @@ class Enclosure:
     """
 
     outputs: tuple[Range, ...]
-    undecided: NDArray[np.bool_]
+    undecided: Mask
 
 
 def enclose(function: ca.Function, boxes: Sequence[Sequence[tuple[ArrayLike, ArrayLike]]]) -> Enclosure:
@@ -209,7 +209,7 @@ def multiply(a: Bounds, b: Bounds) -> Bounds:
     return np.where(whole, low, wide[0]), np.where(whole, high, wide[1])
 
 
-def _outward_but_zero(low: Array, high: Array, zero: NDArray[np.bool_]) -> Bounds:
+def _outward_but_zero(low: Array, high: Array, zero: Mask) -> Bounds:
     """Return bounds rounded outward, but for a zero that is exact because an operand is zero."""
     wide = _outward(low, high)
     return np.where(zero & (low == 0.0), 0.0, wide[0]), np.where(zero & (high == 0.0), 0.0, wide[1])
@@ -275,7 +275,7 @@ def _middle(a: Bounds) -> Bounds:
     return middle, half
 
 
-def _truth(never: NDArray[np.bool_], always: NDArray[np.bool_]) -> Bounds:
+def _truth(never: Mask, always: Mask) -> Bounds:
     return np.where(always, 1.0, 0.0), np.where(never, 0.0, 1.0)
 
 

@@ -19,14 +19,12 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ..scheduling.plant import AngleScheduledPlant
+from ....foundation.arrays import Array
+from ..scheduling.angle_form import AngleScheduledPlant
 from ..scheduling.scheduled import ObserverDesign
 from .exact import Matrix, combined, corners, identity, times
 from .intervals import enclose, multiply
-
-Array = NDArray[np.float64]
 
 SPEED_LIMIT = 1e4
 """Largest speed in rad/s for which the slope of the braked speed is bounded."""

@@ -1,18 +1,21 @@
-"""The inputs of an observer: which readings of the angle it believes, and which sample's current it wants."""
+"""The readings of an observer: its measured angle and plausible inputs, its first reading, a whole record."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Protocol
 
+import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ....foundation.errors import ValueRangeError
+from ....foundation.arrays import Array
+from ....foundation.errors import MeasurementError, ValueRangeError
+from ....foundation.symbolic import Expression
 from ....model import FlatModel, Plausibility, Variable
 from ....model.declared_limits import declared_reading
-from .plant import AngleScheduledPlant
-
-Array = NDArray[np.float64]
+from ....simulation import Trace, simulate
+from .angle_form import AngleScheduledPlant
 
 FASTER = 2.0
 """Times the typical speed that a motion has at most where the deck does not declare a largest rate."""
@@ -157,3 +160,173 @@ def noticeable_change(plant: AngleScheduledPlant, drive: str, angles: Array, res
         speeds = np.linspace(0.0, float(plant.sizes[speed]), 33)
         held = max(abs(float(plant.friction(s))) for s in speeds)
     return SURELY * (2.0 * held + slope * resolution) / pushed
+
+
+class StepWriter(Protocol):
+    """Writes the step of a scheduled observer with the entries read from its table."""
+
+    plant: AngleScheduledPlant
+    w: Expression
+
+    def read(self, kind: str, i: int, j: int = 0) -> Expression:
+        """Return one entry of a matrix."""
+        ...
+
+    def row(self, kind: str, i: int, of: Sequence[Expression]) -> Expression:
+        """Return one row of a matrix times a vector."""
+        ...
+
+    def prior(self, memory: Sequence[Expression]) -> list[Expression]:
+        """Return the states that are expected at a sample."""
+        ...
+
+
+class FirstReading:
+    """Begin and expectation of a scheduled observer.
+
+    Parameters
+    ----------
+    writer
+        Of its step.
+    memory, others
+        Its states: what the estimates carry on, then previous values and filtered rates of what else is
+        measured.
+    angle
+        The measured angle.
+    """
+
+    def __init__(
+        self,
+        writer: StepWriter,
+        memory: Sequence[Expression],
+        others: Sequence[Expression],
+        angle: Expression,
+    ) -> None:
+        self.writer, self.plant = writer, writer.plant
+        self.memory, self.others, self.angle = list(memory), list(others), angle
+        self.inputs = [angle, *(ca.SX.sym(v.name) for v in self.plant.inputs)]
+        self.arguments = [_column([*memory, *others]), _column(self.inputs), ca.SX(0, 1), writer.w]
+
+    def expected(self) -> ca.Function:
+        """Return what is expected of each input: of the angle what the model predicts."""
+        place, _ = self.plant.moving
+        predicted = self.writer.prior(self.memory)[place]
+        return ca.Function("expected", self.arguments, [_column([predicted, *self.inputs[1:]])])
+
+    def begin(self) -> ca.Function:
+        """Return the states of a machine that rests at the first reading, and those after a gap."""
+        plant, writer, count = self.plant, self.writer, len(self.memory)
+        angle_place, speed_place = plant.moving
+        measured = [writer.read("measured", i) for i in range(len(plant.measured))]
+        given = {angle_place: self.angle, speed_place: ca.SX(0)}
+        given |= {plant.names.index(name): y for name, y in zip(plant.measured, measured, strict=True)}
+        inner = [i for i in range(count) if i not in given]
+        known = [given.get(i, ca.SX(0)) for i in range(count)]
+        offset = [writer.row("next", i, [*known, ca.SX(1)]) + writer.read("prior", i) for i in inner]
+        carried = [[writer.read("next", i, j) for j in inner] for i in inner]
+        for i, value in zip(inner, at_rest(carried, offset), strict=True):
+            known[i] = value
+        begun = [known[i] - writer.read("prior", i) for i in range(count)]
+        resumed = list(self.memory)
+        resumed[angle_place] += self.angle - writer.prior(self.memory)[angle_place]
+        rates = [ca.SX(0)] * (len(self.others) - len(measured))
+        results = [_column([*begun, *measured, *rates]), _column([*resumed, *measured, *rates])]
+        return ca.Function("begin", self.arguments, results)
+
+
+def at_rest(carried: Sequence[Sequence[Expression]], offset: Sequence[Expression]) -> list[Expression]:
+    """Return the inner states that stay as they are: x = A·x + g.
+
+    A state that never decays, such as a permanent set, has no rest of its own and begins at zero.
+
+    Parameters
+    ----------
+    carried
+        A, shape (n, n).
+    offset
+        g, shape (n,).
+    """
+    count = len(offset)
+    lasting = [i for i in range(count) if not _decays(carried[i][i])]
+    moving = [i for i in range(count) if i not in lasting]
+    result = [ca.SX(0)] * count
+    if not moving:
+        return result
+    matrix = ca.SX.eye(len(moving)) - ca.SX(
+        ca.vertcat(*[ca.horzcat(*[carried[i][j] for j in moving]) for i in moving])
+    )
+    rest = ca.solve(matrix, _column([offset[i] for i in moving]))
+    for place, i in enumerate(moving):
+        result[i] = rest[place]
+    return result
+
+
+def _decays(kept: Expression) -> bool:
+    """Return whether a share that is kept over a sample is below one, or varies with the angle."""
+    return not (kept.is_constant() and float(kept) >= 1.0 - 1e-12)
+
+
+def _column(items: Sequence[Expression]) -> Expression:
+    return ca.SX(ca.densify(ca.vertcat(*items))) if items else ca.SX(0, 1)
+
+
+def observe(
+    observer: FlatModel,
+    trace: Trace,
+    *,
+    readings: Mapping[str, str] | None = None,
+    start: Mapping[str, float] | None = None,
+) -> Trace:
+    """Return what an observer makes of a simulated or measured record.
+
+    Parameters
+    ----------
+    observer
+        Discrete.
+    trace
+        Sampled at the observer's sample time.
+    readings
+        Input of the observer to signal of the trace where the names differ, for instance
+        ``{"motor.angle": "motor_encoder.reading"}``.
+    start
+        Start values of the memory, for instance those of :meth:`ObserverDesign.start`; by default those of a
+        machine that rests at the first readings.
+
+    Returns
+    -------
+    Trace
+        Inputs, memory and outputs of the observer.
+
+    Raises
+    ------
+    ValueRangeError
+        If the trace is not sampled at the sample time of the observer.
+    MeasurementError
+        If the trace does not have what the observer measures.
+    """
+    if observer.sample_time is None:
+        raise ValueRangeError(f"model '{observer.name}'", "is not a discrete observer")
+    if np.any(np.abs(np.diff(trace.time) / observer.sample_time - 1.0) > 1e-6):
+        raise ValueRangeError(
+            f"record '{trace.name}'", f"must be sampled every {observer.sample_time:g} s",
+            next_step="resample it with Trace.at",
+        )  # fmt: skip
+    wires = {v.name: v.name for v in observer.inputs} | dict(readings or {})
+    missing = [signal for signal in wires.values() if signal not in trace]
+    if missing:
+        raise MeasurementError(
+            f"record '{trace.name}'", f"has no signal '{missing[0]}', which the observer needs"
+        )
+    inputs = {name: trace[signal] for name, signal in wires.items()}
+    begun = start if start is not None else _begun(observer, {n: float(v[0]) for n, v in inputs.items()})
+    return simulate(observer, trace.time, inputs=inputs, start=begun)
+
+
+def _begun(observer: FlatModel, first: Mapping[str, float]) -> dict[str, float]:
+    """Return the states with which an observer begins at its first readings, as generated code does."""
+    if observer.begin is None:
+        return {}
+    x, u = observer.start(observer.states), [first[v.name] for v in observer.inputs]
+    w = observer.look_up(x.tolist(), u)
+    begun = np.array(observer.begin(x, u, observer.start(observer.parameters), w)[0], dtype=float).ravel()
+    return {v.name: float(value) for v, value in zip(observer.states, begun, strict=True)}

@@ -1,8 +1,12 @@
-"""Which observer errs least over the spread of the deck, and the one that is designed where none is named."""
+"""Which observer errs least over the spread of the deck, and the one that is designed where none is named.
+
+Beside it stands what the best estimator could reach on the bench, from what is known of the numbers.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,15 +16,17 @@ from ....foundation.prefixes import prefixed
 from ....foundation.quantity import typeset_unit
 from ....model import FlatModel
 from ....model.roles import measured_motion, spring_torque
-from ....simulation.sampled_batch import run_batch
-from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
-from ..adaptive.adaptive_settings import AdaptiveSettings
-from ..adaptive.adaptive_variables import SPREAD
-from ..scheduling.forms import StateForm
-from ..scheduling.gains import FittedGain, GainRule
+from ....simulation.buffered import Translate, as_it_is
+from ....simulation.prior import Prior
+from ....simulation.sampled_batch import PLANT, run_batch
+from ..adaptive.adaptive_observer import SPREAD, AdaptiveDesign, design_adaptive_observer, encoder_quantum
+from ..adaptive.duty_and_directions import AdaptiveSettings
+from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
+from ..scheduling.angle_form import StateForm
 from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details
+from ..scheduling.step import FittedGain, GainRule
 from ..scheduling.table import Grid
-from .observer_bench import observer_bench
+from .observer_bench import ObserverBench, observer_bench
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +174,7 @@ def design_observer(
         Rule for the correction of a scheduled observer, at each angle or for all angles together.
     form
         Which states a scheduled observer carries;
-        :class:`~nlsdesign.feedback.observer.scheduling.forms.Minimal` where only a gain is named.
+        :class:`~nlsdesign.feedback.observer.scheduling.angle_form.Minimal` where only a gain is named.
     grid
         Range and number of grid points; the whole contour of the cam by default.
 
@@ -192,3 +198,36 @@ def design_observer(
     return design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, gain=gain, form=form, grid=grid
     ).model
+
+
+def least_torque_error(bench: ObserverBench, *, translate: Translate = as_it_is) -> Callable[[Prior], float]:
+    """Return a function from a prior to the Cramér–Rao bound along the bench, N·m rms.
+
+    The machine runs once, with the numbers of the deck; a calibration is worth what it takes off this bound.
+
+    Parameters
+    ----------
+    bench
+        One run for all observers.
+    translate
+        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
+
+    Raises
+    ------
+    ArrangementError
+        If no encoder of the measured motion is declared.
+    """
+    system = bench.system({})
+    names = [f"{PLANT}.{v.name}" for v in bench.model.inputs]
+    batch = run_batch(system, bench.stop, inputs=bench.inputs, keep=names, translate=translate)
+    inputs = np.vstack([batch[name] for name in names])
+    sensed = SensedTorque(
+        bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured), system.sample_time
+    )
+
+    def least(prior: Prior) -> float:
+        bound = estimator_bound(bench.model, prior, inputs, sensed)
+        squares = [rms_over([bound], first, last) ** 2 for _, first, last in bench.stretches]
+        return math.sqrt(float(np.mean(squares)))
+
+    return least

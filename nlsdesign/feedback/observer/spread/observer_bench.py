@@ -13,17 +13,15 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
 from ....model import FlatModel, Variable
 from ....model.roles import measured_motion, spring_torque
 from ....simulation.sampled_batch import PLANT, SampledSystem
-from ..adaptive.duty import Duty, operating_points, push, spring_inertia
-from ..scheduling.forms import minimal_form
+from ..adaptive.duty_and_directions import Duty, operating_points, push, spring_inertia
+from ..scheduling.angle_form import minimal_form
 from ..scheduling.scheduled import whole_contour
-
-Array = NDArray[np.float64]
 
 SERVO = "servo"
 BANDWIDTH = 25.0
@@ -108,8 +106,7 @@ def observer_bench(
     model
         Continuous, load fixed.
     duty
-        Frequencies and amplitude; those of :class:`~nlsdesign.feedback.observer.adaptive.duty.Duty` by
-        default.
+        Frequencies and amplitude; those of :class:`~nlsdesign.feedback.observer.Duty` by default.
     estimate, measured
         As for :func:`~nlsdesign.feedback.observer.design_observer`.
     sample_time

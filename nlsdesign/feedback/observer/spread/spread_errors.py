@@ -9,8 +9,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ....foundation.arrays import Array
 from ....foundation.data_frames import Axis, data_set
 from ....foundation.errors import ArrangementError, ConvergenceError, unknown_name
 from ....foundation.prefixes import shared_prefix
@@ -22,8 +22,6 @@ from ....simulation.sampled_batch import PLANT, BatchTrace, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from .observer_bench import ObserverBench
-
-Array = NDArray[np.float64]
 
 FINE = 1e-6
 """Counts over declared counts of the run that has no rounding of the encoder worth mentioning."""

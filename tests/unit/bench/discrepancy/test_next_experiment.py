@@ -11,7 +11,6 @@ from typing import cast
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.bench.discrepancy import effects
 from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
@@ -26,12 +25,12 @@ from nlsdesign.bench.identification.equation_error.block_response import DrivenB
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import ROTATION, Assembly, Dashpot, GearedMotor, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
 
-Array = NDArray[np.float64]
 Law = Callable[[Array], Array]
 
 INERTIA, DAMPING, STIFFNESS, TORQUE = 2e-3, 5e-3, 0.8, 0.05

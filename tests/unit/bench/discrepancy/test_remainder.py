@@ -7,7 +7,6 @@ from typing import cast
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.bench.discrepancy.effects.unnamed_tables import unnamed_part
 from nlsdesign.bench.discrepancy.reporting.advice import advice, experiment
@@ -15,9 +14,8 @@ from nlsdesign.bench.discrepancy.reporting.sparse_formula import sparse_formula
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.estimation.least_squares import Fit
 from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
-
-Array = NDArray[np.float64]
 
 
 def motion(seed: int) -> tuple[Array, Array]:

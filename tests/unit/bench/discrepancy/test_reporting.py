@@ -7,7 +7,6 @@ from typing import cast
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.reporting.advice import where_they_differ
@@ -34,12 +33,12 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate
 
-Array = NDArray[np.float64]
 TIME = np.arange(6000) * 0.002
 SIGMA = 0.1
 ROLES: tuple[Role, ...] = ("fit", "fit", "fit", "held_out", "held_out")

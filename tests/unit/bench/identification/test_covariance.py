@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from nlsdesign.bench.identification.estimation.covariance import Piece, robust_covariance
-
-Array = NDArray[np.float64]
+from nlsdesign.foundation.arrays import Array
 
 COUNT, STEP = 600, 0.01
 NOTHING = np.zeros((0, 2))

@@ -7,13 +7,13 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
-from nlsdesign.feedback.analysis.batched import (
+from nlsdesign.feedback.analysis.kalman import best_covariances, deviation_of, steady_state_kalman
+from nlsdesign.feedback.analysis.sweep import (
     covariance_without_measurement,
     exponential_and_gramian,
     riccati,
     transposed,
 )
-from nlsdesign.feedback.analysis.kalman import best_covariances, deviation_of, steady_state_kalman
 
 COUNT = 6
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import CompiledStep, export_c
@@ -34,7 +33,6 @@ __all__ = ["run"]  # the fixture
 
 DECK = "austin2015_stiff_spring"
 WORDS = ("observer", "--deck", DECK, "--certificate", "--real", "float")
-Array = NDArray[np.float64]
 
 
 def test_forged_c_with_a_hash_written_anew_fails(run: Run, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from nlsdesign.feedback.observer.scheduling.discretise import held, linear
+from nlsdesign.feedback.observer.scheduling.step import held, linear
 
 TIME = 1e-3
 FAST = -0.58e6 / 411.0  # the printed relaxation, 1/s

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from nlsdesign.feedback.observer import CascadeGain, PolePlacement, SteadyStateKalman
-from nlsdesign.feedback.observer.scheduling.gains import GainRule, SampledPlant
+from nlsdesign.feedback.observer.scheduling.step import GainRule, SampledPlant
 from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError
 from tests import observed as ob
 

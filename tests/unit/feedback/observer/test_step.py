@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
-from nlsdesign.feedback.observer.scheduling.angle_form import AngleForm, ScheduledNames
-from nlsdesign.feedback.observer.scheduling.plant import AngleScheduledPlant, Coefficients
+from nlsdesign.feedback.observer.scheduling.angle_form import (
+    AngleForm,
+    AngleScheduledPlant,
+    Coefficients,
+    ScheduledNames,
+)
 from nlsdesign.feedback.observer.scheduling.step import ObserverStep
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.model import FlatModel, Variable

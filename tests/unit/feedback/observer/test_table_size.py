@@ -21,9 +21,8 @@ from nlsdesign.feedback.observer import (
     design_adaptive_observer,
     design_observer_with_details,
 )
-from nlsdesign.feedback.observer.scheduling.breakpoints import FineEntries, linearly
 from nlsdesign.feedback.observer.scheduling.scheduled import whole_contour
-from nlsdesign.feedback.observer.scheduling.table import Entry
+from nlsdesign.feedback.observer.scheduling.table import Entry, FineEntries, linearly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ConvergenceError, ValueRangeError
 from nlsdesign.foundation.quantity import Quantity, quantity
