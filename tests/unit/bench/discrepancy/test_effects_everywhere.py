@@ -39,7 +39,9 @@ def test_every_effect_is_offered_on_two_machines(effect: object) -> None:
     machines = {name: (made(), bare(made())) for name, made in MACHINES.items()}
     able = {name for name, pair in machines.items() if any(effect(each) for each in pair)}  # type: ignore[operator]
     wanted = 1 if effect.__name__ in ONE_KIND_OF_MACHINE else 2  # type: ignore[attr-defined]
-    assert len(able) >= wanted, f"offered on {able}: add machines that can have it to tests/effect_machines.py"
+    assert len(able) >= wanted, (
+        f"offered on {able}: add machines that can have it to tests/effect_machines.py"
+    )
 
 
 @pytest.mark.parametrize("name", quick_only(MACHINES, ["rig"]))
