@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 import nlsdesign as nls
-from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult
+from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult, write_part
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.presentation.report import FileSection, Section
 
@@ -82,29 +80,11 @@ def with_machined_contour(actuator: nls.Assembly, anchor: nls.Quantity | None = 
 
 def make_cam(design: CamDesign, machined: MachinedCam, folder: Path, *, title: str) -> MadeCam:
     """Write the edge for the machine and the page for the workshop, and return the part."""
-    part = machined.part(design.contour)
-    files = nls.write_drawings(folder, design.contour, machined=machined, note=f"design {design.fingerprint}")
-    block = nls.figures.TitleBlock(
-        title=title, deck=design.actuator.name, fingerprint=design.fingerprint, material="EN AW-7075"
+    pictures = nls.figures.DesignPictures(
+        deck=design.actuator.name, title=title, material="EN AW-7075", sheet="sheet", inspected=INSPECTED
     )
-    page = nls.figures.workshop_drawing(part, title=block, rows=inspection_rows(design))
-    files += nls.figures.write_figures(folder, {"sheet": page})
-    files += nls.figures.write_figures(folder, {"sheet": page}, suffix=".pdf")
-    return MadeCam(design, part, tuple(files))
-
-
-def inspection_rows(design: CamDesign) -> list[nls.figures.InspectionRow]:
-    """Return torque, lever arm and cable tension at a few angles, to be measured on the finished spring."""
-    curves, check, contour = design.curves, design.check, design.contour
-    return [
-        nls.figures.InspectionRow(
-            angle=float(angle),
-            torque=float(np.interp(angle, check.angles, check.torques)),
-            lever_arm=float(np.interp(angle, contour.angles, contour.lever_arms)),
-            tension=float(np.interp(angle, curves.angles, curves.forces)),
-        )
-        for angle in np.linspace(0.0, design.target.last_angle, INSPECTED)
-    ]
+    files = write_part(design, machined, folder, pictures=pictures)
+    return MadeCam(design, machined.part(design.contour), tuple(files))
 
 
 def drawing_section(cam: MadeCam) -> Section:

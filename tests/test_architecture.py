@@ -55,6 +55,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
+    "design.jobs.written_design": ("components.assembly.deck_writer",),
     "design.statics.smooth_cables": ("components.core.element",),
     "design.optimisation.stock": ("components.assembly.other_rubber", "components.materials.library"),
     "bench.discrepancy": (ASSEMBLY,),

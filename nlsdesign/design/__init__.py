@@ -29,6 +29,14 @@ from .drawing.machined_cam import (
 from .jobs.job_file import DesignJob, job_of, read_job
 from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
+from .jobs.written_design import (
+    DESIGN_FILES,
+    PicturesOfDesign,
+    WrittenDesign,
+    design_summary,
+    write_design,
+    write_part,
+)
 from .optimisation.checks import torque_check
 from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
@@ -69,6 +77,7 @@ from .tolerance.tolerance_result import CauseEffect, QuantileEstimate, Tolerance
 from .tolerance.trimming import Trim
 
 __all__ = [
+    "DESIGN_FILES",
     "AnchorDistance",
     "AreaRange",
     "AtMost",
@@ -118,6 +127,7 @@ __all__ = [
     "OneSidedSpring",
     "OverTravel",
     "ParetoFront",
+    "PicturesOfDesign",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
@@ -154,12 +164,14 @@ __all__ = [
     "TwoBranchSpring",
     "UniformSpread",
     "UnmakeablePart",
+    "WrittenDesign",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
     "curve_for_task",
     "design_cam",
+    "design_summary",
     "draw_deviations",
     "elastic_law",
     "energy_profile",
@@ -180,5 +192,7 @@ __all__ = [
     "torque_check",
     "unmakeable_parts",
     "walking_task",
+    "write_design",
     "write_drawings",
+    "write_part",
 ]

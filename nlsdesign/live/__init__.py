@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 # The server is a room mate of the session but must answer before any numerical library is loaded, so what
 # the session brings is imported when it is first asked for.
 if TYPE_CHECKING:
-    from ..design.parametric.question import TargetPoint
+    from ..design.parametric.cam_question import TargetPoint
     from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
     from .background import WorkState
     from .edits import (

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
 from ..design.optimisation.limit_kinds import LIMIT_KINDS
-from ..design.parametric.question import ChosenMachine, TargetPoint
+from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
 from ..design import CamDesign, Contour, DesignSettings, Limit, Target, design_cam
-from ..design.parametric.solver import ParametricDesign
+from ..design.parametric.parametric_solver import ParametricDesign
 from ..foundation.errors import ConvergenceError, InfeasibleError
 from ..foundation.prefixes import prefixed
 from .answers import DesignView, LiveAnswer

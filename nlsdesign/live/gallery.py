@@ -13,7 +13,7 @@ from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
 from ..design import MaximumStrain, MaximumStress, contour_of_cam
 from ..design.optimisation.defaults import BREAKS
-from ..design.parametric.question import ChosenMachine, TargetPoint
+from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque
 from ..foundation.arrays import Array

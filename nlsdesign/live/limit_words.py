@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 from ..design.optimisation.limit_kinds import LIMIT_KINDS
-from ..design.parametric.question import LimitNumber
+from ..design.parametric.cam_question import LimitNumber
 from .answers import LimitMargin
 from .question import LiveQuestion
 

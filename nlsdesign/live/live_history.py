@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..design.parametric.solver import ParametricSolver
+from ..design.parametric.parametric_solver import ParametricSolver
 from .full_design import FullDesign
 from .live_moment import LiveMoment, first_moment, next_moment, opened_moment, settled_moment
 from .question import LiveQuestion

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
-from ..design.parametric.solver import DesignedNumbers, ParametricDesign, ParametricSolver
+from ..design.parametric.parametric_solver import DesignedNumbers, ParametricDesign, ParametricSolver
 from .answers import LiveAnswer
 from .at_angle import AngleView
 from .full_design import FullDesign, angle_view_of, full_answer

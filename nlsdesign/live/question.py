@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..design.parametric.question import CamQuestion, TargetPoint
+from ..design.parametric.cam_question import CamQuestion, TargetPoint
 from ..foundation.errors import ValueRangeError, brief
 
 FEWEST_POINTS, MOST_POINTS = 2, 50

@@ -15,7 +15,7 @@ from ..components.assembly.deck_writer import deck_text, declare
 from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_of
 from ..design.curves.numbers import plain
 from ..design.optimisation.limit_kinds import LIMIT_KINDS
-from ..design.parametric.question import ChosenMachine, TargetPoint
+from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES

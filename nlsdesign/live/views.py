@@ -8,7 +8,7 @@ import numpy as np
 
 from ..design import CamDesign, LimitState
 from ..design.optimisation.result import DesignCurves
-from ..design.parametric.solver import ParametricDesign
+from ..design.parametric.parametric_solver import ParametricDesign
 from ..foundation.arrays import Array
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
 from .limit_words import shown_value

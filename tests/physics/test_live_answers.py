@@ -483,7 +483,7 @@ def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A program takes tens of megabytes: a step whose program is gone gives the same design and goes on."""
-    monkeypatch.setattr("nlsdesign.design.parametric.solver._MOST_PROGRAMS", 1)
+    monkeypatch.setattr("nlsdesign.design.parametric.parametric_solver._MOST_PROGRAMS", 1)
     before = template.answer.design
     point = template.question.points[2]
     template.apply(AddPoint(0.5, 0.21))

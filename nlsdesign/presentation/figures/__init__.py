@@ -18,6 +18,7 @@ from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
 from .design_figures import design_picture, limit_margins
+from .design_pictures import DesignPictures, inspection_rows
 from .loop_evaluation import (
     coupled_stability_map,
     impedance_over_frequency,
@@ -47,6 +48,7 @@ __all__ = [
     "CamPicture",
     "CandidateShare",
     "ClosedLoopRun",
+    "DesignPictures",
     "Figure",
     "HeldOut",
     "InspectionRow",
@@ -81,6 +83,7 @@ __all__ = [
     "held_out_series",
     "impedance_over_frequency",
     "inline_svg",
+    "inspection_rows",
     "limit_margins",
     "loop_area",
     "margins_over_angle",

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 
 from nlsdesign.design.optimisation.limit_kinds import LIMIT_KINDS
-from nlsdesign.design.parametric.program import SoftenedProgram
-from nlsdesign.design.parametric.rows import ProgramRows
+from nlsdesign.design.parametric.parametric_program import SoftenedProgram
+from nlsdesign.design.parametric.program_rows import ProgramRows
 from nlsdesign.live import gallery_question
 
 

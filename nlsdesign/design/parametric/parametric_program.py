@@ -20,8 +20,8 @@ from ...foundation.arrays import Array
 from ..optimisation.limit_kinds import LIMIT_KINDS
 from ..optimisation.program import PROVED_INFEASIBLE
 from ..optimisation.starts import start_values, starts
-from .question import CamQuestion
-from .rows import ProgramRows
+from .cam_question import CamQuestion
+from .program_rows import ProgramRows
 
 SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 """States of the solver that count as solved."""

@@ -25,7 +25,7 @@ from ..optimisation.solve import GOALS
 from ..optimisation.variables import DesignVariable, VariableScale, scale_of, scaled
 from ..statics.equilibrium import elastic_law
 from ..statics.rounding import has_corners
-from .question import CamQuestion
+from .cam_question import CamQuestion
 
 
 class MovableTarget:
