@@ -29,17 +29,7 @@ _OLD = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class ExportedDesign:
-    """One file.
-
-    Parameters
-    ----------
-    name
-        Of the file.
-    media_type
-        For browsers.
-    content
-        Bytes.
-    """
+    """One file."""
 
     name: str
     media_type: str
@@ -73,15 +63,7 @@ class ExportDesign(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the export of the last good design.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such export.
-        ValueRangeError
-            If there is no design yet.
-        """
+        """Return the export of the last good design."""
         if self.what not in EXPORTS:
             raise unknown_name("export", self.what[:80], EXPORTS)
         if shown is None:
@@ -106,13 +88,7 @@ def exported_dxf(stage: Callable[[str], None], design: ShownDesign) -> ExportedD
 
 
 def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
-    """Return cascade observer and PID controller as C, in an archive.
-
-    Raises
-    ------
-    NlsError
-        If the machine has no observer or controller.
-    """
+    """Return cascade observer and PID controller as C, in an archive."""
     from ..export import export_c
     from ..feedback.control import joined, torque_controller
     from ..feedback.observer import CascadeGain, design_observer
@@ -131,13 +107,7 @@ def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDes
 
 
 def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
-    """Return the plant as an FMU for co-simulation.
-
-    Raises
-    ------
-    NlsError
-        If it cannot be compiled here.
-    """
+    """Return the plant as an FMU for co-simulation."""
     from ..export import export_fmu
 
     stage("compiles the plant")

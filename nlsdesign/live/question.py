@@ -35,18 +35,7 @@ class LiveQuestion(CamQuestion):
     title: str = ""
 
     def with_points(self, points: tuple[TargetPoint, ...]) -> LiveQuestion:
-        """Return the question with another target.
-
-        Parameters
-        ----------
-        points
-            In the order of their angles.
-
-        Raises
-        ------
-        ValueRangeError
-            If there are too many or not enough, out of order, or out of range.
-        """
+        """Return the question with another target."""
         if not FEWEST_POINTS <= len(points) <= MOST_POINTS:
             raise ValueRangeError(
                 f"target with {len(points)} points", f"has {FEWEST_POINTS} to {MOST_POINTS} of them",
@@ -78,21 +67,7 @@ class LiveQuestion(CamQuestion):
 def finite_in(what: str, value: object, *, lowest: float, highest: float, unit: str = "1") -> float:
     """Return a number that a designer gave, checked.
 
-    Parameters
-    ----------
-    what
-        For messages.
-    value
-        Anything.
-    lowest, highest
-        Inclusive range.
-    unit
-        Unit in SI of value and range; people read them in the unit of the page.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is no finite number in the range.
+    ``unit``: unit in SI of value and range; people read them in the unit of the page.
     """
     try:
         sound = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)

@@ -143,22 +143,7 @@ def job_of(text: str, file: Path) -> DesignJob:
 
 
 def job_in(deck: Deck) -> DesignJob:
-    """Return what is asked of a design by tables that were read; see :func:`job_of`.
-
-    Parameters
-    ----------
-    deck
-        Tables of a design file, with their places.
-
-    Raises
-    ------
-    DeckError
-        If a table is of the wrong kind; file, line and column are named.
-    UnknownNameError
-        If there is no such table, limit, goal, target or field, with the nearest that exists.
-    NlsError
-        If a number is refused by what it is for, with its place.
-    """
+    """Return what is asked of a design by tables that were read; see :func:`job_of`."""
     file = deck.path
     for key in deck.tables:
         if key not in _TABLES:
@@ -186,13 +171,7 @@ def job_in(deck: Deck) -> DesignJob:
 
 
 def kinds(base: type) -> dict[str, type]:
-    """Return the classes that can be named in a design file, by name.
-
-    Parameters
-    ----------
-    base
-        Of targets, limits or goals.
-    """
+    """Return the classes that can be named in a design file, by name."""
     result: dict[str, type] = {}
     kind: type
     for kind in base.__subclasses__():
@@ -222,26 +201,7 @@ def _target(deck: Deck) -> tuple[Target | TaskTarget, tuple[Limit, ...]]:
 
 
 def read_entries(text: str, base: type[Asked], origin: str) -> list[Asked]:
-    """Return the objects of one entry ``NAME = {field = "number unit"}``, as it stands in a design file.
-
-    Parameters
-    ----------
-    text
-        TOML.
-    base
-        Of targets, limits or goals.
-    origin
-        Where it came from, for messages.
-
-    Raises
-    ------
-    DeckError
-        If it is no such entry.
-    UnknownNameError
-        If there is no such class or field, with the nearest that exists.
-    NlsError
-        If a number is refused by what it is for, with its place.
-    """
+    """Return the objects of one entry ``NAME = {field = "number unit"}``, as it stands in a design file."""
     deck = read_deck(text, Path(origin))
     return list(_of_kinds(deck, "", base, deck.tables))
 
@@ -260,13 +220,7 @@ def read_stock(text: str, origin: str) -> list[StockChoice]:
 
 
 def target_of_file(path: Path) -> tuple[Target, tuple[Limit, ...]]:
-    """Return the curve of a file, and the band that stands beside it as a limit.
-
-    Raises
-    ------
-    NlsError
-        If the file cannot be read.
-    """
+    """Return the curve of a file, and the band that stands beside it as a limit."""
     target = read_target(path)
     with path.open(encoding="utf-8-sig") as lines:
         head = next((line for line in lines if line.strip() and not line.startswith("#")), "")
@@ -290,28 +244,7 @@ def _of_kinds(deck: Deck, key: str, base: type[Asked], table: Mapping[str, Any])
 
 
 def built(deck: Deck, kind: type, given: object, place: str) -> Any:
-    """Return the object of a table.
-
-    Parameters
-    ----------
-    deck
-        The file.
-    kind
-        A dataclass.
-    given
-        Its fields by name.
-    place
-        For messages.
-
-    Raises
-    ------
-    DeckError
-        If it is no table, or a field is missing.
-    UnknownNameError
-        If there is no such field.
-    NlsError
-        If a field is refused.
-    """
+    """Return the object of a table."""
     if not isinstance(given, Mapping):
         raise DeckError(
             place, f"{brief(given)} is not a table", next_step='write it as {field = "number unit", ...}'

@@ -68,15 +68,7 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
 
 
 def with_defaults(keep: Sequence[Limit], defaults: Sequence[Limit]) -> tuple[Limit, ...]:
-    """Return the limits asked for, and those defaults of whose kind none was asked for.
-
-    Parameters
-    ----------
-    keep
-        Asked for.
-    defaults
-        Otherwise.
-    """
+    """Return the limits asked for, and those defaults of whose kind none was asked for."""
     kinds = {type(limit) for limit in keep}
     return (*keep, *(limit for limit in defaults if type(limit) not in kinds))
 
@@ -89,13 +81,7 @@ class StrainEnd(NamedTuple):
 
 
 def strain_ends(model: FlatModel) -> dict[str, StrainEnd]:
-    """Return how far each piece of rubber behind the cam may be stretched, by its path.
-
-    Parameters
-    ----------
-    model
-        Flat model of an actuator with a cam spring.
-    """
+    """Return how far each piece of rubber behind the cam may be stretched, by its path."""
     return {piece.name: _end_of(model, piece) for piece in series_cam(model).specimens}
 
 

@@ -193,10 +193,7 @@ class CamQuestion:
     def keeps(self, limit: str) -> bool:
         """Tell whether a limit is kept, and not only shown: whether anything that is free can change it.
 
-        Parameters
-        ----------
-        limit
-            Name of its class; ranges of free numbers are always kept.
+        ``limit``: name of its class; ranges of free numbers are always kept.
         """
         kind = LIMIT_KINDS.get(limit)
         return kind is None or self.contour in self.free or not kind.of_shape
@@ -215,18 +212,7 @@ class CamQuestion:
         return result
 
     def number(self, name: str) -> NumberState:
-        """Return one of them.
-
-        Parameters
-        ----------
-        name
-            Full name.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest that exists.
-        """
+        """Return one of them."""
         if name not in self.numbers:
             raise unknown_name("number", name, self.numbers)
         return self.numbers[name]

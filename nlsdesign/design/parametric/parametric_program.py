@@ -80,68 +80,30 @@ class SearchOutcome:
 
 
 def interior_point(name: str, program: dict[str, Any], *, iterations: int, **options: Any) -> ca.Function:
-    """Return the solver of a program.
-
-    Parameters
-    ----------
-    name
-        Of the function.
-    program
-        Unknowns ``x``, cost ``f``, rows ``g`` and parameters ``p``.
-    iterations
-        At most.
-    **options
-        Of Ipopt, besides those of all searches.
-    """
+    """Return the solver of a program."""
     settings = {f"ipopt.{key}": value for key, value in options.items()}
     return ca.nlpsol(name, "ipopt", program, {**_COMMON, **settings, "ipopt.max_iter": iterations})
 
 
 class ProgramOutputs:
-    """What follows from the unknowns of one program.
-
-    Parameters
-    ----------
-    rows
-        Of the program.
-    """
+    """What follows from the unknowns of one program."""
 
     def __init__(self, rows: ProgramRows) -> None:
         self._rows = rows
 
     def columns(self, unknowns: Array, question: CamQuestion) -> dict[str, Array]:
-        """Return curves, sums and values of the limits by name.
-
-        Parameters
-        ----------
-        unknowns
-            Scaled.
-        question
-            Of this structure.
-        """
+        """Return curves, sums and values of the limits by name."""
         names, function = self._columns
         columns = function(unknowns, self._rows.numbers_of(question))
         return {name: np.array(c, dtype=float).ravel() for name, c in zip(names, columns, strict=True)}
 
     def chosen_values(self, unknowns: Array) -> dict[str, float]:
-        """Return sizes and variables of the contour in SI by name.
-
-        Parameters
-        ----------
-        unknowns
-            Scaled.
-        """
+        """Return sizes and variables of the contour in SI by name."""
         values = np.array(self._in_si(unknowns)).ravel()
         return {v.name: float(value) for v, value in zip(self._rows.chosen, values, strict=True)}
 
     def scaled_values(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return values in SI as this program scales them, those that it knows.
-
-        Parameters
-        ----------
-        values
-            In SI by name.
-        """
+        """Return values in SI as this program scales them, those that it knows."""
         return {v.name: self._rows.scaled(v, values[v.name]) for v in self._rows.chosen if v.name in values}
 
     @cached_property
@@ -178,27 +140,13 @@ _KEPT = 1e-6
 
 
 class SoftenedProgram:
-    """The program of one structure with limits that give.
-
-    Parameters
-    ----------
-    rows
-        Of the program.
-    """
+    """The program of one structure with limits that give."""
 
     def __init__(self, rows: ProgramRows) -> None:
         self._rows = rows
 
     def conflict(self, question: CamQuestion, begin: Array) -> SearchOutcome:
-        """Find out whether any cam keeps all limits, and which are in conflict where none does.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        begin
-            Unknowns.
-        """
+        """Find out whether any cam keeps all limits, and which are in conflict where none does."""
         rows = self._rows
         count = len(rows.bounds)
         if not count:
@@ -313,13 +261,7 @@ class ParametricProgram:
         _ = self._cold, self._warm, self._again
 
     def from_starts(self, question: CamQuestion) -> SearchOutcome:
-        """Return the best solution from the starts that are always taken.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        """
+        """Return the best solution from the starts that are always taken."""
         best: SearchOutcome | None = None
         problem = self.rows.problem
         for start in starts(_STARTS, 1, []):
@@ -338,41 +280,15 @@ class ParametricProgram:
         return best
 
     def beside(self, question: CamQuestion, last: SearchPoint) -> SearchOutcome:
-        """Return the solution beside the last one.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        last
-            Of this program.
-        """
+        """Return the solution beside the last one."""
         return self._solved(self._warm, question, last)
 
     def from_point(self, question: CamQuestion, point: SearchPoint, room: Array | float) -> SearchOutcome:
-        """Return the solution from unknowns that keep all limits, as far as they do there.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        point
-            Of this program.
-        room
-            What each limit gave there, of the size that counts as kept.
-        """
+        """Return the solution from unknowns that keep all limits, as far as they do there."""
         return self._solved(self._cold, question, point, room)
 
     def from_values(self, question: CamQuestion, values: Mapping[str, float]) -> SearchOutcome:
-        """Return the solution from scaled values of another program or design.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        values
-            By name.
-        """
+        """Return the solution from scaled values of another program or design."""
         point = SearchPoint(self.rows.completed(question, values))
         return self._solved(self._again, question, point)
 

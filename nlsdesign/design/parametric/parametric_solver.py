@@ -181,13 +181,7 @@ class ParametricSolver:
         self._contradicted: ParametricProgram | None = None
 
     def program(self, question: CamQuestion) -> ParametricProgram:
-        """Return the program of a question, made where there is none yet.
-
-        Parameters
-        ----------
-        question
-            Any.
-        """
+        """Return the program of a question, made where there is none yet."""
         key = structure_of(question)
         if key not in self._programs or not self._programs[key].rows.fits(question):
             self._programs[key] = ParametricProgram(question)
@@ -198,13 +192,7 @@ class ParametricSolver:
         return self._programs[key]
 
     def keeps(self, design: ParametricDesign) -> bool:
-        """Tell whether the program of a design is still kept.
-
-        Parameters
-        ----------
-        design
-            Of this session.
-        """
+        """Tell whether the program of a design is still kept."""
         return any(each is design.program for each in self._programs.values())
 
     def answer(
@@ -212,14 +200,7 @@ class ParametricSolver:
     ) -> tuple[ParametricDesign | None, SearchOutcome]:
         """Return the design for a question, and how it was come by.
 
-        Parameters
-        ----------
-        question
-            Any.
-        last
-            The last good design, to begin beside.
-        values
-            Its numbers in SI by name, where its program is not kept; empty where there is no design.
+        ``values``: its numbers in SI by name, where its program is not kept; empty where there is no design.
         """
         program = self.program(question)
         begin = _Beginning(program, question, values if last is None else last.numbers.values)
@@ -246,27 +227,11 @@ class ParametricSolver:
         return ParametricDesign(program, question, outcome.point, outcome.cost), outcome
 
     def beside_design(self, question: CamQuestion, design: CamDesign) -> ParametricDesign | None:
-        """Return the quick design at a finished one, for the next drag to begin from.
-
-        Parameters
-        ----------
-        question
-            That both answer.
-        design
-            Finished.
-        """
+        """Return the quick design at a finished one, for the next drag to begin from."""
         return self.beside_values(question, values_of_design(self.program(question), design))
 
     def beside_values(self, question: CamQuestion, values: dict[str, float]) -> ParametricDesign | None:
-        """Return the quick design at numbers of another; ``None`` where there is none.
-
-        Parameters
-        ----------
-        question
-            Any.
-        values
-            In SI by name.
-        """
+        """Return the quick design at numbers of another; ``None`` where there is none."""
         program = self.program(question)
         outcome = program.from_values(question, program.outputs.scaled_values(values))
         if outcome.state != "solved" or outcome.point is None:
@@ -288,17 +253,7 @@ class ParametricSolver:
 
 @dataclass(frozen=True, eq=False)
 class _Beginning:
-    """Where a search begins; computed where it is asked for, which most drags do not.
-
-    Parameters
-    ----------
-    program
-        Of the question.
-    question
-        That is asked.
-    numbers
-        Of the last good design in SI by name; empty where there is none.
-    """
+    """Where a search begins; computed where it is asked for, which most drags do not."""
 
     program: ParametricProgram
     question: CamQuestion
@@ -328,15 +283,7 @@ def _unlimited(question: CamQuestion) -> str:
 
 
 def values_of_design(program: ParametricProgram, design: CamDesign) -> dict[str, float]:
-    """Return the variables of a finished design in SI by name.
-
-    Parameters
-    ----------
-    program
-        Of the question.
-    design
-        Finished.
-    """
+    """Return the variables of a finished design in SI by name."""
     values = {name: given.number for name, given in design.changes if len(given.values) == 1}
     problem, contour = program.rows.problem, design.contour
     if problem.contour is None:

@@ -10,7 +10,7 @@ import numpy as np
 from nlsdesign.design.optimisation.limit_kinds import LIMIT_KINDS
 from nlsdesign.design.parametric.parametric_program import SoftenedProgram
 from nlsdesign.design.parametric.program_rows import ProgramRows
-from nlsdesign.live import gallery_question
+from nlsdesign.live.gallery import gallery_question
 
 
 def test_a_slack_widens_its_limit_and_no_other() -> None:

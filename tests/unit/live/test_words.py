@@ -10,9 +10,11 @@ import pytest
 
 from nlsdesign.design.optimisation.defaults import StrainEnd
 from nlsdesign.design.optimisation.limit_kinds import LIMIT_KINDS
-from nlsdesign.live import FreeNumber, HoldNumber, LiveQuestion, gallery_question
 from nlsdesign.live.answers import LimitMargin, LiveColumn
+from nlsdesign.live.edits import FreeNumber, HoldNumber
+from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.limit_words import holding, in_words
+from nlsdesign.live.question import LiveQuestion
 from nlsdesign.live.stretch import smallest, stretched_beyond
 from nlsdesign.live.views import not_kept
 
