@@ -12,7 +12,7 @@ from types import ModuleType
 
 from ....foundation.errors import ArrangementError, unknown_name
 from ....foundation.extensions import extension_modules
-from .candidate import Candidate, EffectFunction, Unknown, wrapped
+from .candidate import Candidate, Unknown
 from .effect import Edit, Effect, Form, Ranked, ranked
 
 
@@ -59,11 +59,9 @@ __all__ = [
     "Candidate",
     "Edit",
     "Effect",
-    "EffectFunction",
     "Form",
     "Ranked",
     "Unknown",
     "catalogue",
     "ranked",
-    "wrapped",
 ]

@@ -83,10 +83,7 @@ class Effect:
     def __call__(self, assembly: Assembly) -> Sequence[Candidate]:
         """Return one candidate for each form, place and edit.
 
-        Parameters
-        ----------
-        assembly
-            As declared; a place that has the phenomenon already is left out.
+        ``assembly``: as declared; a place that has the phenomenon already is left out.
         """
         return [
             Candidate(
@@ -125,13 +122,7 @@ class Ranked:
         object.__setattr__(self, "__name__", self.function.__name__)
 
     def __call__(self, assembly: Assembly) -> Sequence[Candidate]:
-        """Return what the function does.
-
-        Parameters
-        ----------
-        assembly
-            As declared.
-        """
+        """Return what the function does."""
         return self.function(assembly)
 
 

@@ -61,10 +61,7 @@ def _domain(cell: Sensor) -> Domain:
 def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell or torque transducer whose reading comes late.
 
-    Parameters
-    ----------
-    assembly
-        As declared; load cells behind or before a delay are left out.
+    ``assembly``: as declared; load cells behind or before a delay are left out.
     """
     candidates = []
     for name, sensor in _sensors_without(assembly, _CELLS, TransportDelay, ClockDrift).items():
@@ -86,13 +83,7 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
 
 @ranked(140)
 def force_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
-    """A load cell or torque transducer whose zero is off.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """A load cell or torque transducer whose zero is off."""
     return [
         Candidate(
             "force_sensor_bias",
@@ -109,13 +100,7 @@ def force_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
 
 @ranked(150)
 def force_sensor_gain(assembly: Assembly) -> Sequence[Candidate]:
-    """A load cell or torque transducer that reads too much or too little in proportion.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """A load cell or torque transducer that reads too much or too little in proportion."""
     return [
         Candidate(
             "force_sensor_gain",
@@ -132,13 +117,7 @@ def force_sensor_gain(assembly: Assembly) -> Sequence[Candidate]:
 
 @ranked(70)
 def current_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
-    """An ammeter whose zero is off, or a constant torque on the body that the current drives.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """An ammeter whose zero is off, or a constant torque on the body that the current drives."""
     return [
         Candidate(
             "current_sensor_bias",
@@ -157,10 +136,7 @@ def current_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
 def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
     """An encoder whose disc sits off its shaft, on the shaft that is read or on the motor in front of a gear.
 
-    Parameters
-    ----------
-    assembly
-        As declared; encoders behind or before an eccentric disc are left out.
+    ``assembly``: as declared; encoders behind or before an eccentric disc are left out.
     """
     candidates = []
     for name, sensor in _sensors_without(assembly, (Encoder,), Eccentricity).items():
@@ -198,10 +174,7 @@ def _disc_orders(assembly: Assembly, measured: str) -> list[Quantity]:
 def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell or torque transducer whose zero wanders from the start of each record.
 
-    Parameters
-    ----------
-    assembly
-        As declared; load cells behind or before a drift are left out.
+    ``assembly``: as declared; load cells behind or before a drift are left out.
     """
     candidates = []
     for name, sensor in _sensors_without(assembly, _CELLS, Drift).items():
@@ -225,10 +198,7 @@ def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
 def force_sensor_nonlinearity(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell or torque transducer whose gain changes with the load.
 
-    Parameters
-    ----------
-    assembly
-        As declared; cells behind or before a nonlinearity are left out.
+    ``assembly``: as declared; cells behind or before a nonlinearity are left out.
     """
     candidates = []
     for name, sensor in _sensors_without(assembly, _CELLS, LoadNonlinearity).items():
@@ -255,10 +225,7 @@ def clock_drift(assembly: Assembly) -> Sequence[Candidate]:
     Encoders keep the time: a shift of all others is a shift of them. Where a reading is delayed already,
     records show the sum of both alone.
 
-    Parameters
-    ----------
-    assembly
-        As declared; instruments behind or before a delay or a drift of the clock are left out.
+    ``assembly``: as declared; instruments behind or before a delay or a drift of the clock are left out.
     """
     candidates = []
     kinds = (*_CELLS, CurrentSensor)
