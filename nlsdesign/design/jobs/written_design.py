@@ -149,7 +149,13 @@ def write_part(
 
 
 def design_summary(design: CamDesign) -> dict[str, Any]:
-    """Return the result of a design in numbers that JSON can hold, rounded to what they are good for."""
+    """Return the result of a design in numbers that JSON can hold, rounded to what they are good for.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    """
     spread = {}
     if design.tolerance is not None:
         spread = {f"{100 * q.share:g} %": _rounded(q.value) for q in design.tolerance.quantiles}
