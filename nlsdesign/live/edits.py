@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
-from ..design.optimisation.limit_kinds import LIMIT_KINDS
+from ..design.optimisation.limit_kinds import limit_kinds
 from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
@@ -140,9 +140,9 @@ class ChangeLimit(LiveEdit):
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with that limit."""
-        if self.limit not in LIMIT_KINDS:
-            raise unknown_name("limit", self.limit, LIMIT_KINDS)
-        kind = LIMIT_KINDS[self.limit]
+        if self.limit not in limit_kinds():
+            raise unknown_name("limit", self.limit, limit_kinds())
+        kind = limit_kinds()[self.limit]
         value = finite_in(kind.title, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
         try:
             kind.limit(value)

@@ -14,7 +14,7 @@ import numpy as np
 from ..components.assembly.deck_writer import deck_text, declare
 from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_of
 from ..design.curves.numbers import plain
-from ..design.optimisation.limit_kinds import LIMIT_KINDS
+from ..design.optimisation.limit_kinds import limit_kinds
 from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, ValueRangeError
@@ -59,8 +59,8 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
     angles, torques = (json.dumps([float(v) for v in row]) for row in rows)
     lines += [f"TabulatedTorque = {{angles = {angles}, torques = {torques}}}", "", "[limits]"]
     for name, value in question.limits.items():
-        kind = LIMIT_KINDS[name]
-        lines.append(f'{name} = {{{kind.field} = "{float(value)!r} {kind.unit}"}}')
+        kind = limit_kinds()[name]
+        lines.append(f'{name} = {{{kind.described.field} = "{float(value)!r} {kind.unit}"}}')
     ranges = [
         f'{{name = {json.dumps(name)}, minimum = "{float(low)!r} {question.numbers[name].unit}", '
         f'maximum = "{float(high)!r} {question.numbers[name].unit}"}}'
@@ -161,12 +161,12 @@ def _limits_of(keep: tuple[Any, ...]) -> tuple[dict[str, float], dict[str, tuple
         name = type(limit).__name__
         if isinstance(limit, NumberRange):
             ranges[limit.name] = (plain(limit.minimum), plain(limit.maximum))
-        elif name in LIMIT_KINDS and name not in limits:
-            limits[name] = LIMIT_KINDS[name].value_of(limit)
+        elif name in limit_kinds() and name not in limits:
+            limits[name] = limit_kinds()[name].value_of(limit)
         else:
             raise ValueRangeError(
                 f"{_JOB}: limit {name}", "is twice there, or is none of the live design",
-                next_step=f"those are: {', '.join([*LIMIT_KINDS, 'NumberRange'])}",
+                next_step=f"those are: {', '.join([*limit_kinds(), 'NumberRange'])}",
             )  # fmt: skip
     return limits, ranges
 

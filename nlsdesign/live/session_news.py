@@ -9,7 +9,7 @@ from typing import Any
 
 from ..components.materials.library import materials
 from ..components.materials.material_law import missing_law
-from ..design.optimisation.limit_kinds import LIMIT_KINDS
+from ..design.optimisation.limit_kinds import limit_kinds
 from ..foundation.errors import NlsError
 from .answers import LiveAnswer, to_json
 from .gallery import gallery_cards
@@ -145,7 +145,7 @@ def choices() -> dict[str, Any]:
     """Return what a page lets choose from: actuators, rubbers, limits."""
     kinds = [
         {"name": each.name, "words": each.words, "unit": each.unit, "upper": each.upper}
-        for each in LIMIT_KINDS.values()
+        for each in limit_kinds().values()
     ]
     return {
         "cards": [to_json(each) for each in gallery_cards()],

@@ -7,15 +7,7 @@ from dataclasses import dataclass
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import parse_unit, with_unit
 from ..curves.numbers import plain
-from .limits import (
-    Limit,
-    MaximumCableTension,
-    MaximumCamRadius,
-    MaximumStrain,
-    MaximumStress,
-    MinimumRadiusOfCurvature,
-    PositiveStiffness,
-)
+from .limits import Limit, OneNumber
 
 
 @dataclass(frozen=True)
@@ -26,25 +18,37 @@ class LimitKind:
     ----------
     kind
         Its class.
-    field
-        In which the number stands.
-    words
-        What is limited.
-    unit, shown_unit
-        SI unit, and that in which people read it.
-    upper
-        Whether the number is the largest that is allowed, or the least.
-    of_shape
-        Whether the contour alone decides it.
+    described
+        What the class says of its number.
     """
 
     kind: type[Limit]
-    field: str
-    words: str
-    unit: str
-    shown_unit: str
-    upper: bool
-    of_shape: bool = False
+    described: OneNumber
+
+    @property
+    def words(self) -> str:
+        """What is limited."""
+        return self.described.words
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the number."""
+        return self.described.unit
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit in which people read it."""
+        return self.described.shown_unit
+
+    @property
+    def upper(self) -> bool:
+        """Whether the number is the largest that is allowed, or the least."""
+        return self.described.upper
+
+    @property
+    def of_shape(self) -> bool:
+        """Whether the contour alone decides it."""
+        return self.described.of_shape
 
     @property
     def name(self) -> str:
@@ -71,20 +75,20 @@ class LimitKind:
         """Return the limit."""
         if not abs(value) < float("inf"):
             raise ValueRangeError(f"{self.title} = {value:g}", "is no finite number")
-        return self.kind(**{self.field: value})
+        return self.kind(**{self.described.field: value})
 
     def value_of(self, limit: Limit) -> float:
         """Return the number of a limit of this kind in SI: what is allowed, with its safety factor."""
-        return plain(getattr(limit, self.field)) / float(getattr(limit, "safety_factor", 1.0))
+        return plain(getattr(limit, self.described.field)) / float(getattr(limit, "safety_factor", 1.0))
 
 
-_ALL = (
-    LimitKind(MinimumRadiusOfCurvature, "radius", "radius of curvature", "m", "mm", False, True),
-    LimitKind(MaximumCamRadius, "radius", "cam radius", "m", "mm", True, True),
-    LimitKind(MaximumStrain, "strain", "strain of the rubber", "1", "%", True),
-    LimitKind(MaximumStress, "stress", "nominal stress of the rubber", "Pa", "MPa", True),
-    LimitKind(MaximumCableTension, "tension", "tension of a cable", "N", "N", True),
-    LimitKind(PositiveStiffness, "minimum", "slope of the torque", "N*m/rad", "N*m/rad", False),
-)
-LIMIT_KINDS: dict[str, LimitKind] = {each.name: each for each in _ALL}
-"""The limits with one number, by name."""
+def limit_kinds() -> dict[str, LimitKind]:
+    """Return the limits with one number by name, those of other packages that are loaded among them."""
+    known: dict[str, LimitKind] = {}
+    classes = list(Limit.__subclasses__())
+    while classes:
+        kind = classes.pop(0)
+        if kind.described is not None:
+            known[kind.__name__] = LimitKind(kind, kind.described)
+        classes += kind.__subclasses__()
+    return known

@@ -14,7 +14,7 @@ from ...model.roles import series_cam
 from ...model.structure import CamNames
 from ..curves.target import TabulatedTorque
 from ..optimisation.defaults import StrainEnd, safe_limits, strain_ends
-from ..optimisation.limit_kinds import LIMIT_KINDS, LimitKind
+from ..optimisation.limit_kinds import LimitKind, limit_kinds
 from ..optimisation.limits import Limit, NumberRange
 from ..statics.contour import Contour
 from ..statics.declared_cam import with_contour
@@ -101,7 +101,7 @@ class ChosenMachine:
     @cached_property
     def default_limits(self) -> dict[str, float]:
         """Limits that follow from cable and rubber, in SI, by name of their kind."""
-        kinds = [(LIMIT_KINDS[type(each).__name__], each) for each in safe_limits(self.model)]
+        kinds = [(limit_kinds()[type(each).__name__], each) for each in safe_limits(self.model)]
         return {kind.name: kind.value_of(each) for kind, each in kinds}
 
 
@@ -168,9 +168,9 @@ class CamQuestion:
     @cached_property
     def limit_values(self) -> dict[str, LimitNumber]:
         """All limits that hold by name: those that were set, and those of the machine besides."""
-        result = {name: LimitNumber(LIMIT_KINDS[name], value, False) for name, value in self.limits.items()}
+        result = {name: LimitNumber(limit_kinds()[name], value, False) for name, value in self.limits.items()}
         for name, value in self.machine.default_limits.items():
-            result.setdefault(name, LimitNumber(LIMIT_KINDS[name], value, True))
+            result.setdefault(name, LimitNumber(limit_kinds()[name], value, True))
         return dict(sorted(result.items()))
 
     @property
@@ -195,7 +195,7 @@ class CamQuestion:
 
         ``limit``: name of its class; ranges of free numbers are always kept.
         """
-        kind = LIMIT_KINDS.get(limit)
+        kind = limit_kinds().get(limit)
         return kind is None or self.contour in self.free or not kind.of_shape
 
     @cached_property

@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
-from ..optimisation.limit_kinds import LIMIT_KINDS
+from ..optimisation.limit_kinds import limit_kinds
 from ..optimisation.program import PROVED_INFEASIBLE
 from ..optimisation.starts import start_values, starts
 from .cam_question import CamQuestion
@@ -198,7 +198,7 @@ class SoftenedProgram:
 
     def _words(self, question: CamQuestion, involved: Sequence[int], gives: Array) -> str:
         bounds = self._rows.bounds
-        kinds = [LIMIT_KINDS[name] for name in dict.fromkeys(bounds[i].limit for i in involved)]
+        kinds = [limit_kinds()[name] for name in dict.fromkeys(bounds[i].limit for i in involved)]
         rule = "contradict each other" if len(kinds) > 1 else "cannot be kept with what is free"
         limits, values = question.limit_values, self._rows.values_of(question)
         needed = []
@@ -206,7 +206,7 @@ class SoftenedProgram:
             bound, give = bounds[i], float(gives[i] * self._rows.scales[i])
             if gives[i] > _KEPT:
                 moved = values[i] + give if bound.upper else values[i] - give
-                kind = LIMIT_KINDS[bound.limit]
+                kind = limit_kinds()[bound.limit]
                 needed.append(f"{kind.title} from {kind.shown(values[i])} to about {kind.shown(moved)}")
         names = [f"{kind.title} ({kind.shown(limits[kind.name].value)})" for kind in kinds]
         words = f"{' and '.join(names)} {rule}"

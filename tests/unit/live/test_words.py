@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.design.optimisation.defaults import StrainEnd
-from nlsdesign.design.optimisation.limit_kinds import LIMIT_KINDS
+from nlsdesign.design.optimisation.limit_kinds import limit_kinds
 from nlsdesign.live.answers import LimitMargin, LiveColumn
 from nlsdesign.live.edits import FreeNumber, HoldNumber
 from nlsdesign.live.gallery import gallery_question
@@ -51,7 +51,7 @@ def test_a_limit_is_called_what_it_limits(question: LiveQuestion, sentence: str,
 
 
 def margin(limit: str, of: str, bound: float, *, active: bool = True) -> LimitMargin:
-    kind = LIMIT_KINDS[limit]
+    kind = limit_kinds()[limit]
     return LimitMargin(limit, of, bound, bound, 0.0, kind.unit, kind.unit, kind.upper, active)
 
 
