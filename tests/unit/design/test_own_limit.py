@@ -11,7 +11,7 @@ ASKED = """
 import sys
 from nlsdesign.foundation.extensions import load_extension
 from nlsdesign.live.edits import ChangeLimit
-from nlsdesign.live import gallery_question
+from nlsdesign.live.gallery import gallery_question
 
 load_extension(sys.argv[1])
 question = gallery_question("cam-actuator")
@@ -29,8 +29,8 @@ def test_the_page_on_a_limit_of_ones_own(root: Path, tmp_path: Path) -> None:
     (tmp_path / "my_limits.py").write_text(block, encoding="utf-8")
 
     def python(*words: str) -> str:
-        done = subprocess.run([sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, check=True)
-        return done.stdout
+        command = [sys.executable, *words]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
 
     listed = python("-m", "nlsdesign", "--with", "my_limits.py", "design", "--list", "limits")
     assert "LeastContourRadius" in listed
