@@ -13,11 +13,10 @@ import click
 from ..foundation.errors import ExportError, ValueRangeError
 from ..foundation.prefixes import prefixed
 from ..foundation.quantity import typeset_unit
-from .observer_kinds import DesignedObserver, designed_observer
 from .units import Bytes, Number
 
 if TYPE_CHECKING:
-    from ..feedback.observer import GridByTorqueError
+    from ..feedback.observer import DesignedObserver, GridByTorqueError
     from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
     from ..model import FlatModel
 
@@ -110,7 +109,7 @@ def sized_observer(
     part_of
         Makes what is exported of the observer; by default that is the observer alone.
     chosen
-        Kind, spring and measured state, as for :func:`~nlsdesign.cli.observer_kinds.designed_observer`.
+        Kind, spring and measured state, as for :func:`~nlsdesign.feedback.observer.designed_observer`.
 
     Raises
     ------
@@ -119,6 +118,7 @@ def sized_observer(
     ExportError
         If a size is asked for and no compiler is installed.
     """
+    from ..feedback.observer import designed_observer
     from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
 
     each = 4 if real == "float" else 8

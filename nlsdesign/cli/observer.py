@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .observer_certificate import CERTIFICATE, range_options
-from .observer_kinds import CASCADE, CERTIFIED, designed_observer, kind_option
+from .observer_kinds import CASCADE, CERTIFIED, kind_option
 from .output import DECK_HELP, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
 from .range_remarks import range_remarks, warn
@@ -77,13 +77,13 @@ def observer(
     if deck_name is None:
         raise click.MissingParameter(ctx=context, param_type="option", param_hint="'--deck'")
     from ..components.assembly.deck_writer import declare
-    from ..export import export_c
-    from ..feedback.observer import certified_design
+    from ..export import export_c, quickest
+    from ..feedback.observer import certified_design, designed_observer, errors_beside
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from .observer_certificate import prove
-    from .observer_spread import content_of, show_errors, spread_errors, write_errors
+    from .observer_spread import show_errors, write_errors
 
     drawn = context.get_parameter_source("draws") is not click.core.ParameterSource.DEFAULT
     if drawn and not options["with_errors"]:
@@ -101,7 +101,9 @@ def observer(
     errors = None
     if options["with_errors"]:
         with steps.step("errors over the spread"):
-            errors = spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
+            errors = errors_beside(
+                plant, chosen, draws=options["draws"], sample_time=sample_time, translate=quickest(), **roles
+            )
     model = chosen.model if proved is None else proved.stated(certified_design(proved, plant).model)
     source = export_c(model, out, real=real, name="observer")
     files = [source.header, source.source, source.selftest]
@@ -119,7 +121,7 @@ def observer(
             "description": model.description, "statement": list(statement),
             "certified": proved is not None, "warnings": remarks, "files": files,
         }  # fmt: skip
-        show_json(content | ({} if errors is None else {"errors": content_of(errors)}))
+        show_json(content | ({} if errors is None else {"errors": errors.content()}))
         return
     for sentence in words:
         click.echo(sentence)

@@ -16,10 +16,9 @@ from .output import examples, json_option, show_json
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..feedback.observer import Certificate, Contraction
+    from ..feedback.observer import Certificate, Contraction, DesignedObserver
     from ..foundation.deck import Deck
     from ..model import FlatModel
-    from .observer_kinds import DesignedObserver
 
 CERTIFICATE = "certificate.json"
 """File that is announced; the library is not loaded for it."""

@@ -3,6 +3,7 @@
 from .closed_loop import ClosedLoop, encoder_loop, joined
 from .evaluation.linear_loop import LinearLoop, linear_loop
 from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
+from .evaluation.loop_evaluation import LoopEvaluation, LoopRange, evaluate_loop
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .evaluation.margins import (
     CoupledStability,
@@ -57,10 +58,12 @@ __all__ = [
     "LimitCycleOnset",
     "LinearLoop",
     "LoopChoice",
+    "LoopEvaluation",
     "LoopJudge",
     "LoopLimits",
     "LoopMargins",
     "LoopNames",
+    "LoopRange",
     "LoopSpread",
     "LoopVerdict",
     "OutputImpedance",
@@ -84,6 +87,7 @@ __all__ = [
     "check_torque",
     "coupled_stability",
     "encoder_loop",
+    "evaluate_loop",
     "held_torque",
     "joined",
     "largest_gain",
