@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from .observer_certificate import CERTIFICATE, range_options
+from .observer_certificate import CERTIFICATE, given_ranges, range_options
 from .observer_kinds import CASCADE, CERTIFIED, kind_option
 from .output import DECK_HELP, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
 from .range_remarks import range_remarks, warn
 from .units import Number
-
-if TYPE_CHECKING:
-    from .observer_certificate import ToProve
 
 sample_time_option = click.option(
     "--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
@@ -82,7 +79,6 @@ def observer(
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
-    from .observer_certificate import prove
     from .observer_spread import show_errors, write_errors
 
     drawn = context.get_parameter_source("draws") is not click.core.ParameterSource.DEFAULT
@@ -97,7 +93,8 @@ def observer(
     steps = Steps()
     with steps.step("observer"):
         chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
-        proved = None if wanted is None else prove(plant, deck, chosen, wanted)
+        text = (deck.name, deck.path.read_text(encoding="utf-8-sig"))
+        proved = None if wanted is None else chosen.certify(plant, deck=text, **wanted)
     errors = None
     if options["with_errors"]:
         with steps.step("errors over the spread"):
@@ -134,10 +131,10 @@ def observer(
     click.echo(f"written: {', '.join(map(str, files))}")
 
 
-def _what_is_asked(context: click.Context, options: dict[str, Any]) -> tuple[str | None, ToProve | None]:
+def _what_is_asked(
+    context: click.Context, options: dict[str, Any]
+) -> tuple[str | None, dict[str, Any] | None]:
     """Return the kind of observer, and what is to be proved of it; nothing by default."""
-    from .observer_certificate import ToProve, given_ranges
-
     ranges = given_ranges(options)
     kind, decay, with_spread = options["kind"], options["decay"], options["with_spread"]
     if not (options["certified"] or kind == CERTIFIED):
@@ -153,7 +150,7 @@ def _what_is_asked(context: click.Context, options: dict[str, Any]) -> tuple[str
     if decay is not None and kind == CASCADE:
         raise click.UsageError(f"--decay belongs to --kind {CERTIFIED}", ctx=context)
     kind = kind or (CASCADE if decay is None else CERTIFIED)
-    return kind, ToProve(decay, with_spread, options["real"], ranges)
+    return kind, {"decay": decay, "with_spread": with_spread, "real": options["real"], "ranges": ranges}
 
 
 def _refuse_misplaced(context: click.Context) -> None:

@@ -6,7 +6,7 @@ Beside it stands what the best estimator could reach on the bench, from what is 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,7 +25,9 @@ from ...analysis.rest_points import rest_points
 from ..adaptive.adaptive_observer import SPREAD, AdaptiveDesign, design_adaptive_observer, encoder_quantum
 from ..adaptive.duty_and_directions import AdaptiveSettings
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
+from ..certificates.certificate import Certificate
 from ..certificates.co_design import CertifiedGain
+from ..certificates.contraction import Contraction, certify, declared_assumptions
 from ..scheduling.angle_form import PaperForm, StateForm
 from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details, whole_contour
 from ..scheduling.step import CascadeGain, FittedGain, GainRule, SteadyStateKalman
@@ -172,6 +174,47 @@ class DesignedObserver:
         model = self.design.model
         text = "; ".join(filter(None, (model.description, self.reason, "not certified")))
         return replace(model, description=text)
+
+    def certify(
+        self,
+        plant: FlatModel,
+        *,
+        deck: tuple[str, str] = ("", ""),
+        decay: float | None = None,
+        with_spread: bool = False,
+        real: str = "double",
+        ranges: Mapping[str, Any] | None = None,
+    ) -> Certificate[Contraction]:
+        """Prove what can be proved of the observer.
+
+        Parameters
+        ----------
+        plant
+            Flat model of the actuator.
+        deck
+            Name and text of its deck.
+        decay
+            To be proved, in 1/s; 98 % of the fastest that can be by default.
+        with_spread
+            Whether parameters may be anywhere within their spread.
+        real
+            ``"double"`` or ``"float"``, of the C code.
+        ranges
+            Angles, speed and error of the angle by name, where they are not those that the deck declares.
+
+        Raises
+        ------
+        ArrangementError
+            If observers of that kind cannot be certified.
+        """
+        if not isinstance(self.design, ObserverDesign):
+            raise ArrangementError(
+                f"observer of kind '{self.kind}'", "cannot be certified", next_step="take --kind certified"
+            )
+        spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if with_spread else {}
+        declared = declared_assumptions(plant, self.design)
+        assumed = replace(declared, spreads=spreads, real=real, **(ranges or {}))
+        return certify(plant, self.design, assumptions=assumed, decay=decay, deck=deck)
 
 
 def designed_observer(
