@@ -162,7 +162,7 @@ def _written(result: LoopEvaluation, out: Path) -> list[Path]:
 def _shown(result: LoopEvaluation) -> None:
     import numpy as np
 
-    from ..feedback.control.evaluation.loop_evaluation import BIAS
+    from ..feedback.control.evaluation.whole_evaluation import BIAS
 
     rows = [
         [

@@ -3,7 +3,6 @@
 from .closed_loop import ClosedLoop, encoder_loop, joined
 from .evaluation.linear_loop import LinearLoop, linear_loop
 from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
-from .evaluation.loop_evaluation import LoopEvaluation, LoopRange, evaluate_loop
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .evaluation.margins import (
     CoupledStability,
@@ -35,6 +34,7 @@ from .evaluation.responses import (
     tracking,
     zero_torque,
 )
+from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, evaluate_loop
 from .laws.known_drive import TorqueLimit, check_torque, largest_torque, only_side, torque_limit
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
 from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
