@@ -20,10 +20,7 @@ CERTIFICATE = "certificate.json"
 def range_options(command: Any) -> Any:
     """Add the options for the ranges over which a bound on the torque is to hold.
 
-    Parameters
-    ----------
-    command
-        Gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
+    ``command``: gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
     """
     for option in (
         click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
@@ -37,13 +34,7 @@ def range_options(command: Any) -> Any:
 
 
 def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ranges that were given.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    """
+    """Return the ranges that were given."""
     named = {name: options[name] for name in ("angles", "speed", "angle_error")}
     return {name: value for name, value in named.items() if value is not None}
 

@@ -25,18 +25,7 @@ def write_errors(
 ) -> list[Path]:
     """Write the errors as table, JSON, figure and page.
 
-    Parameters
-    ----------
-    errors
-        Of the observers.
-    out
-        Folder.
-    model
-        The observer.
-    words
-        What is said of it.
-    files
-        Written before; the page lists them too.
+    ``files``: written before; the page lists them too.
     """
     from ..presentation import figures
     from ..presentation.report import write_observer_report
@@ -50,17 +39,7 @@ def write_errors(
 
 
 def show_errors(errors: SpreadErrors, kind: str, deck_name: str) -> None:
-    """Print both tables, and where the way goes on.
-
-    Parameters
-    ----------
-    errors
-        Of the observers.
-    kind
-        Whose causes are ranked.
-    deck_name
-        As the command was given it.
-    """
+    """Print both tables, and where the way goes on."""
     unit, causes = typeset_unit(errors.unit), errors.ranked_causes(kind)[:CAUSES]
     factor, shown = shared_prefix([size for _, size in causes], errors.unit)
     title = (
