@@ -81,7 +81,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
     "feedback.observer": ({"scheduling"}, {"certificates", "adaptive"}, {"spread"}),
     "feedback.control": ({"laws"}, {"closed_loop"}, {"evaluation"}, {"tuning"}),
-    "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "target", "modelica"}, {"ssp"}),
+    "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "modelica"}),
 }  # fmt: skip
 
 # library: the only places that may know it

@@ -21,7 +21,7 @@ from typing import Any
 from ..components.assembly.deck_writer import deck_digest, declare
 from ..export.c.provenance import SHORT, stamp_of
 from ..export.files import BROKEN_ARCHIVE
-from ..export.fmi.fmu_origin import ORIGIN_FILE, ORIGIN_FORMAT
+from ..export.fmi.authorship import ORIGIN_FILE, ORIGIN_FORMAT
 from ..foundation.deck import read_deck
 from ..foundation.errors import ExportError, NlsError
 from ..model.derived_deck import digits_in_name

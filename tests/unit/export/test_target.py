@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from nlsdesign.export import export_c
+from nlsdesign.export.compilation import target_run
+from nlsdesign.export.compilation import target_run as emulator
 from nlsdesign.export.compilation.cross_compiler import run_compiler
-from nlsdesign.export.target import emulator, target_run
-from nlsdesign.export.target.elf_file import SectionSizes, section_sizes
-from nlsdesign.export.target.emulator import emulated, missing_emulator
-from nlsdesign.export.target.processors import CORTEX_M4F, CORTEX_M7
-from nlsdesign.export.target.target_run import measure_on_target
+from nlsdesign.export.compilation.processors import CORTEX_M4F, CORTEX_M7
+from nlsdesign.export.compilation.target_build import SectionSizes, section_sizes
+from nlsdesign.export.compilation.target_run import emulated, measure_on_target, missing_emulator
 from nlsdesign.foundation.errors import ExportError
 from tests.hand_built import controller, observer
 
