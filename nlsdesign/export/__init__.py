@@ -8,7 +8,7 @@ from .c.programs import write_examples
 from .c.writer import CSource
 from .compilation.compiled_step import CompiledStep, Natively, natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
-from .compilation.processors import CORTEX_M4F, CORTEX_M7, Processor
+from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
 from .compilation.target_run import TargetMeasurement, TargetRun, measure_on_target
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
@@ -25,6 +25,7 @@ __all__ = [
     "CORTEX_M4F",
     "CORTEX_M7",
     "PLATFORMS",
+    "PROCESSORS",
     "Authorship",
     "CSource",
     "CoSimulation",

@@ -14,7 +14,7 @@ from ...model.origin import Origin
 from ..files import filled
 from .authorship import Authorship
 from .fmu_variables import FmuLayout, FmuVariable
-from .model_description import FLANGE, Terminal, terminals
+from .terminals import FLANGE, LOOP, Terminal, terminals
 from .terminals import LOOP
 
 
