@@ -15,7 +15,6 @@ from ..files import filled
 from .authorship import Authorship
 from .fmu_variables import FmuLayout, FmuVariable
 from .terminals import FLANGE, LOOP, Terminal, terminals
-from .terminals import LOOP
 
 
 def page(layout: FmuLayout, authorship: Authorship | None = None) -> str:
