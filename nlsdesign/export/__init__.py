@@ -6,10 +6,10 @@ Presentation and commands may import it; it reads models, and designs nothing.
 from .c.controller_code import export_c
 from .c.programs import write_examples
 from .c.writer import CSource
-from .compilation.compiled_step import CompiledStep, Natively, natively, quickest
-from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
+from .compilation.compiled_step import natively, quickest
+from .compilation.cross_compiler import ALL_PLATFORMS
 from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
-from .compilation.target_run import TargetMeasurement, TargetRun, measure_on_target
+from .compilation.target_run import TargetMeasurement, measure_on_target
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
@@ -24,24 +24,20 @@ __all__ = [
     "ALL_PLATFORMS",
     "CORTEX_M4F",
     "CORTEX_M7",
-    "PLATFORMS",
     "PROCESSORS",
     "Authorship",
     "CSource",
     "CoSimulation",
-    "CompiledStep",
     "Convergence",
     "Extrapolated",
     "FmuSystem",
     "Held",
     "Iterated",
     "Late",
-    "Natively",
     "Processor",
     "SamplesOf",
     "Stepping",
     "TargetMeasurement",
-    "TargetRun",
     "Wire",
     "WrittenSystem",
     "convergence",
@@ -49,7 +45,6 @@ __all__ = [
     "export_c",
     "export_fmu",
     "export_modelica",
-    "host_platform",
     "measure_on_target",
     "natively",
     "quickest",

@@ -24,13 +24,7 @@ _LONGEST = 300
 
 
 def fit_to_show(text: object) -> str:
-    """Return text in one line of printable characters, cut where it is long.
-
-    Parameters
-    ----------
-    text
-        Whatever a file or a library says.
-    """
+    """Return text in one line of printable characters, cut where it is long."""
     whole = str(text)
     line = " ".join("".join(c if c.isprintable() else " " for c in whole[: 4 * _LONGEST]).split())
     return line if len(line) <= _LONGEST else f"{line[:_LONGEST]} ..."
@@ -45,22 +39,7 @@ MOST_BYTES = 2**30
 def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
     """Unpack an archive into a folder.
 
-    Parameters
-    ----------
-    what
-        The archive in messages.
-    archive
-        File.
-    folder
-        New; its owner removes it.
-    needs
-        Entry that must be there.
-
-    Raises
-    ------
-    ExportError
-        If the file is no archive or damaged, lacks the entry, would unpack to more than the limits, or has
-        an entry that is a link, appears twice or leads out of the folder.
+    ``folder``: new; its owner removes it.
     """
     try:
         with zipfile.ZipFile(archive) as opened:
@@ -201,22 +180,7 @@ class FmuDescription:
 
 
 def read_description(instance: str, archive: Path, folder: Path) -> FmuDescription:
-    """Read the description of an FMU that was unpacked.
-
-    Parameters
-    ----------
-    instance
-        Name of the instance, for messages.
-    archive
-        The FMU, for messages.
-    folder
-        Where it was unpacked.
-
-    Raises
-    ------
-    ExportError
-        If it is no valid co-simulation FMU of FMI 2.0 or 3.0, or states no possible sample time.
-    """
+    """Read the description of an FMU that was unpacked."""
     what = f"instance '{instance}' ({archive})"
     try:
         read = fmpy.read_model_description(str(folder))
@@ -241,18 +205,7 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
 
 
 def check_library(description: FmuDescription) -> None:
-    """Check that there is a binary for this machine.
-
-    Parameters
-    ----------
-    description
-        Of the FMU.
-
-    Raises
-    ------
-    ExportError
-        If there is none.
-    """
+    """Check that there is a binary for this machine."""
     if not description.library.is_file():
         place = description.library.parent.relative_to(description.folder).as_posix()
         raise ExportError(

@@ -29,11 +29,6 @@ class LoadedFmu:
         Of the FMU.
     watch
         Told what is called, so that a crash can be explained.
-
-    Raises
-    ------
-    ExportError
-        If its library cannot be loaded or instantiated.
     """
 
     def __init__(self, description: FmuDescription, watch: Watch) -> None:
@@ -95,15 +90,7 @@ class LoadedFmu:
     def explained(
         self, what: str, kind: type[ExportError] | type[ConvergenceError] = ExportError
     ) -> Iterator[None]:
-        """Raise what the FMU refuses within with its own message.
-
-        Parameters
-        ----------
-        what
-            Is done.
-        kind
-            Of the error.
-        """
+        """Raise what the FMU refuses within with its own message."""
         try:
             yield
         except FMICallException as error:
@@ -112,10 +99,7 @@ class LoadedFmu:
     def begin(self, start: float, stop: float | None) -> None:
         """Enter the initialization mode.
 
-        Parameters
-        ----------
-        start, stop
-            Times in s; ``None`` without an end.
+        ``start``, ``stop``: times in s; ``None`` without an end.
         """
         self.watch(self.number, Activity.INITIALIZING)
         with self.explained("initialization"):
@@ -145,15 +129,7 @@ class LoadedFmu:
 
 
 def why(messages: Sequence[str], error: object) -> str:
-    """Return the last message of the FMU, or the error without one, made fit to be shown.
-
-    Parameters
-    ----------
-    messages
-        Of the FMU.
-    error
-        What is said without any.
-    """
+    """Return the last message of the FMU, or the error without one, made fit to be shown."""
     return fit_to_show(messages[-1] if messages else error)
 
 
@@ -171,11 +147,6 @@ class FmuInstance(LoadedFmu):
         Of the FMU.
     watch
         Told what is called, so that a crash can be explained.
-
-    Raises
-    ------
-    ExportError
-        If its library cannot be loaded or instantiated, or lacks a function.
     """
 
     def __init__(self, description: FmuDescription, watch: Watch) -> None:
@@ -186,18 +157,7 @@ class FmuInstance(LoadedFmu):
             raise ExportError(f"instance '{self.name}'", f"could not be made: {error}") from error
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Set variables.
-
-        Parameters
-        ----------
-        values
-            Numbers by name.
-
-        Raises
-        ------
-        ExportError
-            With the message of the FMU if it refuses.
-        """
+        """Set variables."""
         for name, value in values.items():
             variable = self.description.variables[name]
             self.watch(self.number, Activity.SETTING)
@@ -212,12 +172,7 @@ class FmuInstance(LoadedFmu):
     def setter(self, names: Sequence[str], values: Array) -> Callable[[], None]:
         """Return a function that sets real variables to what an array holds when it is called.
 
-        Parameters
-        ----------
-        names
-            Of real variables.
-        values
-            Shape (n,), contiguous; the function reads it.
+        ``values``: shape (n,), contiguous; the function reads it.
         """
         variables = [self.description.variables[name] for name in names]
         call = self._access("fmi2SetReal" if self.two else "fmi3SetFloat64", variables, values.ctypes.data)
@@ -226,12 +181,7 @@ class FmuInstance(LoadedFmu):
     def reader(self, variables: Sequence[FmuScalar], values: Array) -> Callable[[], None]:
         """Return a function that reads variables into an array when it is called.
 
-        Parameters
-        ----------
-        variables
-            Reals first, then integers.
-        values
-            Shape (n,), contiguous; the function writes it.
+        ``values``: shape (n,), contiguous; the function writes it.
         """
         reals = [v for v in variables if v.kind == "real"]
         integers = [v for v in variables if v.kind != "real"]
@@ -294,18 +244,7 @@ class FmuInstance(LoadedFmu):
         return step
 
     def step(self, time: float, length: float) -> None:
-        """Advance by one communication step.
-
-        Parameters
-        ----------
-        time, length
-            Communication point and step in s.
-
-        Raises
-        ------
-        ConvergenceError
-            With the message of the FMU if it cannot.
-        """
+        """Advance by one communication step."""
         self.watch(self.number, _STEPPING)
         status = self._step(time, length)
         if status > _WARNING:
@@ -320,25 +259,13 @@ class FmuInstance(LoadedFmu):
             return self.fmu.getFMUstate() if self.two else self.fmu.getFMUState()
 
     def restore_state(self, state: Any) -> None:
-        """Go back to a state that was kept.
-
-        Parameters
-        ----------
-        state
-            From :meth:`keep_state`.
-        """
+        """Go back to a state that was kept."""
         self.watch(self.number, Activity.ROLLING_BACK)
         with self.explained("going back to an earlier state"):
             (self.fmu.setFMUstate if self.two else self.fmu.setFMUState)(state)
 
     def forget_state(self, state: Any) -> None:
-        """Free a state that was kept.
-
-        Parameters
-        ----------
-        state
-            From :meth:`keep_state`.
-        """
+        """Free a state that was kept."""
         self.watch(self.number, Activity.ROLLING_BACK)
         with self.explained("freeing a state"):
             (self.fmu.freeFMUstate if self.two else self.fmu.freeFMUState)(state)

@@ -25,13 +25,7 @@ _SAME = 1e-9
 
 
 def sample_times(period: float, stop: float) -> Array:
-    """Return the samples of an instance from 0 to the end.
-
-    Parameters
-    ----------
-    period, stop
-        Sample time and end in s.
-    """
+    """Return the samples of an instance from 0 to the end."""
     return np.arange(math.floor(stop / period + 1e-6) + 1.0) * period
 
 
@@ -47,22 +41,6 @@ def communication_points(
 
     What lies between two samples is divided into equal steps no longer than asked for, so step and sample
     times are independent; sample times need not be multiples of each other.
-
-    Parameters
-    ----------
-    stop, step
-        End and longest step in s.
-    periods
-        Sample times in s.
-    changes
-        Sample time and delay in s of sampled values that change an input between samples.
-    parts
-        Parts into which each step is divided once more.
-
-    Raises
-    ------
-    ValueRangeError
-        If there would be too many.
     """
     rhythms = [(period, 0.0) for period in sorted(set(periods))] + sorted(set(changes))
     expected = parts * (stop / step + sum(stop / period for period, _ in rhythms))
@@ -94,13 +72,7 @@ def _merged(times: Array, stop: float, same: float) -> Array:
 
 
 def rows_of(points: Array, times: Array) -> NDArray[np.int64]:
-    """Return the numbers of the points that are nearest to times.
-
-    Parameters
-    ----------
-    points, times
-        In s, ascending.
-    """
+    """Return the numbers of the points that are nearest to times."""
     after = np.clip(np.searchsorted(points, times), 1, max(1, len(points) - 1))
     nearer = np.abs(points[after - 1] - times) <= np.abs(points[np.minimum(after, len(points) - 1)] - times)
     return np.where(nearer, after - 1, np.minimum(after, len(points) - 1))
@@ -146,25 +118,7 @@ class Given:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Everything that a run needs to know.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    links
-        All wires.
-    signals
-        Signals from outside by input.
-    parameters
-        By ``instance.variable``.
-    order
-        Of sampled instances that are due at the same time; empty if all read before any computes.
-    points
-        Communication points in s.
-    coupling
-        Of continuous instances.
-    """
+    """Everything that a run needs to know."""
 
     descriptions: Mapping[str, FmuDescription]
     links: tuple[Link, ...]
@@ -181,13 +135,7 @@ class Plan:
         return [*shown, *(link.target for link in self.links), *self.signals]
 
     def sampled(self, name: str) -> bool:
-        """Tell whether an instance, or the instance of a variable, is sampled.
-
-        Parameters
-        ----------
-        name
-            Of an instance, or ``instance.variable``.
-        """
+        """Tell whether an instance, or the instance of a variable, is sampled."""
         return self.descriptions[split_name(name)[0]].sample_time is not None
 
     @property
@@ -206,13 +154,7 @@ class Plan:
         return any(link.fresh and not link.delay and not self.sampled(link.target) for link in self.links)
 
     def curved(self, link: Link) -> bool:
-        """Tell whether the source of a wire is continuous.
-
-        Parameters
-        ----------
-        link
-            Wire.
-        """
+        """Tell whether the source of a wire is continuous."""
         return not self.sampled(link.source)
 
 
@@ -223,19 +165,7 @@ def points_of(
     step: float,
     parts: int = 1,
 ) -> Array:
-    """Return the communication points of a system in s.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    links
-        All wires.
-    stop, step
-        End and longest step in s.
-    parts
-        Parts into which each step is divided once more.
-    """
+    """Return the communication points of a system in s."""
     periods = {name: each.sample_time for name, each in descriptions.items() if each.sample_time is not None}
     changes = {
         (periods[split_name(link.source)[0]], link.delay)

@@ -117,15 +117,7 @@ class Authorship:
 
 
 def described(description: str, origin: Origin | None) -> str:
-    """Return the description of a model with its deck.
-
-    Parameters
-    ----------
-    description
-        Of the model.
-    origin
-        Deck behind the model.
-    """
+    """Return the description of a model with its deck."""
     if origin is None:
         return description
     return f"{description} (deck {origin.deck}, SHA-256 {origin.digest[:SHORT_DIGEST]})"
@@ -136,15 +128,7 @@ ORIGIN_FORMAT = "nlsdesign origin 1"
 
 
 def with_origin(model: FlatModel, contents: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the contents of an FMU with one file more, which says where they come from.
-
-    Parameters
-    ----------
-    model
-        In the FMU.
-    contents
-        Everything else in the archive, by path.
-    """
+    """Return the contents of an FMU with one file more, which says where they come from."""
     record = {
         "format": ORIGIN_FORMAT,
         "generator": f"nlsdesign {version()}",

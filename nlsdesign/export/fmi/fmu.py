@@ -57,28 +57,7 @@ def compiled_binaries(
 ) -> dict[str, bytes]:
     """Return the shared library of an FMU for each platform, from the cache where nothing changed.
 
-    Parameters
-    ----------
-    sources
-        All C files by name.
-    main
-        The one to compile; it includes the others.
-    folder
-        Temporary folder to work in.
-    name
-        Of the library, without its extension.
-    platforms
-        Machines to build for.
-
-    Returns
-    -------
-    dict
-        Content of the library by name of the platform.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or finds a mistake.
+    ``main``: the one to compile; it includes the others.
     """
 
     def binary(platform: Platform) -> bytes:
@@ -226,21 +205,7 @@ def fmu_texts(
 ) -> dict[str, bytes]:
     """Return everything in an FMU but the binaries.
 
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    version
-        ``"3.0"`` or ``"2.0"``.
-    step
-        Communication step of the default experiment in s.
-    authorship
-        Author, licence and date. The date has no part in the token.
-
-    Returns
-    -------
-    dict
-        Content by path within the FMU.
+    ``authorship``: author, licence and date. The date has no part in the token.
     """
     variables, about = layout(model), authorship or Authorship()
 
@@ -296,13 +261,7 @@ def _binaries(
 
 
 def universal_binary(parts: Mapping[str, bytes]) -> bytes:
-    """Return one macOS library for several processors, which FMI 2.0 has only one folder for.
-
-    Parameters
-    ----------
-    parts
-        Mach-O libraries by platform name.
-    """
+    """Return one macOS library for several processors, which FMI 2.0 has only one folder for."""
     # (processor type, subtype) as in <mach/machine.h>; the header is big-endian, slices start on 16 KiB.
     processors = {"x86_64-darwin": (0x01000007, 3), "aarch64-darwin": (0x0100000C, 0)}
     align = 14

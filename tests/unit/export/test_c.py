@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.export import CompiledStep, export_c
+from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_SATURATED,
@@ -28,6 +28,7 @@ from nlsdesign.export.c.guarded_step import (
     GuardedModel,
     index_bit,
 )
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
 from nlsdesign.feedback.observer import design_adaptive_observer
 from nlsdesign.foundation.deck import load_deck
