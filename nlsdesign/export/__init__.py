@@ -15,6 +15,7 @@ from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
 from .cosimulation.ssp import WrittenSystem, read_ssp, write_ssp
 from .cosimulation.wires import Late, SamplesOf, Wire
+from .exported_files import ExportedFile, ExportedFolder, read_exports
 from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
 from .fmi.reference_results import write_reference
@@ -29,6 +30,8 @@ __all__ = [
     "CSource",
     "CoSimulation",
     "Convergence",
+    "ExportedFile",
+    "ExportedFolder",
     "Extrapolated",
     "FmuSystem",
     "Held",
@@ -48,6 +51,7 @@ __all__ = [
     "measure_on_target",
     "natively",
     "quickest",
+    "read_exports",
     "read_ssp",
     "write_examples",
     "write_reference",
