@@ -33,15 +33,15 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
     from ..export import read_exports
     from ..foundation.deck import load_deck
 
-    found = read_exports(folder, reference=deck_digest(declare(load_deck(deck_name))) if deck_name else "")
-    status = UNREADABLE if found.problems else TOGETHER if found.together else APART
+    exports = read_exports(folder, reference=deck_digest(declare(load_deck(deck_name))) if deck_name else "")
+    status = UNREADABLE if exports.problems else TOGETHER if exports.together else APART
     judged = [(str(file.path.relative_to(folder)), file, why)
-              for file, why in zip(found.files, found.apart, strict=True)]  # fmt: skip
+              for file, why in zip(exports.files, exports.apart, strict=True)]  # fmt: skip
     if as_json:
         rows = [{**asdict(file), "path": path, "belongs": not why, "why": why} for path, file, why in judged]
-        show_json({"folder": folder, "deck": found.reference, "status": status,
-                   "together": found.together, "files": rows,
-                   "unreadable": [str(problem) for problem in found.problems]})  # fmt: skip
+        show_json({"folder": folder, "deck": exports.reference, "status": status,
+                   "together": exports.together, "files": rows,
+                   "unreadable": [str(problem) for problem in exports.problems]})  # fmt: skip
         return status
     if judged:
         show_table(
@@ -49,6 +49,6 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
             ("file", "kind", "deck", "digest", "state"),
             [(path, file.kind, file.deck, file.short, why or "belongs") for path, file, why in judged],
         )
-    for sentence in found.findings():
+    for sentence in exports.findings():
         click.echo(sentence)
     return status
