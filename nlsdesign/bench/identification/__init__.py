@@ -1,21 +1,28 @@
-"""Measured records, noise, fits and their metrics."""
+"""Measured records, their noise, and fits of a model's numbers to them.
 
-from .estimation.least_squares import Fit, fit
-from .estimation.parameters import Parameter, declared_parameter, free_parameter
-from .estimation.profile import Profile, profile_of
-from .output_error.cma_es import Evolved, fit_by_cma
-from .output_error.multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
-from .output_error.prediction import Prediction, predict_in_windows
-from .output_error.simulation_error import Shots, SimulationError, Weights
-from .output_error.wiring import Wiring, wired
+``records`` reads files; ``equation_error`` drives pieces of a model with what was measured; ``least_squares``
+fits their numbers, and ``multiple_shooting`` those of a whole simulation. ``discrepancy``, ``calibration``
+and the rooms above may import it. It never changes the structure of a model.
+"""
+
+from .least_squares import Fit, Huber, Loss, Profile, Squares, fit, profile_of
+from .multiple_shooting import (
+    Evolved,
+    Prediction,
+    SimulatedFit,
+    coloured_sigma,
+    fit_by_cma,
+    fit_by_simulation,
+    predict_in_windows,
+)
+from .parameters import Parameter, declared_parameter, free_parameter
 from .records.alignment import aligned, joined, resampled
-from .records.clocks import Channel, Resampled, on_one_clock
-from .records.lag import Lag, lag_between
+from .records.clocks import Channel, Lag, Resampled, lag_between, on_one_clock
 from .records.measurement import Column, ColumnMap, Record, RecordSet, cut_in_time, load_record, load_records
 from .records.quality import Finding
-from .statistics.losses import Huber, Loss, Squares
-from .statistics.metrics import Agreement, agreement, rmse
-from .statistics.residuals import noise_of
+from .residuals import Agreement, agreement, noise_of, rmse
+from .simulation_error import Shots, SimulationError, Weights
+from .windowed_simulation import Wiring, wired
 
 __all__ = [
     "Agreement",

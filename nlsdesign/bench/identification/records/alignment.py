@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from ....foundation.errors import MeasurementError, unknown_name
 from ....simulation import Trace
-from .clocks import Channel, Resolution, on_one_clock
-from .lag import Lag, lag_between
+from .clocks import Channel, Lag, Resolution, lag_between, on_one_clock
 from .measurement import Record
 
 
@@ -42,14 +41,14 @@ def aligned(
     delayed, reference
         Full names of two signals that show the same motion; the first is moved.
     longest
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`.
+        As for :func:`~nlsdesign.bench.identification.records.clocks.lag_between`.
 
     Raises
     ------
     UnknownNameError
         If the record has no such signal.
     MeasurementError
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`.
+        As for :func:`~nlsdesign.bench.identification.records.clocks.lag_between`.
     """
     lag = lag_between(_channel(record, delayed), _channel(record, reference), longest=longest)
     parts = [_only(record, [s for s in record.trace.signals if s != delayed]), _only(record, [delayed])]
@@ -71,14 +70,14 @@ def joined(
     rate
         Of the common clock in Hz.
     longest
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`.
+        As for :func:`~nlsdesign.bench.identification.records.clocks.lag_between`.
 
     Raises
     ------
     UnknownNameError
         If a record has no such signal.
     MeasurementError
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`, or if the second adds no
+        As for :func:`~nlsdesign.bench.identification.records.clocks.lag_between`, or if the second adds no
         signal.
     """
     lag = lag_between(_channel(other, by[1]), _channel(record, by[0]), longest=longest)

@@ -22,8 +22,8 @@ from nlsdesign.bench.identification import (
     profile_of,
     wired,
 )
-from nlsdesign.bench.identification.estimation.parameters import Parameter
-from nlsdesign.bench.identification.output_error.simulation_error import Point
+from nlsdesign.bench.identification.parameters import Parameter
+from nlsdesign.bench.identification.simulation_error import Point
 from nlsdesign.components import Dashpot, Mass, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError
