@@ -236,15 +236,7 @@ def _effective_size(rows: Sequence[Array]) -> float:
 
 
 def without(fit: SimulatedFit, name: str) -> tuple[Parameter, ...]:
-    """Return the parameters of a fit, at their fitted values, without one of them.
-
-    Parameters
-    ----------
-    fit
-        Ended.
-    name
-        Of the parameter left out.
-    """
+    """Return the parameters of a fit, at their fitted values, without one of them."""
     return tuple(replace(p, start=fit.fit.values[p.name]) for p in fit.fit.parameters if p.name != name)
 
 
@@ -345,21 +337,9 @@ def fit_by_cma(
 ) -> Evolved:
     """Fit parameters with the evolution strategy of Hansen and Ostermeier 2001.
 
-    Parameters
-    ----------
-    model, records, parameters, shots, weights
-        As for :func:`fit_by_simulation`; the windows must be apart, since nothing here joins them.
-    seed
-        Of the random numbers; the same seed gives the same result.
-    simulations
-        At most so many.
-
-    Raises
-    ------
-    MissingLibraryError
-        If ``cma`` is not installed.
-    ConvergenceError
-        If no set of numbers could be simulated.
+    ``model``, ``records``, ``parameters``, ``shots``, ``weights``: as for :func:`fit_by_simulation`; the
+    windows must be apart, since nothing here joins them. ``seed``: of the random numbers; the same seed gives
+    the same result.
     """
     try:
         cma = importlib.import_module("cma")
