@@ -51,7 +51,7 @@ def test_an_operation_takes_as_many_values_as_it_needs(operation: int) -> None:
     count = 2 if operation in TWO_OPERANDS else 1
     value = applied(operation, [X, Y][:count])
     steps = read_graph(ca.Function("f", [X, Y], [value])).steps
-    assert [len(step.operands) for step in steps if step.operation == operation] == [count]
+    assert [len(step.operands) for step in steps if step.operation == value.op()] == [count]
 
 
 def test_operations_go_by_the_names_of_casadi() -> None:
