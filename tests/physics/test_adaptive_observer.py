@@ -21,7 +21,7 @@ from nlsdesign.feedback.observer import (
 )
 from nlsdesign.feedback.observer.adaptive.adaptive_step import _matrices, _Side
 from nlsdesign.feedback.observer.adaptive.duty_and_directions import UncertainDirections, uncertain_directions
-from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, within_a_count
+from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, truncated_update
 from nlsdesign.feedback.observer.scheduling.angle_form import minimal_form
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
@@ -108,13 +108,13 @@ def test_a_reading_cuts_the_prediction_at_the_edges_of_a_count(off: float, devia
     half = np.sqrt(3.0)
     edges = (off - half) / deviation, (off + half) / deviation
     mean, variance = truncnorm.stats(*edges, scale=deviation, moments="mv")
-    moved, kept = (float(ca.evalf(v)) for v in within_a_count(ca.SX(off), ca.SX(deviation**2)))
+    moved, kept = (float(ca.evalf(v)) for v in truncated_update(ca.SX(off), ca.SX(deviation**2)))
     assert moved == pytest.approx(float(mean), abs=1e-9)
     assert kept == pytest.approx(float(variance) / deviation**2, abs=1e-9)
 
 
 def test_a_wide_prediction_is_corrected_as_by_kalman() -> None:
-    moved, kept = (float(ca.evalf(v)) for v in within_a_count(ca.SX(-30.0), ca.SX(400.0)))
+    moved, kept = (float(ca.evalf(v)) for v in truncated_update(ca.SX(-30.0), ca.SX(400.0)))
     assert moved == pytest.approx(-30.0 * 400.0 / 401.0)
     assert kept == pytest.approx(1.0 / 401.0)
 

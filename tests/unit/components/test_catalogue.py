@@ -237,7 +237,7 @@ def test_the_order_of_the_catalogue_is_that_of_the_ranks() -> None:
 
 ROW = """
 from nlsdesign.components import Dashpot, ROTATION, tie
-from nlsdesign.bench.discrepancy.effects import Edit, Effect, Form, Unknown, ranked
+from nlsdesign.bench.discrepancy.effects import Edit, Effect, Form, Unknown
 from nlsdesign.bench.discrepancy.effects.places import turning_bodies
 
 
@@ -248,11 +248,7 @@ def _greased(assembly, body):
 
 form = Form(turning_bodies, _greased, "torque as the speed", "Newton 1687")
 grease = Effect("grease", "Viscous friction.", 15, (form,))
-
-
-@ranked(25)
-def nothing(assembly):
-    return []
+nothing = Effect("nothing", "Nothing at all.", 25, ())
 """
 
 LAW_FILE = '''
@@ -295,6 +291,18 @@ def test_an_effect_is_one_row_in_one_file(written: Path, monkeypatch: pytest.Mon
     (candidate,) = catalogue()[1](drive())
     assert (candidate.effect, candidate.location) == ("grease", "motor")
     assert flatten(candidate.assembly).values["grease.damping"] == 1e-3
+
+
+def test_a_file_may_be_named_as_its_effect(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (written / "grease.py").write_text(ROW, encoding="utf-8")
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(written)])
+    monkeypatch.setattr(effects, "grease", None, raising=False)  # nothing of it stays behind
+    (row,) = [effect for effect in catalogue() if effect.__name__ == "grease"]
+    assert effects.grease is row
+    importlib.import_module(f"{effects.__name__}.grease")
+    assert effects.grease is row
+    (candidate,) = row(drive())
+    assert candidate.effect == "grease"
 
 
 def test_a_law_is_one_file(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:

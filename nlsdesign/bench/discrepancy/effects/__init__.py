@@ -1,27 +1,21 @@
-"""The catalogue of missing effects, in tables: each row is an effect, and makes assemblies that have it.
+"""The catalogue of missing effects: each row is an effect, and makes assemblies that have it.
 
-A row, or a function with a rank, is found by standing in a module of this room; it needs to be in no list.
+A row is found by standing in a module of this room; it needs to be in no list. The module may be called as
+its row is: ``effects.NAME`` gives the row.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Iterator
-from types import ModuleType
 
 from ....foundation.errors import ArrangementError, unknown_name
 from ....foundation.extensions import extension_modules
 from .candidate import Candidate, EffectFunction, Unknown, wrapped
-from .effect import Edit, Effect, Form, Ranked, ranked
+from .effect import Edit, Effect, Form
 
 
-def _own() -> Iterator[ModuleType]:
-    for listed in pkgutil.iter_modules(__path__, f"{__name__}."):
-        yield importlib.import_module(listed.name)
-
-
-def catalogue() -> tuple[Effect | Ranked, ...]:
+def catalogue() -> tuple[Effect, ...]:
     """Return the effects of all modules of this room, in the order of their ranks.
 
     Those of packages that the present block is extended by are among them. The order decides between effects
@@ -32,38 +26,27 @@ def catalogue() -> tuple[Effect | Ranked, ...]:
     ArrangementError
         If two effects have one name.
     """
-    by_name: dict[str, Effect | Ranked] = {}
-    for module in (*_own(), *extension_modules()):
+    by_name: dict[str, Effect] = {}
+    listed = (importlib.import_module(m.name) for m in pkgutil.iter_modules(__path__, f"{__name__}."))
+    for module in (*listed, *extension_modules()):
         for row in vars(module).values():
-            if isinstance(row, Effect | Ranked) and by_name.setdefault(row.__name__, row) is not row:
-                rule = f"has an effect '{row.__name__}', and so has the catalogue"
+            if isinstance(row, Effect) and by_name.setdefault(row.identifier, row) is not row:
+                rule = f"has an effect '{row.identifier}', and so has the catalogue"
                 raise ArrangementError(module.__name__, rule, next_step="give it another identifier")
+            # Importing a module makes it an attribute of its package, where it would hide a row of its name.
+            if isinstance(row, Effect) and module.__name__.startswith(f"{__name__}."):
+                globals()[row.identifier] = row
     return tuple(sorted(by_name.values(), key=lambda row: row.rank))
 
 
-ALL: tuple[Effect | Ranked, ...] = catalogue()
+ALL: tuple[Effect, ...] = catalogue()
 
 
-def __getattr__(name: str) -> Effect | Ranked:
-    """Return an effect of the catalogue by its identifier."""
-    for row in ALL:
-        if row.__name__ == name:
-            return row
+def __getattr__(name: str) -> Effect:
+    """Explain that there is no such effect; those of the catalogue are attributes of this room."""
     if name.startswith("__"):
         raise AttributeError(name)
-    raise AttributeError(str(unknown_name("effect", name, [row.__name__ for row in ALL])))
+    raise AttributeError(str(unknown_name("effect", name, [row.identifier for row in ALL])))
 
 
-__all__ = [
-    "ALL",
-    "Candidate",
-    "Edit",
-    "Effect",
-    "EffectFunction",
-    "Form",
-    "Ranked",
-    "Unknown",
-    "catalogue",
-    "ranked",
-    "wrapped",
-]
+__all__ = ["ALL", "Candidate", "Edit", "Effect", "EffectFunction", "Form", "Unknown", "catalogue", "wrapped"]

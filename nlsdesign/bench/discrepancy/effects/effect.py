@@ -91,7 +91,7 @@ class Effect:
         return [
             Candidate(
                 effect=self.identifier,
-                location=place,
+                location=site,
                 assembly=edit.assembly,
                 unknowns=edit.unknowns,
                 signature=form.signature,
@@ -99,48 +99,7 @@ class Effect:
                 **edit.more,
             )
             for form in self.forms
-            for place in form.places(assembly)
-            if not (form.brings and assembly.has(place, form.brings))
-            for edit in form.edits(assembly, place)
+            for site in form.places(assembly)
+            if not (form.brings and assembly.has(site, form.brings))
+            for edit in form.edits(assembly, site)
         ]
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """A function of the catalogue that needs no table: from an assembly to candidates.
-
-    Parameters
-    ----------
-    function
-        Named as the effect is.
-    rank
-        As of :class:`Effect`.
-    """
-
-    function: Callable[[Assembly], Sequence[Candidate]]
-    rank: int
-    __name__: str = field(init=False, repr=False, default="")
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "__name__", self.function.__name__)
-
-    def __call__(self, assembly: Assembly) -> Sequence[Candidate]:
-        """Return what the function does.
-
-        Parameters
-        ----------
-        assembly
-            As declared.
-        """
-        return self.function(assembly)
-
-
-def ranked(rank: int) -> Callable[[Callable[[Assembly], Sequence[Candidate]]], Ranked]:
-    """Put a function into the catalogue.
-
-    Parameters
-    ----------
-    rank
-        As of :class:`Effect`.
-    """
-    return lambda function: Ranked(function, rank)

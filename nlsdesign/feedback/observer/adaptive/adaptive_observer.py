@@ -49,12 +49,12 @@ from .duty_and_directions import (
 )
 from .filter_equations import FilterEquations, FilterNoise, expected_inputs, first_states, pairs
 
-DEVIATION, SPREAD, UNREST = "deviation", "standard_deviation", "unrest"
+DEVIATION, SPREAD, INFLATION = "deviation", "standard_deviation", "unrest"
 """Endings of the name of the estimate: slow states, the deviation that the filter expects, and the factor on
 the noise that it reckons with."""
 FIRST_READING = 2.0
 """Deviation of the angle at the start, in deviations of rounding: the filter begins at its first reading."""
-FOLLOWED = "followed"
+LOW_PASS = "followed"
 """Ending of the name of the angle: its measured value behind a filter."""
 
 
@@ -118,11 +118,11 @@ class _Variables:
             text = f"distance from the deck in standard deviations; one is {self.directions.in_words(d)}"
             states.append(Variable(f"{name}.{MEMORY}", "1", text))
         text = "factor on the variances of all noise, from innovations that were larger than expected"
-        states.append(Variable(f"{plant.estimate.name}.{UNREST}", "1", text, 1.0))
+        states.append(Variable(f"{plant.estimate.name}.{INFLATION}", "1", text, 1.0))
         v = plant.states[self.angle]
         size = float(plant.sizes[self.angle])
         words = f"measured {v.name} behind a filter, which shows whether it moves"
-        states.append(Variable(f"{v.name}.{FOLLOWED}", v.unit, words, nominal=size))
+        states.append(Variable(f"{v.name}.{LOW_PASS}", v.unit, words, nominal=size))
         initial = np.concatenate([self._initial_variances(), np.ones(self.slow)])
         names = [*plant.names, *self._slow_names()]
         for i, j in pairs(len(names)):
@@ -212,7 +212,7 @@ class AdaptiveDesign:
         state = plant.rest(at)[0] - matrices["shift"][0, :, 0]
         memory = state - matrices["prior"][0, :, 0] - matrices["coupling"][0] @ state[: self.step.inner]
         start = {f"{n}.{MEMORY}": float(m) for n, m in zip(plant.names, memory, strict=True)}
-        return start | {f"{plant.angle}.{FOLLOWED}": float(angle)}
+        return start | {f"{plant.angle}.{LOW_PASS}": float(angle)}
 
     def __str__(self) -> str:
         grid = self.compact.angles

@@ -41,7 +41,7 @@ class _Side(NamedTuple):
     """A plant with other numbers, and its inertia over the declared one."""
 
     plant: AngleScheduledPlant
-    heavier: float
+    relative_inertia: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +61,10 @@ class AdaptiveStep:
     lowered: tuple[_Side, ...]
 
     @property
-    def lightness(self) -> list[float]:
+    def inertia_slopes(self) -> list[float]:
         """Slope of the logarithm of one over the inertia along each direction."""
         return [
-            (math.log(down.heavier) - math.log(up.heavier)) / 2.0
+            (math.log(down.relative_inertia) - math.log(up.relative_inertia)) / 2.0
             for up, down in zip(self.raised, self.lowered, strict=True)
         ]
 
@@ -130,7 +130,11 @@ class AdaptiveStep:
             Inputs, shape (m,).
         """
         return ca.SX(self.nominal.plant.driven(u)), [
-            (up.heavier * ca.SX(up.plant.driven(u)) - down.heavier * ca.SX(down.plant.driven(u))) / 2.0
+            (
+                up.relative_inertia * ca.SX(up.plant.driven(u))
+                - down.relative_inertia * ca.SX(down.plant.driven(u))
+            )
+            / 2.0
             for up, down in zip(self.raised, self.lowered, strict=True)
         ]
 
@@ -148,7 +152,9 @@ class AdaptiveStep:
         slopes = []
         for up, down in zip(self.raised, self.lowered, strict=True):
             rates = [
-                ca.SX(0) if side.plant.friction is None else side.heavier * ca.SX(side.plant.friction(speed))
+                ca.SX(0)
+                if side.plant.friction is None
+                else side.relative_inertia * ca.SX(side.plant.friction(speed))
                 for side in (up, down)
             ]
             slopes.append((rates[0] - rates[1]) / 2.0)
@@ -166,8 +172,8 @@ def _matrices(side: _Side, time: float, angles: Array, inner: int) -> dict[str, 
     plant = side.plant
     c, n = plant.at(angles), len(plant.states)
     # What accelerates, times the inertia over the declared one.
-    pulled = side.heavier * c.a[:, inner:, :inner]
-    given = side.heavier * c.drive[:, inner:, None]
+    pulled = side.relative_inertia * c.a[:, inner:, :inner]
+    given = side.relative_inertia * c.drive[:, inner:, None]
     within, begin_inner, end_inner = linear(c.a[:, :inner, :inner], time)
     moving, begin, end = linear(c.a[:, inner:, inner:], time)
     count = len(angles)

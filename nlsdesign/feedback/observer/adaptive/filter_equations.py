@@ -1,6 +1,24 @@
 """The filter of an adaptive observer: two halves of a sample, their slopes, and the correction between.
 
-What an adaptive observer makes of its first reading and of one after a gap, and what it expects next.
+It is an extended Kalman filter with these additions. The names of the state variables are those of the
+interface, which C code and FMUs have in common.
+
+| symbol | name here | what it is |
+| --- | --- | --- |
+| x̂⁻, P⁻ | ``expected``, ``prior`` | states expected at a sample, and the covariance of their error |
+| ν | ``innovation`` | measured minus expected angle |
+| λ | ``inflation`` | covariance inflation, the factor on all noise; state ``unrest`` |
+| ε = ν²/(P⁻ + λ) | ``nis`` | normalised innovation squared, in counts |
+| min(1, ε₀/√ε) | ``gate`` | innovation gate of the slow states |
+| ω₀, ω²/(ω² + ω₀²) | ``dead_band``, ``moving`` | speed dead band of the slow states, and what passes it |
+| J₀/J(s) | ``inertia_ratio`` | declared inertia over that at the slow states |
+| w in √(ω² + w²) | ``smoothing_width`` | width over which dry friction is smoothed around zero speed |
+| θ_f | ``low_pass`` | measured angle behind a low-pass; state ``followed`` |
+| Δθ, P⁺/P⁻ | ``mean_shift``, ``variance_ratio`` | what one reading does to mean and variance of the angle |
+| K, I − KC | ``gain``, ``complement`` | gain, and what it leaves of the covariance (Joseph form) |
+| φ | ``forgetting`` | share of the variance of the slow states that one sample makes open again |
+
+When the observer starts, and after a gap, it takes the states of a machine that rests at its reading.
 """
 
 from __future__ import annotations
@@ -15,15 +33,16 @@ from scipy.linalg import solve_discrete_are
 
 from ....foundation.symbolic import Expression
 from ..scheduling.measured_angle import at_rest
+from ..scheduling.step import speed_change
 from ..scheduling.table import Compact
 from .adaptive_step import AdaptiveStep
 from .duty_and_directions import Trust
 
-FOLLOWING_TIME = 0.01
+LOW_PASS_TIME = 0.01
 """Seconds by which an angle lags the measured one; their distance says whether the actuator moves at all."""
-UNREST_TIME = 1.0
+INFLATION_TIME = 1.0
 """Seconds over which innovations that are larger than expected raise the noise that is reckoned with."""
-MOST_UNREST = 1e4
+LARGEST_INFLATION = 1e4
 """Largest factor on the variances of that noise."""
 _WIDE = 5.0
 """Deviation of a prediction, in deviations of rounding, beyond which rounding is as good as normal noise."""
@@ -76,14 +95,16 @@ class FilterEquations:
         # Units in which all covariances are near one: counts, counts per sample, sizes of inner states.
         self.units = self.plant.sizes.copy()
         self.units[self.angle], self.units[self.speed] = noise.angle, noise.angle / time
-        self.blur = _speed_deviation(noise.angle, _white(noise.acceleration, trust, time), time)
-        self.calm = _calm_speed(self.plant.friction, float(self.plant.sizes[self.speed]), self.blur)
+        self.smoothing_width = _speed_deviation(noise.angle, _white(noise.acceleration, trust, time), time)
+        self.dead_band = _dead_band(
+            self.plant.friction, float(self.plant.sizes[self.speed]), self.smoothing_width
+        )
 
     # --- reading the table ------------------------------------------------------------------------------
 
     def _read(self, kind: str, i: int, j: int = 0) -> Expression:
-        place = self.compact.places[f"{kind}[{i}][{j}]"]
-        return ca.SX(place.factor) if place.column is None else place.factor * self.w[place.column]
+        entry = self.compact.places[f"{kind}[{i}][{j}]"]
+        return ca.SX(entry.factor) if entry.column is None else entry.factor * self.w[entry.column]
 
     def matrix(self, kind: str, rows: int, columns: int, slow: Expression) -> Expression:
         """Return a matrix of the step at the slow states.
@@ -104,7 +125,7 @@ class FilterEquations:
                 parts += [slow[d] * self._read(f"{kind}.{d}", i, j) for d in range(self.slow)]
                 total[i, j] = sum(parts, start=ca.SX(0))
                 if self._accelerates(kind, i, j):
-                    total[i, j] *= self._lightness(slow)
+                    total[i, j] *= self._inertia_ratio(slow)
         return total
 
     def _accelerates(self, kind: str, i: int, j: int) -> bool:
@@ -114,9 +135,9 @@ class FilterEquations:
             kind in ("prior", "coupling") or (kind == "next" and (j < self.step.inner or j == self.n))
         )
 
-    def _lightness(self, slow: Expression) -> Expression:
+    def _inertia_ratio(self, slow: Expression) -> Expression:
         """Return the declared inertia over that at the slow states."""
-        slopes = [c if abs(c) > 1e-6 else 0.0 for c in self.step.lightness]
+        slopes = [c if abs(c) > 1e-6 else 0.0 for c in self.step.inertia_slopes]
         return ca.exp(sum((c * slow[d] for d, c in enumerate(slopes) if c), start=ca.SX(0)))
 
     # --- the two halves of a sample ---------------------------------------------------------------------
@@ -135,28 +156,23 @@ class FilterEquations:
         inner = self.step.inner
         if inner:
             state += ca.mtimes(self.matrix("coupling", self.n, inner, slow), state[:inner])
-        friction_of = self.step.friction
         speed = ca.SX.sym("speed")
-        length = ca.sqrt(speed**2 + self.blur**2)
-        ahead, back = friction_of(length), friction_of(-length)
+        length = ca.sqrt(speed**2 + self.smoothing_width**2)
+        ahead, back = self.step.friction(length), self.step.friction(-length)
         if ahead is None or back is None:
             return state
 
-        def blurred(forward: Expression, backward: Expression) -> Expression:
+        def smoothed(forward: Expression, backward: Expression) -> Expression:
             return (forward + backward) / 2.0 + (forward - backward) / 2.0 * speed / length
 
-        own = blurred(ahead[0], back[0])
-        slopes = [blurred(one, other) for one, other in zip(ahead[1], back[1], strict=True)]
-        rate = self._lightness(slow) * (
-            own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
+        nominal = smoothed(ahead[0], back[0])
+        slopes = [smoothed(forward, backward) for forward, backward in zip(ahead[1], back[1], strict=True)]
+        rate = self._inertia_ratio(slow) * (
+            nominal + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
         )
-        time = self.step.nominal.sample_time
-        # The exponential Rosenbrock–Euler step of the scheduled observers: it stops but never turns around.
-        x = time * ca.jacobian(rate, speed)
-        x = x - 1e-9 * (ca.fabs(x) < 1e-9)
-        left = speed + time * rate * ca.expm1(x) / x
-        change = ca.substitute(left * (left * speed > 0) - speed, speed, state[self.speed])
-        state[self.angle] += time / 2.0 * change
+        change = speed_change(rate, speed, self.step.nominal.sample_time)
+        change = ca.substitute(change, speed, state[self.speed])
+        state[self.angle] += self.step.nominal.sample_time / 2.0 * change
         state[self.speed] += change
         return state
 
@@ -164,13 +180,13 @@ class FilterEquations:
         """Return what goes on to the next sample."""
         count = self.n + 1 + len(self.plant.rows)
         matrix = self.matrix("next", self.n, count, slow)
-        own, slopes = self.step.driven(u)
-        pushed = self._lightness(slow) * (
-            own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
+        nominal, slopes = self.step.driven(u)
+        pushed = self._inertia_ratio(slow) * (
+            nominal + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
         )
         return ca.SX(ca.mtimes(matrix, ca.vertcat(state, 1, pushed)))
 
-    def _slopes(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
+    def slopes(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
         """Return slopes by states and slow states, both in the units of the filter.
 
         They are taken at the deck, not at the estimate: what no motion can tell apart (a drive, a rubber and
@@ -184,12 +200,12 @@ class FilterEquations:
 
     def _carried(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
         """Return the slopes of one half of a sample; slow states, which stay, below the others."""
-        upper = ca.mtimes(ca.diag(1.0 / self.units), self._slopes(expression, of, slow))
+        upper = ca.mtimes(ca.diag(1.0 / self.units), self.slopes(expression, of, slow))
         return ca.SX(ca.vertcat(upper, ca.horzcat(ca.SX(self.slow, self.n), ca.SX.eye(self.slow))))
 
     def _direction(self, covariance: Expression, speed: Expression) -> tuple[Expression, Expression]:
         """Return what a change of the angle says of all states, and how far the actuator moves, 0 to 1."""
-        moving = speed**2 / (speed**2 + self.calm**2) if self.calm else ca.SX(1)
+        moving = speed**2 / (speed**2 + self.dead_band**2) if self.dead_band else ca.SX(1)
         column = covariance[:, self.angle] / covariance[self.angle, self.angle]
         for i in range(self.n):
             if i not in (self.angle, self.speed):
@@ -199,76 +215,96 @@ class FilterEquations:
 
     def sample(self) -> ca.Function:
         """Return one sample as the equations of a discrete flat model."""
-        n, slow_count, plant = self.n, self.slow, self.plant
-        size = n + slow_count
-        memory, slow = ca.SX.sym("memory", n), ca.SX.sym("slow", slow_count)
-        packed, unrest = ca.SX.sym("covariance", size * (size + 1) // 2), ca.SX.sym("unrest")
-        angle, u = ca.SX.sym(plant.angle), ca.SX.sym("u", len(plant.inputs))
-        slopes = self._carried(self.expected_states(memory, slow), memory, slow)
-        before = ca.mtimes([slopes, _unpacked(packed, size), slopes.T])
+        n, count, plant = self.n, self.slow, self.plant
+        size, time = n + count, self.step.nominal.sample_time
+        memory, slow = ca.SX.sym("memory", n), ca.SX.sym("slow", count)
+        packed, inflation = ca.SX.sym("covariance", size * (size + 1) // 2), ca.SX.sym("inflation")
+        low_pass, angle, u = ca.SX.sym("low_pass"), ca.SX.sym(plant.angle), ca.SX.sym("u", len(plant.inputs))
+
         expected = self.expected_states(memory, slow)
+        slopes = self._carried(expected, memory, slow)
+        prior = ca.mtimes([slopes, _unpacked(packed, size), slopes.T])
         innovation = angle - expected[self.angle]
-        off, variance_of_angle = innovation / self.noise.angle, before[self.angle, self.angle]
-        followed = ca.SX.sym("followed")
-        seen_speed = (angle - followed) / FOLLOWING_TIME
+        seen_speed = (angle - low_pass) / LOW_PASS_TIME
         direction, moving = self._direction(
-            before, ca.fmin(ca.fabs(expected[self.speed]), ca.fabs(seen_speed))
+            prior, ca.fmin(ca.fabs(expected[self.speed]), ca.fabs(seen_speed))
         )
-        # A surprise beyond what noise gives teaches the less the larger it is: a drive at its limit or a
-        # jump of the encoder is no news of the rubber.
-        squared = off**2 / (variance_of_angle + unrest)
-        surprise = ca.sqrt(squared + 1e-12)
-        direction[n:] *= ca.fmin(1.0, self.trust.surprise / surprise)
+        nis = (innovation / self.noise.angle) ** 2 / (prior[self.angle, self.angle] + inflation)
+        direction[n:] *= self._gate(nis)
         for i, v in enumerate(plant.inputs):
             if v.name in self.noise.safe_inputs:
                 direction[n:] *= ca.fabs(u[i]) < self.noise.safe_inputs[v.name]
-        moved, kept = within_a_count(off / ca.sqrt(unrest), variance_of_angle / unrest)
-        moved *= ca.sqrt(unrest)
-        step, gain = direction * moved, direction * (1.0 - kept)
+        step, posterior = self._corrected(prior, direction, innovation, inflation)
         state = expected + step[:n] * self.units
         slow_after = ca.fmin(ca.fmax(slow + step[n:], -self.trust.limit), self.trust.limit)
-        keep = ca.SX.eye(size)
-        keep[:, self.angle] -= gain
-        spread = direction * ca.sqrt(kept * (1.0 - kept) * variance_of_angle)
-        after = ca.mtimes([keep, before, keep.T]) + ca.mtimes(spread, spread.T)
-        s, free = ca.SX.sym("s", n), ca.SX.sym("free", slow_count)
-        end = self._end(s, free, u)
-        following = ca.substitute(end, ca.vertcat(s, free), ca.vertcat(state, slow_after))
-        onward = ca.substitute(
-            self._carried(end, s, free), ca.vertcat(s, free), ca.vertcat(state, slow_after)
-        )
-        forget = moving * (1.0 - math.exp(-2.0 * self.step.nominal.sample_time / self.trust.drift_time))
-        fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forget) * ca.SX.ones(slow_count, 1))
+
+        forgetting = moving * (1.0 - math.exp(-2.0 * time / self.trust.drift_time))
+        fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forgetting) * ca.SX.ones(count, 1))
+        following, onward = self._onward(state, slow_after, u)
         onward = ca.mtimes(ca.diag(fading), onward)
-        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget, unrest, u)
-        row = self.matrix("estimate", 1, n + 1, free)
-        wanted = ca.mtimes(row, ca.vertcat(s, 1))
-        slopes_of_estimate = self._slopes(wanted, s, free)
-        both = (ca.vertcat(s, free), ca.vertcat(state, slow_after))
-        estimate, row_at = ca.substitute(wanted, *both), ca.substitute(slopes_of_estimate, *both)
-        variance = ca.mtimes([row_at, after, row_at.T]) + self.noise.estimate**2
-        shown = state + self.matrix("shift", n, 1, slow_after)
-        outputs = [estimate, ca.sqrt(variance), shown, innovation, slow_after]
-        excess = ca.fmin(squared, self.trust.surprise**2) - 1.0
-        restless = unrest * (1.0 + self.step.nominal.sample_time / UNREST_TIME * excess)
-        restless = ca.fmin(ca.fmax(restless, 1.0), MOST_UNREST)
-        behind = angle + math.exp(-self.step.nominal.sample_time / FOLLOWING_TIME) * (followed - angle)
-        states = [following, slow_after * fading[n:], restless, behind, _packed(next_covariance)]
-        arguments = [
-            ca.SX.sym("time"),
-            ca.vertcat(memory, slow, unrest, followed, packed),
-            ca.vertcat(angle, u),
-            ca.SX(0, 1),
-        ]
+        next_covariance = ca.mtimes([onward, posterior, onward.T]) + self._process_noise(
+            forgetting, inflation, u
+        )
+        excess = ca.fmin(nis, self.trust.surprise**2) - 1.0
+        inflated = inflation * (1.0 + time / INFLATION_TIME * excess)
+        inflated = ca.fmin(ca.fmax(inflated, 1.0), LARGEST_INFLATION)
+        filtered = angle + math.exp(-time / LOW_PASS_TIME) * (low_pass - angle)
+        states = [following, slow_after * fading[n:], inflated, filtered, _packed(next_covariance)]
+
+        estimate, slopes_of_estimate = self._estimate(state, slow_after)
+        variance = ca.mtimes([slopes_of_estimate, posterior, slopes_of_estimate.T]) + self.noise.estimate**2
+        shifted = state + self.matrix("shift", n, 1, slow_after)
+        outputs = [estimate, ca.sqrt(variance), shifted, innovation, slow_after]
         results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
         return ca.Function(
             "equations",
-            [*arguments, self.w],
+            [
+                ca.SX.sym("time"), ca.vertcat(memory, slow, inflation, low_pass, packed),
+                ca.vertcat(angle, u), ca.SX(0, 1), self.w,
+            ],
             [*results, ca.SX(0, 1), ca.SX(0, 1)],
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
 
-    def _process_noise(self, forget: Expression, unrest: Expression, u: Expression) -> Expression:
+    def _gate(self, nis: Expression) -> Expression:
+        """Return how much of a correction passes to the slow states, 0 to 1.
+
+        An innovation beyond what noise gives teaches the less the larger it is: a drive at its limit or a
+        jump of the encoder is no news of the rubber.
+        """
+        return ca.fmin(1.0, self.trust.surprise / ca.sqrt(nis + 1e-12))
+
+    def _corrected(
+        self, prior: Expression, direction: Expression, innovation: Expression, inflation: Expression
+    ) -> tuple[Expression, Expression]:
+        """Return the change of all states by one reading, and the covariance after it, in Joseph's form."""
+        variance = prior[self.angle, self.angle]
+        deviations = innovation / self.noise.angle / ca.sqrt(inflation)
+        mean_shift, variance_ratio = truncated_update(deviations, variance / inflation)
+        gain = direction * (1.0 - variance_ratio)
+        complement = ca.SX.eye(prior.shape[0])
+        complement[:, self.angle] -= gain
+        spread = direction * ca.sqrt(variance_ratio * (1.0 - variance_ratio) * variance)
+        posterior = ca.mtimes([complement, prior, complement.T]) + ca.mtimes(spread, spread.T)
+        return direction * (mean_shift * ca.sqrt(inflation)), posterior
+
+    def _onward(self, state: Expression, slow: Expression, u: Expression) -> tuple[Expression, Expression]:
+        """Return what goes on to the next sample, and its slopes, at the corrected states."""
+        x, s = ca.SX.sym("x", self.n), ca.SX.sym("s", self.slow)
+        end = self._end(x, s, u)
+        free, corrected = ca.vertcat(x, s), ca.vertcat(state, slow)
+        return ca.substitute(end, free, corrected), ca.substitute(self._carried(end, x, s), free, corrected)
+
+    def _estimate(self, state: Expression, slow: Expression) -> tuple[Expression, Expression]:
+        """Return the estimated torque and its slopes, at the corrected states."""
+        x, s = ca.SX.sym("x", self.n), ca.SX.sym("s", self.slow)
+        torque = ca.mtimes(self.matrix("estimate", 1, self.n + 1, s), ca.vertcat(x, 1))
+        free, corrected = ca.vertcat(x, s), ca.vertcat(state, slow)
+        return ca.substitute(torque, free, corrected), ca.substitute(
+            self.slopes(torque, x, s), free, corrected
+        )
+
+    def _process_noise(self, forgetting: Expression, inflation: Expression, u: Expression) -> Expression:
         """Return what one sample adds to the covariance.
 
         A torque that stays the same over the correlation time is, to a filter that takes it as white, one of
@@ -283,12 +319,12 @@ class FilterEquations:
         size = self.n + self.slow
         noise = ca.SX.zeros(size, size)
         missing = _missing(self.step, self.noise.safe_inputs, u) ** 2
-        noise[: self.n, : self.n] = (unrest * density**2 + missing) * ca.DM(np.outer(push, push))
+        noise[: self.n, : self.n] = (inflation * density**2 + missing) * ca.DM(np.outer(push, push))
         for i in range(self.n):
             # Rounding of a small number beside large ones; without it single precision may lose its sign.
             noise[i, i] += 1e-6 if i in (self.angle, self.speed) else 1e-12
         for d in range(self.slow):
-            noise[self.n + d, self.n + d] += forget
+            noise[self.n + d, self.n + d] += forgetting
         return noise
 
 
@@ -306,7 +342,7 @@ def _missing(step: AdaptiveStep, safe: Mapping[str, float], u: Expression) -> Ex
     return missing
 
 
-def _slope_of_drive(step: AdaptiveStep, place: int) -> float:
+def _slope_of_drive(step: AdaptiveStep, index: int) -> float:
     """Return the acceleration per unit of an input, at its start value; zero where it gives none."""
     plant = step.nominal.plant
     rows = list(plant.rows)
@@ -315,44 +351,38 @@ def _slope_of_drive(step: AdaptiveStep, place: int) -> float:
         return 0.0
     u = ca.SX.sym("u", len(plant.inputs))
     slopes = ca.Function("slopes", [u], [ca.densify(ca.jacobian(step.driven(u)[0], u))])
-    return float(slopes([v.start for v in plant.inputs])[rows.index(speed), place])
+    return float(slopes([v.start for v in plant.inputs])[rows.index(speed), index])
 
 
-def within_a_count(off: Expression, variance: Expression) -> tuple[Expression, Expression]:
-    """Return what one reading says of the angle: the change of its mean, and the share of variance left.
+def truncated_update(innovation: Expression, variance: Expression) -> tuple[Expression, Expression]:
+    """Return what one reading says of the angle: the shift of its mean, and the share of variance left.
 
     A reading does not say "this angle, with an error": it says that the angle lies within one count. So a
     prediction inside the count is neither corrected nor believed more, and what is learned at the edges is
     not taken for white noise, which a drive that follows the counts would turn into a wrong inertia. Mean and
-    variance are those of the normal distribution of the prediction, cut off at the edges. Where the
+    variance are those of the normal distribution of the prediction, truncated at the edges. Where the
     prediction is much wider than a count, that is the Kalman filter with the variance of rounding; three
-    deviations outside, the correction goes on as there.
-
-    Parameters
-    ----------
-    off
-        Reading minus predicted angle, in units of the deviation of rounding, a count over √12.
-    variance
-        Of the prediction, in the square of that unit.
+    deviations outside, the correction goes on as there. The innovation is in units of the deviation of
+    rounding, a count over √12, the variance of the prediction in the square of that unit.
     """
     half = math.sqrt(3.0)
     narrow = ca.sqrt(ca.fmin(variance, _WIDE**2))
-    size = ca.fabs(off)
+    size = ca.fabs(innovation)
     near = ca.fmin(size, half + 3.0 * narrow)
     low, high = (near - half) / narrow, (near + half) / narrow
     mass = (ca.erf(high / math.sqrt(2.0)) - ca.erf(low / math.sqrt(2.0))) / 2.0
     at_low, at_high = (ca.exp(-(ca.fmin(edge**2, 100.0)) / 2.0) for edge in (low, high))
     root = math.sqrt(2.0 * math.pi)
     mean = (at_low - at_high) / (root * mass)
-    left = 1.0 + (low * at_low - high * at_high) / (root * mass) - mean**2
-    plain = variance / (variance + 1.0)
+    truncated = 1.0 + (low * at_low - high * at_high) / (root * mass) - mean**2
+    kalman_gain = variance / (variance + 1.0)
     wide = variance > _WIDE**2
-    moved = ca.if_else(wide, plain * size, narrow * mean + plain * (size - near))
-    kept = ca.if_else(wide, 1.0 - plain, ca.fmin(ca.fmax(left, 0.0), 1.0))
-    return ca.SX(ca.sign(off) * moved), ca.SX(kept)
+    mean_shift = ca.if_else(wide, kalman_gain * size, narrow * mean + kalman_gain * (size - near))
+    variance_ratio = ca.if_else(wide, 1.0 - kalman_gain, ca.fmin(ca.fmax(truncated, 0.0), 1.0))
+    return ca.SX(ca.sign(innovation) * mean_shift), ca.SX(variance_ratio)
 
 
-def _calm_speed(friction: ca.Function | None, size: float, blur: float) -> float:
+def _dead_band(friction: ca.Function | None, size: float, smoothing_width: float) -> float:
     """Return a speed below which dry friction is not at its level, as the filter sees it; 0 for none.
 
     That is twice the speed at which 90 % of it are reached.
@@ -362,7 +392,7 @@ def _calm_speed(friction: ca.Function | None, size: float, blur: float) -> float
     speeds = size * np.logspace(-7.0, 0.0, 400)
     level = np.abs(friction.map(len(speeds))(speeds[None, :]).full().ravel())
     reached = np.flatnonzero(level >= 0.9 * np.max(level))
-    return 2.0 * max(float(speeds[reached[0]]), 2.0 * blur)
+    return 2.0 * max(float(speeds[reached[0]]), 2.0 * smoothing_width)
 
 
 def _speed_deviation(angle: float, acceleration: float, time: float) -> float:
@@ -397,9 +427,8 @@ def _packed(matrix: Expression) -> Expression:
 
 def _unpacked(packed: Expression, size: int) -> Expression:
     matrix = ca.SX(size, size)
-    for place, (i, j) in enumerate(pairs(size)):
-        matrix[i, j] = packed[place]
-        matrix[j, i] = packed[place]
+    for k, (i, j) in enumerate(pairs(size)):
+        matrix[i, j] = matrix[j, i] = packed[k]
     return matrix
 
 

@@ -28,7 +28,7 @@ from ....model import FlatModel, Table, Variable
 from ....model.roles import measured_motion, spring_torque
 from .angle_form import Minimal, StateForm
 from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
-from .step import CascadeGain, FittedGain, GainRule, ObserverStep, braked_speed
+from .step import CascadeGain, FittedGain, GainRule, ObserverStep, speed_change
 from .table import Compact, Draft, FineEntries, Grid, TableTorqueError
 from .torque_grid import RESOLUTION, GridByTorqueError, TableTrial
 
@@ -285,8 +285,9 @@ class _Writer:
         after = [memory[i] + self.read("prior", i) for i in range(self.n)]
         if self.plant.friction is None:
             return after
-        time, before = self.step.sample_time, after[self.speed_place]
-        change = ca.SX(braked_speed(self.plant.friction, time)(before)) - before
+        time, speed = self.step.sample_time, ca.SX.sym("speed")
+        change = speed_change(ca.SX(self.plant.friction(speed)), speed, time)
+        change = ca.substitute(change, speed, after[self.speed_place])
         after[self.angle_place] += time / 2.0 * change
         after[self.speed_place] += change
         return after

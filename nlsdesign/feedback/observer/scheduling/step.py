@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import casadi as ca
 import numpy as np
@@ -23,13 +23,11 @@ from scipy.signal import place_poles
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
+from ....foundation.symbolic import Expression
 from ....model import Variable
 from ...analysis.kalman import discrete_noise, steady_state_kalman
 from .angle_form import AngleScheduledPlant
 from .table import Entry
-
-if TYPE_CHECKING:
-    from .angle_form import AngleScheduledPlant
 
 
 def held(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
@@ -84,27 +82,19 @@ def _exponentials(blocks: Array) -> Array:
     return result
 
 
-def braked_speed(friction: ca.Function, sample_time: float) -> ca.Function:
-    """Return the speed after friction has acted for one sample on the speed that all else left, ω -> ω⁺.
+def speed_change(rate: Expression, speed: Expression, sample_time: float) -> Expression:
+    """Return what friction takes from a speed within one sample, as an expression of the speed before.
 
     Friction is stiff near zero speed: held at its value it would throw the speed from side to side. So it
     comes last (Lie splitting), its step is the exponential Rosenbrock–Euler one, Δω = T·f·(e^x − 1)/x with
-    x = T·∂f/∂ω, which is exact where f is linear, and it may stop the speed but not turn it around.
-
-    Parameters
-    ----------
-    friction
-        ``casadi.Function`` ω -> ω̇.
-    sample_time
-        T in s.
+    x = T·∂f/∂ω, which is exact where f is linear, and it may stop the speed but not turn it around. Here f is
+    the rate that friction gives the speed.
     """
-    speed = ca.SX.sym("speed")
-    rate = ca.SX(friction(speed))
     x = sample_time * ca.jacobian(rate, speed)
     # Away from zero, where the quotient is undefined; its limit there is one.
     x = x - 1e-9 * (ca.fabs(x) < 1e-9)
-    left = speed + sample_time * rate * ca.expm1(x) / x
-    return ca.Function("braked", [speed], [left * (left * speed > 0)])
+    after = speed + sample_time * rate * ca.expm1(x) / x
+    return after * (after * speed > 0) - speed
 
 
 Spectrum: TypeAlias = NDArray[np.complex128]
