@@ -109,13 +109,7 @@ class Certificate(Generic[ProofT]):
 
 
 def certificate_text(certificate: Certificate[Proof]) -> str:
-    """Return the JSON text of a certificate.
-
-    Parameters
-    ----------
-    certificate
-        What is proved.
-    """
+    """Return the JSON text of a certificate."""
     name, text = certificate.deck
     content: dict[str, Any] = {
         "format": certificate.proof.form,
@@ -156,18 +150,7 @@ def write_certificate(certificate: Certificate[Proof], path: str | Path) -> Path
 
 
 def hashes_of_code(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each C source and header in a folder, by name.
-
-    Parameters
-    ----------
-    folder
-        Folder of the C files.
-
-    Raises
-    ------
-    MeasurementError
-        If there are none, or one cannot be read.
-    """
+    """Return the SHA-256 of each C source and header in a folder, by name."""
     try:
         files = sorted(f for f in folder.iterdir() if f.suffix in (".c", ".h"))
         result = {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}

@@ -63,21 +63,7 @@ class Enclosure:
 
 
 def enclose(function: ca.Function, boxes: Sequence[Sequence[tuple[ArrayLike, ArrayLike]]]) -> Enclosure:
-    """Return ranges of a function over boxes.
-
-    Parameters
-    ----------
-    function
-        Of symbols SX.
-    boxes
-        For each input of the function, for each of its elements, lower and upper bounds: numbers, or arrays
-        of shape (boxes,).
-
-    Raises
-    ------
-    ArrangementError
-        If the function uses an operation that has no verified range here.
-    """
+    """Return ranges of a function over boxes."""
     given = [
         [(np.asarray(low, dtype=float), np.asarray(high, dtype=float)) for low, high in group]
         for group in boxes
@@ -163,13 +149,7 @@ def _negate(a: Bounds) -> Bounds:
 
 
 def multiply(a: Bounds, b: Bounds) -> Bounds:
-    """Return the range of a product.
-
-    Parameters
-    ----------
-    a, b
-        Lower and upper bounds.
-    """
+    """Return the range of a product."""
     products = np.array(np.broadcast_arrays(a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]))
     zero = (a[0] == 0.0) | (a[1] == 0.0) | (b[0] == 0.0) | (b[1] == 0.0)
     low, high = np.min(products, axis=0), np.max(products, axis=0)
