@@ -28,10 +28,7 @@ CERTIFICATE = "certificate.json"
 def range_options(command: Any) -> Any:
     """Add the options for the ranges over which a bound on the torque is to hold.
 
-    Parameters
-    ----------
-    command
-        Gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
+    ``command``: gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
     """
     for option in (
         click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
@@ -45,13 +42,7 @@ def range_options(command: Any) -> Any:
 
 
 def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ranges that were given.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    """
+    """Return the ranges that were given."""
     named = {name: options[name] for name in ("angles", "speed", "angle_error")}
     return {name: value for name, value in named.items() if value is not None}
 
@@ -81,22 +72,7 @@ class ToProve:
 def prove(
     plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve
 ) -> Certificate[Contraction]:
-    """Prove what can be proved of an observer.
-
-    Parameters
-    ----------
-    plant, deck
-        Flat model of an actuator, and its deck.
-    chosen
-        Cascade or certified gain.
-    wanted
-        What is to be proved.
-
-    Raises
-    ------
-    ArrangementError
-        If observers of that kind cannot be certified.
-    """
+    """Prove what can be proved of an observer."""
     from ..feedback.observer import ObserverDesign, certify, declared_assumptions
 
     design = chosen.design

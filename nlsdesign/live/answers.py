@@ -63,13 +63,7 @@ class LimitMargin:
     active: bool
 
     def shown(self, value: float) -> str:
-        """Return a number in the unit of the limit as text.
-
-        Parameters
-        ----------
-        value
-            In SI.
-        """
+        """Return a number in the unit of the limit as text."""
         return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
 
 

@@ -379,13 +379,7 @@ class ChooseDeck(LiveEdit):
 
 
 def kept_names(question: LiveQuestion) -> LiveQuestion:
-    """Return a question without numbers that its machine no longer has.
-
-    Parameters
-    ----------
-    question
-        With a changed machine.
-    """
+    """Return a question without numbers that its machine no longer has."""
     names = {*question.machine.sizes, question.contour}
     return replace(
         question,
@@ -396,22 +390,7 @@ def kept_names(question: LiveQuestion) -> LiveQuestion:
 
 
 def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
-    """Return a question in which a number, or the contour, is not free.
-
-    Parameters
-    ----------
-    question
-        Before.
-    name
-        Full name.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such number.
-    ValueRangeError
-        If nothing would be left that may change.
-    """
+    """Return a question in which a number, or the contour, is not free."""
     if name != question.contour:
         question.number(name)
     free = tuple(each for each in question.free if each != name)

@@ -156,19 +156,7 @@ class LiveDesign:
 def open_question(live: LiveDesign, question: LiveQuestion, values: dict[str, float]) -> LiveAnswer:
     """Go on with another question, one step that can be undone; what was computed before is forgotten.
 
-    Parameters
-    ----------
-    live
-        The design.
-    question
-        For instance of a saved design.
-    values
-        Numbers in SI of a design to begin beside; empty without one.
-
-    Raises
-    ------
-    NlsError
-        If the question cannot be asked; nothing has changed then.
+    ``values``: numbers in SI of a design to begin beside; empty without one.
     """
     live._history.open(question, values)
     live.work.forget()

@@ -295,21 +295,7 @@ class LiveQuestion:
 def finite_in(what: str, value: object, *, lowest: float, highest: float, unit: str = "1") -> float:
     """Return a number that a designer gave, checked.
 
-    Parameters
-    ----------
-    what
-        For messages.
-    value
-        Anything.
-    lowest, highest
-        Inclusive range.
-    unit
-        Unit in SI of value and range; people read them in the unit of the page.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is no finite number in the range.
+    ``unit``: unit in SI of value and range; people read them in the unit of the page.
     """
     try:
         sound = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)

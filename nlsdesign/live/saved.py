@@ -51,12 +51,7 @@ class SavedDesign:
 def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
     """Return a question as text.
 
-    Parameters
-    ----------
-    question
-        As it stands.
-    values
-        Numbers of the last design in SI by name; empty before the first.
+    ``values``: numbers of the last design in SI by name; empty before the first.
     """
     lines = [_HEAD, f"free = {json.dumps(list(question.free))}", "", "[target]"]
     rows = (question.target.angles, question.target.torques)

@@ -155,20 +155,7 @@ class LiveWork:
     def start(
         self, task: LiveTask, question: LiveQuestion, revision: int, shown: AngleView | None
     ) -> WorkState:
-        """Start a task; one of its kind that runs is cancelled.
-
-        Parameters
-        ----------
-        task
-            What to do.
-        question, revision, shown
-            Of the session.
-
-        Raises
-        ------
-        ValueRangeError
-            If it cannot be done now.
-        """
+        """Start a task; one of its kind that runs is cancelled."""
         work, arguments = task.call(question, shown)
         name = type(task).__name__
         self.cancel(name)
@@ -181,25 +168,11 @@ class LiveWork:
         return tuple(each.state() for each in self._running.values())
 
     def wait(self, name: str, seconds: float) -> WorkState | None:
-        """Return the state of work once it is over, or after that time; ``None`` if it never began.
-
-        Parameters
-        ----------
-        name
-            Of the kind, for instance ``"SettleDesign"``.
-        seconds
-            Longest.
-        """
+        """Return the state of work once it is over, or after that time; ``None`` if it never began."""
         return self._running[name].wait(seconds) if name in self._running else None
 
     def cancel(self, name: str) -> WorkState | None:
-        """End work of a kind; ``None`` if it never began.
-
-        Parameters
-        ----------
-        name
-            Of the kind.
-        """
+        """End work of a kind; ``None`` if it never began."""
         return self._running[name].cancel() if name in self._running else None
 
     def close(self) -> None:
@@ -214,15 +187,7 @@ class LiveWork:
         self._designs.clear()
 
     def loop_at(self, angle: float, shown: AngleView) -> Lazy:
-        """Return the torque loop at one angle, where it was asked for and computed for this design.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        shown
-            The design.
-        """
+        """Return the torque loop at one angle, where it was asked for and computed for this design."""
         work, revision = self._running.get(TorqueLoop.__name__), shown.view.revision
         state = None if work is None else work.state()
         begun = self._designs.get(TorqueLoop.__name__)
@@ -266,20 +231,7 @@ class CloudAnswer:
 def tolerance_cloud(
     stage: Callable[[str], None], machine: Assembly, target: Target, draws: int, seed: int
 ) -> CloudAnswer:
-    """Return the tolerance analysis of a design.
-
-    Parameters
-    ----------
-    stage
-        Called with what is done now.
-    machine, target, draws, seed
-        As for :func:`~nlsdesign.design.tolerance_analysis`.
-
-    Raises
-    ------
-    NlsError
-        If the machine cannot be analysed.
-    """
+    """Return the tolerance analysis of a design."""
     stage(f"computes {draws} made springs")
     result: ToleranceResult = tolerance_analysis(machine, target=target, draws=draws, seed=seed)
     return CloudAnswer(result.angles, result.nominal, result.band, result.errors, tuple(result.rows()))
@@ -314,22 +266,7 @@ class DiagnosisAnswer:
 
 
 def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) -> DiagnosisAnswer:
-    """Return what the records of a folder say.
-
-    Parameters
-    ----------
-    stage
-        Called with what is tried now.
-    actuator
-        As declared.
-    folder
-        Of the records.
-
-    Raises
-    ------
-    NlsError
-        If the records cannot be used.
-    """
+    """Return what the records of a folder say."""
     from ..bench.discrepancy import diagnose
     from ..bench.identification import load_records
     from ..components.assembly.deck_writer import deck_text

@@ -131,18 +131,7 @@ def sweep_task(
 
 
 def require_askable(task: SweepTask) -> None:
-    """Refuse a question that fits no deck of a sweep, nor its first point, whose structure may differ.
-
-    Parameters
-    ----------
-    task
-        That was checked otherwise.
-
-    Raises
-    ------
-    NlsError
-        If the question names what is not there.
-    """
+    """Refuse a question that fits no deck of a sweep, nor its first point, whose structure may differ."""
     first: NlsError | None = None
     for assembly in task.assemblies.values():
         try:
@@ -219,24 +208,7 @@ def sweep(
 def run_task(
     task: SweepTask, folder: Path, *, executor: Executor, settings: SweepSettings, progress: Progress
 ) -> SweepTable:
-    """Run a checked sweep; see :func:`sweep`.
-
-    Parameters
-    ----------
-    task
-        The sweep.
-    folder
-        Of the results.
-    executor, settings, progress
-        As for :func:`sweep`.
-
-    Raises
-    ------
-    ExportError
-        If the folder cannot be written, is full, or holds another sweep.
-    WorkSharingError
-        If workers run other code, or their scheduler is not there.
-    """
+    """Run a checked sweep; see :func:`sweep`."""
     with only_run(folder):
         parts = opened(folder, task.about, task.columns, task.plan, again=settings.again)
         written_about(folder, task.about, task.columns, task.assemblies)
@@ -311,11 +283,6 @@ class _Watch:
 
 def duration(seconds: float) -> str:
     """Return a time in words of two units at most.
-
-    Parameters
-    ----------
-    seconds
-        Not negative.
 
     Examples
     --------

@@ -19,10 +19,14 @@ from ..foundation.errors import DeckError, MeasurementError, unknown_name
 from ..foundation.reading import is_there, text_of
 from .arrow_columns import give_back, libraries, numpy_column, read_columns
 from .changes import changed_assembly
-from .sweep_columns import DONE, RESULTS_FILE, STATE_COLUMNS, SweepColumn
+from .sweep_columns import DONE, RESULTS_FILE, SweepColumn
 from .sweep_parts import rows_in_order
 
-__all__ = ["STATE_COLUMNS", "SweepColumn", "SweepTable", "about_text", "read_about", "read_sweep"]
+__all__ = [
+    "SweepColumn",
+    "SweepTable",
+    "read_sweep",
+]
 
 FORMAT: Final = "nlsdesign sweep 1"
 ABOUT_FILE: Final = "sweep.json"

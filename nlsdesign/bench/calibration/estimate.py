@@ -17,9 +17,10 @@ from ...foundation.errors import ConvergenceError, MeasurementError, ValueRangeE
 from ...foundation.quantity import three_digits, with_unit
 from ...model import flatten
 from ...simulation import Prior, declared_prior
-from ..identification import Finding, RecordSet, load_record
+from ..identification import RecordSet, load_record
 from ..identification.covariance import Piece, inverse_information, robust_covariance
 from ..identification.least_squares import Minimum, huber_rows, minimise
+from ..identification.records.quality import Finding
 from ..identification.records.table_files import table_files
 from .bench_rows import BenchRows
 from .bench_test import WEIGHT, CalibrationTest
@@ -190,22 +191,7 @@ def _hangs(finding: Finding, records: RecordSet) -> bool:
 
 
 def prior_of(actuator: Assembly, given: Prior | None) -> Prior:
-    """Return what is known of a machine: as given, or the declared spreads.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    given
-        Of this machine.
-
-    Raises
-    ------
-    UnknownNameError
-        If the machine has no such number.
-    ValueRangeError
-        If a number stands for another value in the deck.
-    """
+    """Return what is known of a machine: as given, or the declared spreads."""
     model = flatten(actuator)
     if given is None:
         return declared_prior(model)

@@ -27,8 +27,9 @@ from ..identification.equation_error.evidence import Bench
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from .blocks.tearing import blocks_of
-from .effects import Candidate, EffectFunction
+from .effects import Candidate
 from .effects import catalogue as known_effects
+from .effects.candidate import EffectFunction
 from .fitting.unpredictable import Key
 from .planning.experiment import Experiment, next_experiment
 from .reporting.advice import advice, more_excitation, where_they_differ

@@ -126,14 +126,7 @@ class Huber(Loss):
 def huber_rows(residual: Array, slope: Array, limit: float) -> tuple[Array, Array]:
     """Return residuals and slopes scaled so that half the sum of squares is Huber's loss.
 
-    Parameters
-    ----------
-    residual
-        In standard deviations, shape (n,).
-    slope
-        Its derivatives, shape (n, parameters).
-    limit
-        Beyond so many standard deviations the loss is a line.
+    ``slope``: its derivatives, shape (n, parameters).
     """
     size = np.abs(residual)
     far = size > limit
@@ -148,14 +141,7 @@ def bounded_total(residual: Array, slope: Array, bound: float) -> tuple[Array, A
     ρ(c) = c up to the bound, bound·(2 − bound/c) beyond: smooth, and rising ever more slowly. For a whole
     record that a model may predict not at all, which must not decide over those that it predicts.
 
-    Parameters
-    ----------
-    residual
-        Of one record in standard deviations, shape (n,).
-    slope
-        Its derivatives, shape (n, parameters).
-    bound
-        Sum of squares up to which everything counts, above zero.
+    ``slope``: its derivatives, shape (n, parameters).
     """
     total = float(residual @ residual)
     if total <= bound:
@@ -200,27 +186,8 @@ def minimise(
 ) -> Minimum:
     """Return the minimum of half a sum of squares within bounds.
 
-    Parameters
-    ----------
-    rows
-        Residuals and their derivatives at a point.
-    start
-        Inside the bounds.
-    box
-        Lower and upper bounds.
-    evaluations
-        At most so many; a point where there is no response counts as a bad one.
-    share
-        Ends when the predicted gain is below this share of the cost, or below :data:`ENOUGH`.
-    least
-        Ends too when the predicted gain is below this.
-    logarithmic
-        Which coordinates are logarithms of positive numbers, in the shape of the start; by default none.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is no response at the start, or its slopes are not finite.
+    ``evaluations``: at most so many; a point where there is no response counts as a bad one. ``logarithmic``:
+    which coordinates are logarithms of positive numbers, in the shape of the start; by default none.
     """
     x, damping, used = start, _FIRST_DAMPING, 0
     residual, slope = rows(x)
@@ -481,13 +448,7 @@ def fit(
 
 
 def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
-    """Return the cost that the linearised problem would reach from a start, at the price of one evaluation.
-
-    Parameters
-    ----------
-    evidence, parameters
-        As for :func:`fit`.
-    """
+    """Return the cost that the linearised problem reaches from a start, at the price of one evaluation."""
     low, high, start = box(parameters)
     residual, slope = StackedRows(evidence, parameters)(start)
     size = np.linalg.norm(slope, axis=0)
@@ -498,13 +459,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
 
 
 class StackedRows:
-    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered.
-
-    Parameters
-    ----------
-    evidence, parameters, known
-        As for :func:`fit`.
-    """
+    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered."""
 
     def __init__(
         self,
@@ -519,13 +474,7 @@ class StackedRows:
         self._last: tuple[bytes, tuple[Array, Array]] | None = None
 
     def values(self, x: Array) -> dict[str, float]:
-        """Return the numbers in SI by name.
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return the numbers in SI by name."""
         # At a bound the last digit of a product may lie beyond it, and a part refuses such a value.
         return {
             p.name: min(max(p.outward(v), p.lower), p.upper) for p, v in zip(self.parameters, x, strict=True)
@@ -537,47 +486,21 @@ class StackedRows:
         return np.asarray(self._prior.T @ self._prior, dtype=np.float64)
 
     def prior_gradient(self, x: Array) -> Array:
-        """Return the gradient of half the sum of squares of the priors.
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return the gradient of half the sum of squares of the priors."""
         return np.asarray(self.prior_information @ (x - self._centre), dtype=np.float64)
 
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
-        """Return residuals of the priors, shape (parameters,), and slopes, shape (parameters, parameters).
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return residuals of the priors, shape (parameters,), and slopes, shape (parameters, parameters)."""
         return self._prior @ (x - self._centre), self._prior
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        """Return residuals and slopes of priors and evidence, one below the other.
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return residuals and slopes of priors and evidence, one below the other."""
         if self._last is None or self._last[0] != x.tobytes():
             self._last = x.tobytes(), self._evaluated(x)
         return self._last[1]
 
     def of(self, each: Evidence, x: Array) -> tuple[Array, Array]:
-        """Return residuals of one piece of evidence, shape (rows,), and slopes, shape (rows, parameters).
-
-        Parameters
-        ----------
-        each
-            A record seen by a block.
-        x
-            In the fitted scale.
-        """
+        """Return residuals of one piece of evidence, shape (rows,), and slopes, shape (rows, parameters)."""
         values = self.values(x)
         residual, slope = each.residual(values)
         wide = np.zeros((len(residual), len(x)))

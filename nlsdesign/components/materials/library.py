@@ -95,18 +95,7 @@ class Material:
     properties: tuple[Property, ...]
 
     def __getitem__(self, name: str) -> Property:
-        """Return one property.
-
-        Parameters
-        ----------
-        name
-            For instance ``"loss_tangent"``.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest that exists.
-        """
+        """Return one property."""
         for each in self.properties:
             if each.name == name:
                 return each

@@ -84,11 +84,6 @@ class MaterialLaw:
 def missing_law(material: Material) -> str:
     """Return why a rubber gives no elastic law; empty where it gives one.
 
-    Parameters
-    ----------
-    material
-        Of the library.
-
     Examples
     --------
     >>> from nlsdesign.components import material

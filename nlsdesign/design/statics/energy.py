@@ -105,28 +105,7 @@ def energy_profile(
 def closed_form(
     law: ElasticLaw, target: Target, *, elements: float, pretension: float = 0.0, points: int = 401
 ) -> CamProfile:
-    """Return the closed-form cam for an elastic law.
-
-    Parameters
-    ----------
-    law
-        Equilibrium law of one element.
-    target
-        Torque curve.
-    elements
-        Number of equal elements.
-    pretension
-        Extension at angle zero in m.
-    points
-        Number of angles.
-
-    Raises
-    ------
-    InfeasibleError
-        As :func:`energy_profile`.
-    ValueRangeError
-        If fewer than three angles are asked for.
-    """
+    """Return the closed-form cam for an elastic law."""
     if points < 3:
         raise ValueRangeError(f"points = {points}", "a profile needs at least three angles")
     angles = np.linspace(0.0, target.last_angle, points)

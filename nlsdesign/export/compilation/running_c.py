@@ -60,15 +60,7 @@ class CompiledStep:
     def __call__(self, inputs: Sequence[float]) -> tuple[Array, int]:
         """Advance by one sample.
 
-        Parameters
-        ----------
-        inputs
-            Shape (inputs,).
-
-        Returns
-        -------
-        tuple
-            Outputs, shape (outputs,), and the status word.
+        Result: outputs, shape (outputs,), and the status word.
         """
         outputs = self._array([0.0] * len(self._source.model.outputs))
         status = self._library.adapter_step(self._state, self._array(inputs), outputs)

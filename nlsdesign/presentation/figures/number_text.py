@@ -11,13 +11,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def root_mean_square(values: ArrayLike) -> float:
-    """Return the root of the mean square of all finite values.
-
-    Parameters
-    ----------
-    values
-        Any shape.
-    """
+    """Return the root of the mean square of all finite values."""
     return float(np.sqrt(np.nanmean(np.square(np.asarray(values, dtype=float)))))
 
 
@@ -70,11 +64,5 @@ def compact(value: float, digits: int = 4) -> str:
 
 
 def superscript(number: int) -> str:
-    """Return an integer in superscript digits.
-
-    Parameters
-    ----------
-    number
-        Of either sign.
-    """
+    """Return an integer in superscript digits."""
     return str(number).translate(_SUPERSCRIPTS)

@@ -46,13 +46,7 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
 
 
 def value_in_words(q: Quantity) -> str:
-    """Return a value without its unit; of a long row how many, the least and the largest.
-
-    Parameters
-    ----------
-    q
-        Number or row of numbers.
-    """
+    """Return a value without its unit; of a long row how many, the least and the largest."""
     shown = q.shown
     if not isinstance(shown, tuple):
         return compact(shown, 6)

@@ -61,16 +61,7 @@ def scaled_balance(
 ) -> tuple[Expression, float]:
     """Return a balance in the scale of what was measured, and the declared effort per unit of that.
 
-    Parameters
-    ----------
-    terms
-        The balance.
-    drives
-        Readings of what may drive the body; the first one that does is taken.
-    efforts
-        Readings of all efforts, drives and other inputs.
-    inertia
-        Of the body.
+    ``drives``: readings of what may drive the body; the first one that does is taken.
     """
     for reading in drives:
         given = _effort_at_standstill(terms, reading)

@@ -45,15 +45,7 @@ class Measured:
 
 
 def measured_signals(model: FlatModel, signals: Sequence[str]) -> list[Measured]:
-    """Return what each measured signal stands for.
-
-    Parameters
-    ----------
-    model
-        Of what is measured.
-    signals
-        Full names.
-    """
+    """Return what each measured signal stands for."""
     return [_measured(model, signal) for signal in signals]
 
 
@@ -85,17 +77,7 @@ def _variable_behind(model: FlatModel, name: str) -> str:
 
 
 def behind_ratio(measured: Measured, value: Expression, known: Mapping[str, Expression]) -> Expression:
-    """Return the variable that a measured value stands for, where a fixed ratio lies between.
-
-    Parameters
-    ----------
-    measured
-        Signal.
-    value
-        What its sensors must have seen.
-    known
-        Expressions of everything in the model by name.
-    """
+    """Return the variable that a measured value stands for, where a fixed ratio lies between."""
     name = measured.reading.measured
     if measured.shown == name:
         return value

@@ -28,18 +28,7 @@ def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
     it, with measured efforts in place of those that the model would predict. A block that would need a
     command that is not measured is left out.
 
-    Parameters
-    ----------
-    model
-        Of what is measured.
-    signals
-        Full names of measured signals; readings of sensors stand for what these read.
-
-    Raises
-    ------
-    MeasurementError
-        If nothing can be compared: no motion is measured, no effort and no drive, or a drive whose command
-        is unknown stands between.
+    ``signals``: full names of measured signals; readings of sensors stand for what these read.
     """
     used = _sorted(model, measured_signals(model, signals))
     drives, efforts = used.drives, used.efforts
@@ -278,15 +267,7 @@ class _Tearing:
                 yield each.body.rate, self.inferred(each, 1)
 
     def block(self, result: _Result, body: MovingBody | None = None) -> Block:
-        """Return the block of a result.
-
-        Parameters
-        ----------
-        result
-            In the symbols of the model.
-        body
-            Whose balance it is.
-        """
+        """Return the block of a result."""
         model, s = self._model, self._s
         kept = [i for i, v in enumerate(model.states) if v.name not in self._replaced]
         # Where the model is cut, a signal and an input have one name: what is not fed by a reading is unused.

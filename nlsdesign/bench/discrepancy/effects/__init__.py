@@ -11,7 +11,7 @@ import pkgutil
 
 from ....foundation.errors import ArrangementError, unknown_name
 from ....foundation.extensions import extension_modules
-from .candidate import Candidate, EffectFunction, Unknown, wrapped
+from .candidate import Candidate, Unknown
 from .effect import Edit, Effect, Form
 
 
@@ -49,4 +49,12 @@ def __getattr__(name: str) -> Effect:
     raise AttributeError(str(unknown_name("effect", name, [row.identifier for row in ALL])))
 
 
-__all__ = ["ALL", "Candidate", "Edit", "Effect", "EffectFunction", "Form", "Unknown", "catalogue", "wrapped"]
+__all__ = [
+    "ALL",
+    "Candidate",
+    "Edit",
+    "Effect",
+    "Form",
+    "Unknown",
+    "catalogue",
+]

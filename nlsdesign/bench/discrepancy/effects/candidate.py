@@ -141,12 +141,7 @@ def _reading_on(assembly: Assembly, old: str, new: str, renamed: Mapping[str, st
 def free_name(assembly: Assembly, name: str) -> str:
     """Return a name that no part at the top has yet.
 
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    name
-        The name wanted; a number is added where it is taken.
+    ``name``: the name wanted; a number is added where it is taken.
     """
     taken, number, free = {n for n, _ in assembly.parts}, 2, name
     while free in taken:
@@ -157,12 +152,7 @@ def free_name(assembly: Assembly, name: str) -> str:
 def free_inside(part: Part, name: str) -> str:
     """Return a name that no part inside another has yet.
 
-    Parameters
-    ----------
-    part
-        That holds others.
-    name
-        The name wanted; a number is added where it is taken.
+    ``name``: the name wanted; a number is added where it is taken.
     """
     taken, number, free = set(part.children()), 2, name
     while free in taken:
@@ -171,11 +161,5 @@ def free_inside(part: Part, name: str) -> str:
 
 
 def numbers_of(part: Part) -> dict[str, Any]:
-    """Return the fields of a part, to make a part of a more special kind from it.
-
-    Parameters
-    ----------
-    part
-        Of the declared model.
-    """
+    """Return the fields of a part, to make a part of a more special kind from it."""
     return {field.name: getattr(part, field.name) for field in fields(part)}

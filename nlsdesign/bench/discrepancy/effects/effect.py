@@ -83,10 +83,7 @@ class Effect:
     def __call__(self, assembly: Assembly) -> Sequence[Candidate]:
         """Return one candidate for each form, place and edit.
 
-        Parameters
-        ----------
-        assembly
-            As declared; a place that has the phenomenon already is left out.
+        ``assembly``: as declared; a place that has the phenomenon already is left out.
         """
         return [
             Candidate(

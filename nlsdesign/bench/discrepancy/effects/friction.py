@@ -40,32 +40,12 @@ Law = Callable[[Domain], Element]
 
 
 def number(value: float, unit: str) -> Quantity:
-    """Return a number that a fit is going to change.
-
-    Parameters
-    ----------
-    value
-        In SI.
-    unit
-        SI unit.
-    """
+    """Return a number that a fit is going to change."""
     return Quantity(value, unit, SOURCE)
 
 
 def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[Assembly, str]:
-    """Return the assembly with one more element on a body, and the element's name.
-
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    name
-        The name wanted.
-    body
-        Name of the body.
-    element
-        Between the body and the resting frame.
-    """
+    """Return the assembly with one more element on a body, and the element's name."""
     part = free_name(assembly, name)
     return assembly.with_part(part, tie(element, body)), part
 
@@ -98,19 +78,7 @@ class _Surroundings:
 
 
 class Placed:
-    """A law of friction put on a body, or beside what a prescribed motion strains.
-
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    place
-        Name of a body that moves freely, or of a tie with no such body at an end.
-    name
-        Wanted for the law.
-    law
-        Made for the domain.
-    """
+    """A law of friction put on a body, or beside what a prescribed motion strains."""
 
     def __init__(self, assembly: Assembly, place: str, name: str, law: Law) -> None:
         if isinstance(assembly[place], Free):

@@ -159,15 +159,7 @@ class Strategy(ABC):
 
     @abstractmethod
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
-        """Return better starts than those of the unknowns; nothing where there are none.
-
-        Parameters
-        ----------
-        problem
-            What is to be fitted.
-        slow
-            Evidence of the slower records.
-        """
+        """Return better starts than those of the unknowns; nothing where there are none."""
 
 
 @dataclass(frozen=True)
@@ -208,13 +200,7 @@ class Continuation(Strategy):
     takes_long: ClassVar[bool] = True
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
-        """Return the starts that the simpler form leaves; nothing where it has no response.
-
-        Raises
-        ------
-        ConvergenceError
-            If the simpler form explains so little of every block that the whole effect cannot be named.
-        """
+        """Return the starts that the simpler form leaves; nothing where it has no response."""
         bench, first = problem.bench, problem.starts[0]
         every = blocks_of(flatten(self.through), bench.records.signals)
         blocks = [b for b in every if b.name in problem.blocks]
@@ -254,34 +240,11 @@ class Method(ABC):
 
     @abstractmethod
     def fit(self, problem: FitProblem, strategy: Strategy) -> Fit:
-        """Fit the numbers.
-
-        Parameters
-        ----------
-        problem
-            To be fitted.
-        strategy
-            Of the newest effect.
-
-        Raises
-        ------
-        ConvergenceError
-            If there is no response at any of the starts.
-        """
+        """Fit the numbers."""
 
     @abstractmethod
     def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
-        """Return which blocks and records are to be judged by the others.
-
-        Parameters
-        ----------
-        problem
-            That was fitted.
-        best
-            The fitted numbers.
-        after
-            What the fit left over.
-        """
+        """Return which blocks and records are to be judged by the others."""
 
 
 class Smooth(Method):
@@ -349,11 +312,6 @@ def refusal(problem: FitProblem) -> str:
     """Return why a further effect is not fitted at all; empty if it is.
 
     Bounds count operations and starts, never seconds, so that every machine gives the same verdict.
-
-    Parameters
-    ----------
-    problem
-        To be fitted.
     """
     starts = len(problem.starts)
     many = problem.beside_free_flight and starts > MOST_STARTS
@@ -363,13 +321,7 @@ def refusal(problem: FitProblem) -> str:
 
 
 def method_for(problem: FitProblem) -> Method:
-    """Return how a group of blocks is fitted.
-
-    Parameters
-    ----------
-    problem
-        To be fitted.
-    """
+    """Return how a group of blocks is fitted."""
     return RobustOverFreeFlight() if problem.has_free_flight else Smooth()
 
 
@@ -380,24 +332,7 @@ def best_fit(
     *,
     known: Mapping[Key, float] | None = None,
 ) -> Fit:
-    """Return the best of fits from several starts, the most promising first.
-
-    Parameters
-    ----------
-    evidence
-        What the records say.
-    starts
-        At least one.
-    limits
-        Of each fit.
-    known
-        As for :func:`~nlsdesign.bench.identification.least_squares.fit`.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is no response at any of the starts.
-    """
+    """Return the best of fits from several starts, the most promising first."""
     several = len(starts) > 1
     choices = [(_promise(evidence, start) if several else 0.0, start) for start in starts]
     best: Fit | None = None
@@ -433,15 +368,7 @@ def _promise(evidence: Sequence[Evidence], start: Sequence[Parameter]) -> float:
 
 
 def explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:
-    """Tell whether a fit takes enough off the excess over the noise of any block.
-
-    Parameters
-    ----------
-    problem
-        With what was left over before.
-    misfit
-        Half the sum of squares by block and record.
-    """
+    """Tell whether a fit takes enough off the excess over the noise of any block."""
     for block in problem.blocks:
         keys = [key for key in misfit if key[0] == block]
         now = 0.5 * sum(problem.before[key].squares for key in keys)

@@ -64,13 +64,7 @@ class Tally(NamedTuple):
 
 
 def quickest(evidence: Sequence[Evidence]) -> frozenset[str]:
-    """Return the quickest quarter of the records, rounded down, by the acceleration of what moves.
-
-    Parameters
-    ----------
-    evidence
-        Of several blocks on several records.
-    """
+    """Return the quickest quarter of the records, rounded down, by the acceleration of what moves."""
     size: dict[str, float] = {}
     for each in evidence:
         for drive in each.driven.block.drives.values():
@@ -84,15 +78,7 @@ def quickest(evidence: Sequence[Evidence]) -> frozenset[str]:
 def unpredictable(
     before: Mapping[Key, Tally], after: Mapping[Key, Tally], quick: Collection[str]
 ) -> frozenset[Key]:
-    """Return where a quick record is predicted worse than before, or far worse than every other one.
-
-    Parameters
-    ----------
-    before, after
-        By block and record.
-    quick
-        Names of the quickest records.
-    """
+    """Return where a quick record is predicted worse than before, or far worse than every other one."""
 
     def mean_square(key: Key) -> float:
         return after[key].squares / after[key].rows
@@ -113,13 +99,6 @@ def diverges(evidence: Evidence, best: Fit) -> bool:
     Only that proves a record unpredictable: a wrong law that fails on it fails in its neighbourhood too. The
     members of the ensemble differ by a standard error of each number, a hundredth at most, in directions
     drawn once for all.
-
-    Parameters
-    ----------
-    evidence
-        Of the record.
-    best
-        The fitted numbers.
     """
     random = np.random.default_rng(0)
     error = np.minimum(np.sqrt(np.diag(best.covariance)), _NEIGHBOURHOOD)
@@ -140,12 +119,7 @@ def diverges(evidence: Evidence, best: Fit) -> bool:
 def like_the_others(tallies: Mapping[Key, Tally], unpredictable: Collection[Key]) -> dict[Key, Tally]:
     """Return tallies in which an unpredictable record is as well predicted as the others of its block.
 
-    Parameters
-    ----------
-    tallies
-        By block and record.
-    unpredictable
-        Blocks and records; none of them counts for more than it did.
+    ``unpredictable``: blocks and records; none of them counts for more than it did.
     """
     result = dict(tallies)
     for block, record in unpredictable:

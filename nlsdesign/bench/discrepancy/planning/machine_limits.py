@@ -44,16 +44,7 @@ def limits_seen(
 ) -> MachineLimits:
     """Return as limits what the records show that the machine has done.
 
-    Parameters
-    ----------
-    records
-        Measured.
-    commanded
-        Signal that the experiment is going to command. A drive has no limits of rate.
-    drives
-        Measured drives.
-    motions
-        Measured motions.
+    ``commanded``: signal that the experiment is going to command. A drive has no limits of rate.
     """
 
     def smooth(record: Record, signal: str, order: int = 0) -> np.ndarray:

@@ -16,15 +16,7 @@ from .verdict import Course, RecordGap
 
 
 def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tuple[RecordGap, ...]:
-    """Return the error of every block on every record, the records in the order in which they were given.
-
-    Parameters
-    ----------
-    before, after
-        Fitted to all samples.
-    comparison
-        Knows the records.
-    """
+    """Return the error of every block on every record, the records in the order in which they were given."""
     gaps = []
     acting = Acting(comparison.bench, flatten(before.fitted))
     for then, now in zip(comparison.judged(before), comparison.judged(after), strict=True):
@@ -44,13 +36,6 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
     """Return a held-out record of a block over time; the one with the largest error before.
 
     Everything passes the filter of the block, so that the errors are those of :func:`gaps_of`.
-
-    Parameters
-    ----------
-    before, after, comparison
-        As above.
-    block
-        Name.
     """
     pairs = zip(comparison.judged(before), comparison.judged(after), strict=True)
     own = [(a, b) for a, b in pairs if a.block.name == block]
@@ -74,13 +59,7 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
 def shapes_of(
     before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str
 ) -> dict[str, tuple[Binned, Binned]]:
-    """Return the residual of a block over every measured signal, before and after, from all records.
-
-    Parameters
-    ----------
-    before, after, comparison, block
-        As above.
-    """
+    """Return the residual of a block over every measured signal, before and after, from all records."""
     first, last = (_shapes(h, comparison, block) for h in (before, after))
     return {name: (first[name], last[name]) for name in first if name in last}
 

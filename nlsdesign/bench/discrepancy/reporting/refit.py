@@ -194,13 +194,7 @@ def refit(
 
 
 def sourced(hypothesis: Hypothesis) -> Assembly:
-    """Return the fitted assembly, its fitted numbers marked with where they come from.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    """
+    """Return the fitted assembly, its fitted numbers marked with where they come from."""
     fitted = hypothesis.fitted
     known, declared = fitted.quantities(), hypothesis.assembly.quantities()
     rows = {name.partition("[")[0] for name in hypothesis.values}

@@ -94,14 +94,7 @@ class _Rows:
 def remainder_of(judged: Sequence[Judged], records: RecordSet, rounded: Sequence[str]) -> Remainder:
     """Return a description of the residual of one block.
 
-    Parameters
-    ----------
-    judged
-        What all records say of the block.
-    records
-        Give the measured signals.
-    rounded
-        Signals whose noise is rounding, as that of an encoder; the rate of the first is the speed.
+    ``rounded``: signals whose noise is rounding, as that of an encoder; the rate of the first is the speed.
     """
     block = judged[0].block
     motion = [*rounded, *records.signals][0]

@@ -46,17 +46,7 @@ class Formula:
 def sparse_formula(
     parts: Sequence[Part], unit: str, extra: Sequence[Mapping[str, Array]] = ()
 ) -> Formula | None:
-    """Return a short formula for an error, or nothing if none holds on the other records.
-
-    Parameters
-    ----------
-    parts
-        For each record: error, signals at the same places, whether the formula may be fitted to it.
-    unit
-        Of the error.
-    extra
-        Further terms of each record by name.
-    """
+    """Return a short formula for an error, or nothing if none holds on the other records."""
     columns = [_library(signals) for _, signals, _ in parts]
     for column, more in zip(columns, extra, strict=False):
         column |= more

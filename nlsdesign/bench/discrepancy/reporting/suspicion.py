@@ -15,13 +15,7 @@ CONTRADICTION = "deck and records contradict each other, so nothing is named"
 
 
 def as_sentence(text: str) -> str:
-    """Return a reason as a sentence or a question; the name of a file at its beginning stays as it is.
-
-    Parameters
-    ----------
-    text
-        Without a full stop, perhaps.
-    """
+    """Return a reason as a sentence or a question; the name of a file at its beginning stays as it is."""
     begins = text.split(maxsplit=1)[0].isalpha()
     sentence = (capitalised(text) if begins else text).rstrip(".")
     return sentence if sentence.endswith("?") else f"{sentence}."

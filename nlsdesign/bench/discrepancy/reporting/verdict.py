@@ -405,37 +405,19 @@ class Verdict:
 
 
 def let_go(verdict: Verdict) -> bool:
-    """Return whether the records contradict declared numbers, and other numbers explain them.
-
-    Parameters
-    ----------
-    verdict
-        Of a diagnosis.
-    """
+    """Return whether the records contradict declared numbers, and other numbers explain them."""
     return verdict.verdict == "data_suspect" and any(verdict.gap(name).changed for name in verdict.blocks)
 
 
 def suspicions(verdict: Verdict) -> tuple[str, ...]:
-    """Return why records or deck are suspect, in sentences; none with another verdict.
-
-    Parameters
-    ----------
-    verdict
-        Of a diagnosis.
-    """
+    """Return why records or deck are suspect, in sentences; none with another verdict."""
     if verdict.verdict != "data_suspect":
         return ()
     return tuple(text for text in verdict.findings if not text.startswith(f"{DECLARED}:"))
 
 
 def best_forms(tried: Sequence[tuple[Any, ...]]) -> tuple[tuple[Any, ...], ...]:
-    """Return of each effect the form or place that explains most: one name stands for all of them.
-
-    Parameters
-    ----------
-    tried
-        Name of the effect, share that it explains, and perhaps more, best first.
-    """
+    """Return of each effect the form or place that explains most: one name stands for all of them."""
     best: dict[str, tuple[Any, ...]] = {}
     for each in tried:
         best.setdefault(each[0], each)
@@ -465,15 +447,7 @@ def _why_richer(verdict: Verdict, effect: NamedEffect) -> str:
 
 
 def rms_over(gaps: Sequence[RecordGap], which: str) -> float:
-    """Return the root mean square over several records, each sample counted once.
-
-    Parameters
-    ----------
-    gaps
-        Of one block.
-    which
-        ``before``, ``after``, ``noise_floor`` or ``signal``.
-    """
+    """Return the root mean square over several records, each sample counted once."""
     total = sum(g.rows for g in gaps)
     # An exact sum, so that the order of the records makes no difference.
     squares = math.fsum(getattr(g, which) ** 2 * g.rows for g in gaps)

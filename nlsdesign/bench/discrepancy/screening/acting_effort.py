@@ -37,13 +37,7 @@ class Acting:
         self._driven: dict[Block, DrivenBlock] = {}
 
     def name(self, block: Block) -> str:
-        """Return the name of the signal or effort, for people.
-
-        Parameters
-        ----------
-        block
-            Of any hypothesis.
-        """
+        """Return the name of the signal or effort, for people."""
         if block.target is not None:
             return block.target
         drives, others = self._outside(block)
@@ -54,23 +48,11 @@ class Acting:
         return f"measured {effort}" if others else f"{effort} of the inertia"
 
     def drives(self, block: Block) -> list[str]:
-        """Return the measured signals that drive the body of a balance.
-
-        Parameters
-        ----------
-        block
-            Of any hypothesis.
-        """
+        """Return the measured signals that drive the body of a balance."""
         return self._outside(block)[0]
 
     def filtered(self, judged: Judged) -> Array:
-        """Return the signal or effort over a record, filtered as the error is, in the unit of the block.
-
-        Parameters
-        ----------
-        judged
-            The block on the record.
-        """
+        """Return the signal or effort over a record, filtered as the error is, in the unit of the block."""
         block, trace = judged.block, judged.record.trace
         if block.target is not None:
             result: Array = judged.floor.filter @ np.asarray(trace[block.target])

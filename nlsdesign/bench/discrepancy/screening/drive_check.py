@@ -36,17 +36,7 @@ _LEFT = 0.02
 
 
 def drive_findings(actuator: Assembly, comparison: Comparison, base: Hypothesis) -> list[Finding]:
-    """Return the drives whose sign or unit is another than stated, with what shows it.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    comparison
-        Evaluates hypotheses on the records.
-    base
-        Refitted declared model.
-    """
+    """Return the drives whose sign or unit is another than stated, with what shows it."""
     findings = []
     records = comparison.bench.records
     for block, (signal, ratios) in _asked(comparison, base).items():

@@ -58,19 +58,7 @@ class OtherNumbers(NamedTuple):
 def other_numbers(
     comparison: Comparison, base: Hypothesis, better: Hypothesis, criteria: Criteria
 ) -> OtherNumbers:
-    """Let the declared numbers go where the records take them, if a refit has driven some to their ends.
-
-    Parameters
-    ----------
-    comparison
-        Evaluates hypotheses.
-    base
-        Refitted declared model.
-    better
-        With the effects that were added, if any.
-    criteria
-        Of the decision.
-    """
+    """Let the declared numbers go where the records take them, if a refit has driven some to their ends."""
     before, after = _left(base, comparison.bench, criteria), _left(better, comparison.bench, criteria)
     scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
     stuck = [n for n, z in scores.items() if abs(z) >= AT_END]
@@ -99,17 +87,7 @@ def other_numbers(
 
 
 def numbers_explain(share: float, *, left: float, after: float, before: float, named: bool) -> bool:
-    """Tell whether numbers let go explain records, and better than an effect.
-
-    Parameters
-    ----------
-    share
-        Of the excess that they explain.
-    left, after, before
-        Excess with numbers let go, with the effects that were added, and of the declared model.
-    named
-        Whether an effect was added at all.
-    """
+    """Tell whether numbers let go explain records, and better than an effect."""
     effect_is_simpler = named and after <= _CLOSED * before
     return share >= _SHARE and left < 0.5 * after and not effect_is_simpler
 
@@ -142,12 +120,7 @@ def _spread(base: Hypothesis, name: str) -> float:
 def out_of_reach(actuator: Assembly, records: RecordSet) -> list[Finding]:
     """Return the records whose angle goes far beyond the end of the declared cam.
 
-    Parameters
-    ----------
-    actuator
-        As declared.
-    records
-        Measured. Where more than one angle is measured nothing is said.
+    ``records``: measured. Where more than one angle is measured nothing is said.
     """
     model = flatten(actuator)
     ends = [cam.last_angle for spring in model.springs for cam in spring.cams if cam.last_angle]

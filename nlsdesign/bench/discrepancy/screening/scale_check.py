@@ -32,13 +32,6 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
 
     The model is evaluated where one of the measured signals, or the rate of a measured motion, is as large as
     it becomes; a single sample that stands out is not taken for a size.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    records
-        All records.
     """
     model = flatten(actuator)
     sizes = {LONGEST: max(float(r.trace.time[-1] - r.trace.time[0]) for r in records.records)}
@@ -117,15 +110,7 @@ def _rms(values: Array) -> float:
 
 
 def scale_findings(comparison: Comparison, base: Hypothesis) -> list[Finding]:
-    """Return records whose measured signal is many times, or a small part of, what the model predicts.
-
-    Parameters
-    ----------
-    comparison
-        Evaluates hypotheses.
-    base
-        Refitted declared model.
-    """
+    """Return records whose measured signal is many times, or a small part of, what the model predicts."""
     findings = []
     for judged in comparison.judged(base):
         target = judged.block.target

@@ -31,20 +31,8 @@ def with_numbers_let_go(
 ) -> Hypothesis | None:
     """Return a hypothesis with the numbers let go at whose ends a refit was stopped, if they explain enough.
 
-    Parameters
-    ----------
-    comparison
-        Evaluates hypotheses.
-    hypothesis
-        Fitted to all samples, with or without effects.
-    criteria
-        Of the decision.
-
-    Returns
-    -------
-    Hypothesis or None
-        Refitted; nothing where no block is open or no number stands at its end, where letting go explains
-        less than an effect would have to, or where the numbers end near their declared ranges.
+    Result: refitted; nothing where no block is open or no number stands at its end, where letting go explains
+    less than an effect would have to, or where the numbers end near their declared ranges.
     """
     stuck, every = stuck_numbers(hypothesis), excesses(hypothesis, comparison.bench, criteria)
     if not stuck or is_complete(every):
@@ -64,36 +52,18 @@ def with_numbers_let_go(
 
 
 def stuck_numbers(hypothesis: Hypothesis) -> list[str]:
-    """Return the names of the positive declared numbers that stand at the end of what their spread allows.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    """
+    """Return the names of the positive declared numbers that stand at the end of what their spread allows."""
     scores = {n: z for f in hypothesis.fits.values() for n, z in f.prior_z_scores().items()}
     return [n for n in positive_numbers(hypothesis) if abs(scores.get(n, 0.0)) >= AT_END]
 
 
 def positive_numbers(hypothesis: Hypothesis) -> list[str]:
-    """Return the names of the fitted numbers that are positive by nature.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    """
+    """Return the names of the fitted numbers that are positive by nature."""
     return [p.name for f in hypothesis.fits.values() for p in f.parameters if p.scale == "log"]
 
 
 def wrong_numbers(hypothesis: Hypothesis) -> list[str]:
-    """Return in words the numbers that were let go and lie outside what their declared spread allows.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted with some numbers let go.
-    """
+    """Return in words the numbers that were let go and lie outside what their declared spread allows."""
     words = []
     for fit in hypothesis.fits.values():
         for p in fit.parameters:
@@ -119,15 +89,6 @@ def is_explained_by_numbers(
     What is left may be as little as the inexact form of an effect may leave: a bench has friction that sticks
     or counts that round, which leave a trace whatever the numbers are. A wrong number that explains all but
     that is no reason to name an effect that explains less.
-
-    Parameters
-    ----------
-    criteria
-        Of the decision.
-    before
-        What the declared model leaves, its numbers held in their ranges.
-    with_effects, with_numbers
-        What is left with the effects that were named, if any, and with numbers let go instead.
     """
     first, effects, numbers = (
         sum(each.excess for each in _blocks(every).values()) for every in (before, with_effects, with_numbers)
@@ -140,12 +101,6 @@ def _blocks(every: Excesses) -> Excesses:
 
 
 def sentence_of(hypothesis: Hypothesis) -> str:
-    """Return one sentence on the wrong numbers of a hypothesis; empty where there are none.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted, perhaps with some numbers let go.
-    """
+    """Return one sentence on the wrong numbers of a hypothesis; empty where there are none."""
     words = wrong_numbers(hypothesis)
     return f"a declared number is probably wrong: {'; '.join(words)}" if words else ""

@@ -105,60 +105,26 @@ def is_beyond_noise(
     """Tell whether a mean square in units of the noise floor is more than noise.
 
     The floor is a mean square itself; the ratio of two scatters by what both do.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    mean_square
-        Of the residuals of a block.
-    effective_size
-        How many independent residuals these are equivalent to.
-    known_from
-        How many independent squares of noise the floor is known from.
     """
     scatter = criteria.significant * math.sqrt(2.0 / max(effective_size, 1.0) + 2.0 / max(known_from, 1.0))
     return mean_square > 1.0 + max(criteria.least_excess, scatter)
 
 
 def is_beyond_prior(criteria: Criteria, squares: float, expected: float) -> bool:
-    """Tell whether refitted numbers lie outside their declared ranges, taken together.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    squares
-        Sum of squared departures in standard deviations of the prior.
-    expected
-        What noise alone gives: one for each number, more where the noise is coloured.
-    """
+    """Tell whether refitted numbers lie outside their declared ranges, taken together."""
     return squares > criteria.prior_per_number * expected
 
 
 def is_more_than_noise(criteria: Criteria, gained: Gain) -> bool:
-    """Tell whether a gain in prediction is more than noise gives, and does not rest on a single piece.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    gained
-        From one hypothesis to another.
-    """
+    """Tell whether a gain in prediction is more than noise gives, and does not rest on a single piece."""
     return gained.rest >= criteria.noise_margin
 
 
 def predicts_records(criteria: Criteria, before: Excesses, after: Excesses) -> bool:
     """Tell whether whole records are predicted better with an effect, its numbers fitted to the others.
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before, after
-        Of the hypotheses without and with the effect, each record with the numbers of the others. Nothing is
-        asked where only declared numbers are open.
+    ``before``, ``after``: of the hypotheses without and with the effect, each record with the numbers of the
+    others. Nothing is asked where only declared numbers are open.
     """
     if not any(one.open for name, one in before.items() if name != DECLARED):
         return True
@@ -166,15 +132,7 @@ def predicts_records(criteria: Criteria, before: Excesses, after: Excesses) -> b
 
 
 def records_made_worse(criteria: Criteria, before: Excesses, after: Excesses) -> dict[str, float]:
-    """Return the records that are predicted worse than before, with the factor by which their squares grow.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before, after
-        Of the hypotheses without and with an effect.
-    """
+    """Return the records that are predicted worse than before, with the growth of their squares."""
     squares = {"before": dict[str, float](), "after": dict[str, float](), "margin": dict[str, float]()}
     for name, one in before.items():
         for record, pieces in one.pieces.items():
@@ -197,13 +155,6 @@ def unexplained(criteria: Criteria, first: Excesses, last: Excesses) -> list[str
 
     Declared numbers that stay far from their values are no objection where a block was open: they are
     mentioned in ``where``.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    first, last
-        Of the refitted declared model and of the last hypothesis.
     """
     shares = explained(first, last)
     if len(shares) > 1:
@@ -212,50 +163,22 @@ def unexplained(criteria: Criteria, first: Excesses, last: Excesses) -> list[str
 
 
 def stands_out(criteria: Criteria, distance: float) -> bool:
-    """Tell whether an effect explains so much more than any other that it is one, although much is left.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    distance
-        How many times as much the best other name leaves, natural logarithm.
-    """
+    """Tell whether an effect explains so much more than any other that it is one, although much is left."""
     return distance >= math.log(criteria.stands_out)
 
 
 def is_far_from_closed(criteria: Criteria, first: Excess, now: Excess) -> bool:
-    """Tell whether a block has more left than an inexact form of a named effect leaves.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    first, now
-        What the refitted declared model leaves, and what the present hypothesis leaves.
-    """
+    """Tell whether a block has more left than an inexact form of a named effect leaves."""
     return now.excess > criteria.inexact * first.excess
 
 
 def is_complete(last: Excesses) -> bool:
-    """Tell whether nothing is left beyond the noise in any block.
-
-    Parameters
-    ----------
-    last
-        Of the last hypothesis.
-    """
+    """Tell whether nothing is left beyond the noise in any block."""
     return not any(each.open for name, each in last.items() if name != DECLARED)
 
 
 def lacking(now: Excesses) -> list[str]:
-    """Return the blocks that are open, the largest excess first; declared numbers only where no block is.
-
-    Parameters
-    ----------
-    now
-        Of the present hypothesis.
-    """
+    """Return the blocks that are open, the largest excess first; declared numbers only where no block is."""
     names = [n for n, e in now.items() if e.open]
     blocks = sorted((n for n in names if n != DECLARED), key=lambda n: -now[n].excess)
     return blocks or names
@@ -293,47 +216,19 @@ class Rival(Generic[T]):
 
 
 def left_by(rival: Rival[T], block: str) -> float:
-    """Return the excess that a rival leaves in a block.
-
-    Parameters
-    ----------
-    rival
-        Of several.
-    block
-        Name.
-    """
+    """Return the excess that a rival leaves in a block."""
     return rival.excesses[block].excess
 
 
 def is_undecided(criteria: Criteria, before: Excesses, rival: Rival[T]) -> bool:
-    """Tell whether an effect explains what is left, but the records do not determine its numbers.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before
-        Of the hypothesis without the effect.
-    rival
-        With it.
-    """
+    """Tell whether an effect explains what is left, but the records do not determine its numbers."""
     explains = max(explained(before, rival.excesses).values(), default=0.0) >= criteria.closed_share
     unknown = objections_of_numbers(criteria, rival.standing)
     return explains and bool(unknown) and list(objections(criteria, before, rival)) == unknown
 
 
 def objections(criteria: Criteria, before: Excesses, rival: Rival[T]) -> tuple[str, ...]:
-    """Return in words why an effect may not be named; nothing if it may.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before
-        Of the hypothesis without the effect.
-    rival
-        With it.
-    """
+    """Return in words why an effect may not be named; nothing if it may."""
     words, after = [], rival.excesses
     shares = explained(before, after)
     best = max(shares.values(), default=0.0)
@@ -363,15 +258,7 @@ def _strained(criteria: Criteria, before: Excesses, after: Excesses) -> list[str
 
 
 def objections_of_numbers(criteria: Criteria, standing: Standing) -> list[str]:
-    """Return in words what the numbers of an effect have against it.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    standing
-        Of the fitted numbers.
-    """
+    """Return in words what the numbers of an effect have against it."""
     words = []
     if standing.exclusion < criteria.exclusion:
         words.append(f"its numbers are {standing.exclusion:.1f} standard errors from no effect")
@@ -393,15 +280,7 @@ def _worse(criteria: Criteria, before: Excesses, after: Excesses) -> list[str]:
 
 
 def is_superfluous(criteria: Criteria, without: Excesses, with_it: Excesses) -> bool:
-    """Tell whether the hypothesis without an effect predicts about as well as that with it.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    without, with_it
-        Of the two hypotheses.
-    """
+    """Tell whether the hypothesis without an effect predicts about as well as that with it."""
     if not is_more_than_noise(criteria, gain(without, with_it)):
         return True
     return total_excess(without) <= criteria.richer * total_excess(with_it)
@@ -418,21 +297,7 @@ class Choice(Generic[T]):
 def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], block: str) -> Choice[T] | None:
     """Return the simplest of the rivals that predict a block about as well as the best, and may be named.
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before
-        Of the hypothesis that all rivals add to.
-    rivals
-        In the order of the catalogue.
-    block
-        Where something is lacking.
-
-    Returns
-    -------
-    Choice or None
-        Nothing where none of them may be named.
+    Result: nothing where none of them may be named.
     """
 
     def left(rival: Rival[T]) -> float:
@@ -476,17 +341,6 @@ def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -
     """Tell whether an effect only imitates another, whose numbers are not known but that explains far more.
 
     What it leaves shows that it is the other one.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    taken
-        Effect that may be named.
-    other
-        Effect that may not, because of its numbers alone.
-    block
-        Where something is lacking.
     """
     here, there = ({block: each.excesses[block]} for each in (taken, other))
     less = criteria.richer * left_by(other, block) < left_by(taken, block)

@@ -11,17 +11,7 @@ from .measures import DECLARED, Excess
 
 
 def excesses(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> dict[str, Excess]:
-    """Return the excess of each block, and of the declared numbers.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    bench
-        Its records and floors.
-    criteria
-        Of the decision.
-    """
+    """Return the excess of each block, and of the declared numbers."""
     names = dict.fromkeys(block for block, _ in hypothesis.tallies)
     result = {name: _block_excess(hypothesis, bench, name, criteria) for name in names}
     prior, count = hypothesis.prior, sum(len(f.prior_z_scores()) for f in hypothesis.fits.values())

@@ -89,11 +89,5 @@ class Hypothesis:
         return replace(self, values={n: to_resolution(v, errors.get(n, 0.0)) for n, v in self.values.items()})
 
     def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
-        """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do.
-
-        Parameters
-        ----------
-        tallies
-            By block and record, as they are.
-        """
+        """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do."""
         return replace(self, tallies=like_the_others(tallies, self.unpredictable))

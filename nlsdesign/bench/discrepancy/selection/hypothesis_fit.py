@@ -71,19 +71,8 @@ class HypothesisFit:
     ) -> GroupFit | ConvergenceError:
         """Fit a group of blocks.
 
-        Parameters
-        ----------
-        hypothesis
-            With the effect in its assembly, and what was left over without it.
-        group
-            Blocks that share free numbers.
-        new
-            Numbers of the newest effect; nothing where none was added.
-
-        Returns
-        -------
-        GroupFit or ConvergenceError
-            The error says why there is no fit; it is returned so that others go on beside it.
+        ``new``: numbers of the newest effect; nothing where none was added. Result: the error says why there
+        is no fit; it is returned so that others go on beside it.
         """
         problem = self._problem(hypothesis, group, new)
         if reason := refusal(problem):
@@ -106,14 +95,7 @@ class HypothesisFit:
     ) -> Mapping[Key, Tally]:
         """Return what a hypothesis leaves over, its numbers as they are.
 
-        Parameters
-        ----------
-        hypothesis
-            Fitted; on thinned records where it is coarse.
-        group
-            Blocks that share free numbers.
-        folds
-            What is left out in turn.
+        ``hypothesis``: fitted; on thinned records where it is coarse.
         """
         names = tuple(each.block.name for each in group)
         return _tallies(self._problem(hypothesis, group, ()), hypothesis.fits[names], folds)

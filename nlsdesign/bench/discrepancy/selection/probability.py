@@ -36,15 +36,7 @@ class Calibration:
     most: float = 0.99
 
     def probability(self, distance: float, *, complete: bool) -> float:
-        """Return the probability that a name is right.
-
-        Parameters
-        ----------
-        distance
-            ln(r).
-        complete
-            Whether nothing is left beyond the noise.
-        """
+        """Return the probability that a name is right."""
         score = self.offset + self.distance * distance + self.complete * complete
         return min(self.most, 1.0 / (1.0 + math.exp(-score)))
 
@@ -53,19 +45,7 @@ CALIBRATION = Calibration()
 
 
 def distance_to_next(criteria: Criteria, choice: Choice[T], rivals: Sequence[Rival[T]], block: str) -> float:
-    """Return ln(r): how many times as much the best other name leaves as the one that is taken.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    choice
-        What is taken, and what cannot be told from it.
-    rivals
-        All that were compared.
-    block
-        Where something was lacking.
-    """
+    """Return ln(r): how many times as much the best other name leaves as the one that is taken."""
     names = {choice.taken.effect, *(each.effect for each in choice.equals), *choice.taken.simpler}
     # A form that contains it is no other name for what is there.
     forms = {rival.effect for rival in rivals if choice.taken.effect in rival.simpler}

@@ -16,15 +16,7 @@ from .trials import Step, Trials, rival_of
 
 @dataclass(frozen=True, eq=False)
 class Revision:
-    """Builds steps anew from where they began, and keeps what the rule prefers.
-
-    Parameters
-    ----------
-    trials
-        That fit and judge.
-    start
-        Hypothesis without effects.
-    """
+    """Builds steps anew from where they began, and keeps what the rule prefers."""
 
     trials: Trials
     start: Hypothesis
@@ -34,11 +26,6 @@ class Revision:
         """Return the steps with what prediction gains by each effect beside all others that are named.
 
         A step says what it gained when it was added. What was added later may have taken most of that over.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
         """
         if len(steps) < 2:
             return steps
@@ -62,13 +49,7 @@ class Revision:
         return list(self._fewer[kept])
 
     def backward(self, steps: list[Step]) -> list[Step]:
-        """Drop the effects that later ones have made superfluous, the first added first.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
-        """
+        """Drop the effects that later ones have made superfluous, the first added first."""
         place = 0
         while len(steps) > 1 and place < len(steps) - 1:
             self.trials.progress(f"trying without {steps[place].effect}")
@@ -84,11 +65,6 @@ class Revision:
 
         A form of the same effect with more numbers is one too. Beside effects that were not named yet the
         simpler form may have done.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
         """
         if len(steps) < 2 or is_complete(self.trials.excesses_of(steps[-1].chosen)):
             return steps
@@ -103,11 +79,6 @@ class Revision:
         """Put a simpler form of an effect in its place where that predicts about as well.
 
         Before the other effects were named, the richer form may have stood for a part of them.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
         """
         if len(steps) < 2:
             return steps
@@ -141,15 +112,7 @@ class Revision:
         return is_superfluous(self.trials.criteria, *after)
 
     def rebuilt(self, steps: Sequence[Step], changed: Mapping[int, Candidate] | None = None) -> list[Step]:
-        """Return the steps anew, some perhaps changed; nothing if one of them no longer fits.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they are to be added.
-        changed
-            Candidates in the place of some, by place.
-        """
+        """Return the steps anew, some perhaps changed; nothing if one of them no longer fits."""
         present, rebuilt = self.start, list[Step]()
         for place, step in enumerate(steps):
             candidate = same_again(self.trials, present, (changed or {}).get(place, step.chosen.newest))
@@ -169,17 +132,7 @@ class Revision:
 
 
 def same_again(trials: Trials, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
-    """Return the same form of an effect at the same kind of place of another assembly.
-
-    Parameters
-    ----------
-    trials
-        With the catalogue.
-    hypothesis
-        To add to.
-    wanted
-        Made from another assembly.
-    """
+    """Return the same form of an effect at the same kind of place of another assembly."""
     same = [
         c for c in trials.candidates(hypothesis) if c.effect == wanted.effect and _kinds(c) == _kinds(wanted)
     ]
@@ -188,15 +141,7 @@ def same_again(trials: Trials, hypothesis: Hypothesis, wanted: Candidate) -> Can
 
 
 def objections_of_all(criteria: Criteria, last: Hypothesis) -> list[list[str]]:
-    """Return what the numbers of each effect have against it, all effects together.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    last
-        With the effects.
-    """
+    """Return what the numbers of each effect have against it, all effects together."""
     return [
         objections_of_numbers(criteria, standing_of(each.unknowns, last.fits.values())) for each in last.added
     ]

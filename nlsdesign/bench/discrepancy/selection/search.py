@@ -62,21 +62,7 @@ def search(
     criteria: Criteria,
     progress: Callable[[str], None],
 ) -> Outcome:
-    """Add effects to a hypothesis while a block stays open and one may be named.
-
-    Parameters
-    ----------
-    comparison
-        Fits hypotheses to the records.
-    base
-        Refitted declared model.
-    catalogue
-        Effects to try.
-    criteria
-        Of the decision.
-    progress
-        Told what is being tried.
-    """
+    """Add effects to a hypothesis while a block stays open and one may be named."""
     return _Search(Trials(comparison, catalogue, criteria, progress)).outcome(base)
 
 

@@ -17,15 +17,7 @@ _CLOSE = 0.005
 
 
 def standing_of(unknowns: Sequence[Unknown], fits: Iterable[Fit]) -> Standing:
-    """Return distance from "no effect", errors and covariance of the numbers that an effect has brought.
-
-    Parameters
-    ----------
-    unknowns
-        Of the effect.
-    fits
-        In one of them its numbers were fitted, all together.
-    """
+    """Return distance from "no effect", errors and covariance of the numbers that an effect has brought."""
     known = {u.name: u for u in unknowns}
     for fit in fits:
         places = [k for k, p in enumerate(fit.parameters) if p.name in known]

@@ -15,15 +15,6 @@ def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criter
     """Return a hypothesis with a table for what each open block leaves over, where one predicts it.
 
     The clauses are those of an effect that ask for prediction; no share is asked for, since nothing is named.
-
-    Parameters
-    ----------
-    comparison
-        Fits hypotheses to the records.
-    hypothesis
-        Fitted to all samples.
-    criteria
-        Of the rule.
     """
     present = hypothesis
     for block in lacking(excesses(hypothesis, comparison.bench, criteria)):

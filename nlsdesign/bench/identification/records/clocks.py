@@ -242,14 +242,7 @@ def resolutions(
 ) -> dict[str, Resolution]:
     """Return the resolution of channels on a new clock.
 
-    Parameters
-    ----------
-    channels
-        As sampled.
-    step
-        Of the new clock in s.
-    quanta
-        Declared sizes of a count; 0 where none is declared.
+    ``quanta``: declared sizes of a count; 0 where none is declared.
     """
     return {name: each.resolution(step, quanta.get(name, 0.0)) for name, each in channels.items()}
 

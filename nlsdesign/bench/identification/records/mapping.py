@@ -22,42 +22,14 @@ _FASTEST = 1e6
 
 
 def table_at(file: str, field: str, given: Any, next_step: str) -> Mapping[str, Any]:
-    """Return a field that must be a table.
-
-    Parameters
-    ----------
-    file, field
-        For messages.
-    given
-        As read.
-    next_step
-        What to write instead.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a table."""
     if not isinstance(given, dict):
         raise MeasurementError(f"{file}: {field}", f"{_shown(given)} is not a table", next_step=next_step)
     return given
 
 
 def text_at(where: str, field: str, given: Any) -> str:
-    """Return a field that must be a text.
-
-    Parameters
-    ----------
-    where, field
-        For messages.
-    given
-        As read.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a text."""
     if not isinstance(given, str):
         raise MeasurementError(
             f"{where}.{field}", f"{_shown(given)} is not a text", next_step=f'write {field} = "..."'
@@ -66,24 +38,7 @@ def text_at(where: str, field: str, given: Any) -> str:
 
 
 def number_at(where: str, field: str, given: Any, next_step: str, between: str = ": ") -> float:
-    """Return a field that must be a finite number.
-
-    Parameters
-    ----------
-    where, field
-        For messages.
-    given
-        As read.
-    next_step
-        What to write instead.
-    between
-        Stands between the two in messages.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a finite number."""
     if isinstance(given, int | float) and not isinstance(given, bool):
         try:
             number = float(given)
@@ -97,20 +52,7 @@ def number_at(where: str, field: str, given: Any, next_step: str, between: str =
 
 
 def globs_at(file: str, field: str, given: Any) -> tuple[str, ...]:
-    """Return a field that must be a list of names of records.
-
-    Parameters
-    ----------
-    file, field
-        For messages.
-    given
-        As read.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a list of names of records."""
     if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
         raise MeasurementError(
             f"{file}: {field}",
@@ -193,13 +135,7 @@ class Inputs:
 
     @staticmethod
     def of(model: FlatModel) -> Inputs:
-        """Return what commands a model.
-
-        Parameters
-        ----------
-        model
-            Whose signals are measured.
-        """
+        """Return what commands a model."""
         commanded = frozenset(v.name for v in model.inputs) | {c for b in model.bodies for c in b.commands}
         return Inputs(commanded, frozenset(r.signal for r in model.readings if r.measured in commanded))
 
@@ -247,16 +183,8 @@ class ColumnMap:
 def read_mapping(path: Path) -> ColumnMap:
     """Read the mapping of columns to signals.
 
-    Parameters
-    ----------
-    path
-        TOML file. Where it has no table ``columns``, the heads of the records say what they are; where it has
-        no ``time`` either, also which column holds the time, and the name of that column is empty here.
-
-    Raises
-    ------
-    MeasurementError
-        If it is not valid or a column lacks signal or unit.
+    ``path``: TOML file. Where it has no table ``columns``, the heads of the records say what they are; where
+    it has no ``time`` either, also which column holds the time, and the name of that column is empty here.
     """
     try:
         tables = tomllib.loads(text_of(path, MeasurementError, next_step="name a records.toml"))
@@ -421,22 +349,7 @@ def _size(where: str, field: str, given: Any) -> float:
 
 
 def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> None:
-    """Check that every column measures a signal of the model in a unit of its dimension.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    columns
-        Mapped.
-    model
-        Whose signals are measured.
-
-    Raises
-    ------
-    MeasurementError
-        Naming the column, the signal and both units.
-    """
+    """Check that every column measures a signal of the model in a unit of its dimension."""
     everything = {v.name: v for v in model.states + model.inputs + model.signals}
     for column in columns:
         where = f"{file}: column '{column.name}'"

@@ -51,10 +51,7 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
     those that are left, so that fits keep every kind of motion: the one nearer to the middle of the range of
     all, so that it is predicted by interpolation, and among equals the one of the smaller motion.
 
-    Parameters
-    ----------
-    traces
-        With the same signals; at least two.
+    ``traces``: with the same signals; at least two.
     """
     marks = _marks(traces)
     left = list(range(len(traces)))
@@ -70,13 +67,7 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
 
 
 def content_digest(trace: Trace) -> str:
-    """Return a digest of time and signals, whatever their order.
-
-    Parameters
-    ----------
-    trace
-        Of a record.
-    """
+    """Return a digest of time and signals, whatever their order."""
     digest = hashlib.sha256(trace.time.tobytes())
     for name in sorted(trace.signals):
         digest.update(trace.signals[name].tobytes())
@@ -459,17 +450,8 @@ def split(
 ) -> tuple[Record, ...]:
     """Return the records with their roles.
 
-    Parameters
-    ----------
-    records
-        In order of name.
-    held_out, selection
-        Globs on names; see :func:`load_records` for what happens without ``held_out``.
-
-    Raises
-    ------
-    MeasurementError
-        If a glob matches nothing, or no record is left for fitting.
+    ``held_out``, ``selection``: globs on names; see :func:`load_records` for what happens without
+    ``held_out``.
     """
     if not held_out and len(records) == 1:
         return _cut_after_two_thirds(records[0])
@@ -525,15 +507,7 @@ def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
 
 
 def from_sample(record: Record, first: int) -> Record:
-    """Return a record from one sample on.
-
-    Parameters
-    ----------
-    record
-        To be shortened.
-    first
-        Index of the new first sample.
-    """
+    """Return a record from one sample on."""
     return _part(record, slice(first, None), record.role, f"from {record.trace.time[first]:g} s")
 
 
@@ -564,11 +538,6 @@ def in_canonical_order(records: RecordSet) -> RecordSet:
 
     Rounding of sums and choices among equals depend on the order of records. In canonical order results do
     not depend on the names of files.
-
-    Parameters
-    ----------
-    records
-        In any order.
     """
     ordered = tuple(sorted(records.records, key=_content))
     findings, remarks = (

@@ -109,22 +109,7 @@ class Finding:
 
 
 def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2) -> None:
-    """Check that every number is finite, and of a size that can be measured.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    columns
-        Numbers as they stand in the file, by head.
-    first_row
-        Row of the first number: 2 in a text editor, where the heads are row 1.
-
-    Raises
-    ------
-    MeasurementError
-        Naming the column and the first run of rows.
-    """
+    """Check that every number is finite, and of a size that can be measured."""
     for head, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
@@ -145,26 +130,8 @@ def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2
 def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged: float = 0.0) -> str:
     """Check that time ascends without gaps.
 
-    Parameters
-    ----------
-    file, head
-        For messages.
-    time
-        In s, shape (n,).
-    first_row
-        As above.
-    bridged
-        Step in s of a slower clock to which the channel will be resampled; shorter gaps are accepted.
-
-    Returns
-    -------
-    str
-        Empty if the grid is uniform; otherwise the change that makes it uniform.
-
-    Raises
-    ------
-    MeasurementError
-        If time stands still, runs backwards or has a gap.
+    ``bridged``: step in s of a slower clock to which the channel will be resampled; shorter gaps are
+    accepted. Result: empty if the grid is uniform; otherwise the change that makes it uniform.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0.0)
@@ -207,15 +174,7 @@ def _first_run(indices: Indices) -> Indices:
 
 
 def rows_in_words(indices: Indices, first_row: int) -> str:
-    """Return the rows of a run of samples, for messages.
-
-    Parameters
-    ----------
-    indices
-        Ascending, at least one.
-    first_row
-        Row of sample 0.
-    """
+    """Return the rows of a run of samples, for messages."""
     first, last = int(indices[0]) + first_row, int(indices[-1]) + first_row
     return f"row {first}" if first == last else f"rows {first} to {last}"
 
@@ -262,13 +221,6 @@ class Witness:
 
         Then its samples around the group are better described by two parabolas, one before and one behind,
         than by one polynomial of as many coefficients over both.
-
-        Parameters
-        ----------
-        first, behind
-            Of the group.
-        reach
-            Samples on either side that are looked at.
         """
         left = np.arange(max(first - reach, 0), first)
         right = np.arange(behind, min(behind + reach, len(self.values)))
@@ -311,15 +263,7 @@ class Surroundings:
 
 
 def faulty_groups(values: Array, around: Surroundings) -> list[Group]:
-    """Return the groups of samples that are faulty, in order.
-
-    Parameters
-    ----------
-    values
-        Finite, shape (n,).
-    around
-        What else is known.
-    """
+    """Return the groups of samples that are faulty, in order."""
     if len(values) < 2 * _SIDE or np.ptp(values) == 0.0:
         return []
     scatter = _Scatter(values)
@@ -339,13 +283,6 @@ def repaired(values: Array, groups: Sequence[Group]) -> tuple[Array, Mask]:
     A cubic through the good samples on both sides is put in; at an end of the record, and in a group longer
     than :data:`LONGEST`, a straight line between the nearest good samples. What is behind a jump is left as
     it is.
-
-    Parameters
-    ----------
-    values
-        Shape (n,).
-    groups
-        Faulty ones.
     """
     mask = np.zeros(len(values), dtype=bool)
     groups = [g for g in groups if g.kind != "jump"]
@@ -405,15 +342,7 @@ class _Scatter:
         self.edges = np.flatnonzero(size > _ABRUPT * self.tail * scale)
 
     def group(self, first: int, behind: int, *, both: bool = True) -> float:
-        """Return how far a group is off if the samples around it continue each other; 0 if not.
-
-        Parameters
-        ----------
-        first, behind
-            Of the group.
-        both
-            Whether it must be off at both of its ends, or at one.
-        """
+        """Return how far a group is off if the samples around it continue each other; 0 if not."""
         values = self.values
         left = np.arange(max(first - _SIDE, 0), first)
         right = np.arange(behind, min(behind + _SIDE, len(values)))
@@ -614,19 +543,7 @@ class Checked:
 
 
 def check_channels(file: str, time: Array, columns: Sequence[Sampled], *, first_row: int = 2) -> Checked:
-    """Check the columns of one clock.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    time
-        In s, shape (n,).
-    columns
-        On this clock.
-    first_row
-        Row of the first number in messages.
-    """
+    """Check the columns of one clock."""
     witnesses = {c.head: Witness(c.values) for c in columns}
     values: dict[str, Array] = {}
     masked: dict[str, Mask] = {}

@@ -199,17 +199,7 @@ def linear_loop(
 
 
 def plant_of(system: SampledSystem, angles: Array, mode: LinearMode) -> LinearPlant:
-    """Return the plant of a system, linearised with all signals that are wired.
-
-    Parameters
-    ----------
-    system
-        Gives plant and wiring.
-    angles
-        Of the driven body, shape (n,), in rad.
-    mode
-        Of dry friction.
-    """
+    """Return the plant of a system, linearised with all signals that are wired."""
     start = f"{PLANT}."
     wired = [s.removeprefix(start) for s in system.sources.values() if s.startswith(start)]
     spring = series_spring(system.plant)
@@ -227,23 +217,7 @@ def assembled(
     tables: TableSlope,
     mode: LinearMode,
 ) -> LinearLoop:
-    """Return the whole loop of a linearised plant and the blocks of a system, at rest.
-
-    Parameters
-    ----------
-    system
-        Gives blocks and wiring.
-    plant
-        At n points.
-    angles
-        Of those points, shape (n,).
-    cut
-        Inputs at which the loop is open.
-    tables
-        How looked-up tables take part.
-    mode
-        In which the plant was linearised.
-    """
+    """Return the whole loop of a linearised plant and the blocks of a system, at rest."""
     writer = _Assembler(system, plant, cut, tables)
     writer.rest()
     return writer.loop(angles, mode)

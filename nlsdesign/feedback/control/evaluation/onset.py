@@ -233,24 +233,7 @@ class LimitCycleOnset:
 
 
 def checked_gains(loop: ClosedLoop, gain: str, between: tuple[float, float]) -> tuple[float, float]:
-    """Return the range of a gain after a look at its name and ends.
-
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    gain
-        Name of a parameter of the controller.
-    between
-        Smallest and largest gain.
-
-    Raises
-    ------
-    UnknownNameError
-        If the controller has no such parameter.
-    ValueRangeError
-        If the range is empty.
-    """
+    """Return the range of a gain after a look at its name and ends."""
     names = [v.name for v in loop.controller.parameters]
     if gain not in names:
         raise unknown_name("parameter of the controller", gain, names)

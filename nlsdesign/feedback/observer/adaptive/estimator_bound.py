@@ -160,14 +160,6 @@ def _variational(model: FlatModel, prior: Prior, sensed: SensedTorque) -> tuple[
 
 
 def rms_over(bounds: list[EstimatorBound], first: float, last: float) -> float:
-    """Return the root mean square of the bound over a stretch of several runs.
-
-    Parameters
-    ----------
-    bounds
-        Of the runs.
-    first, last
-        Stretch in s.
-    """
+    """Return the root mean square of the bound over a stretch of several runs."""
     squares = [b.deviation[(b.time >= first) & (b.time < last)] ** 2 for b in bounds]
     return math.sqrt(float(np.mean(np.concatenate(squares))))

@@ -156,18 +156,7 @@ def write_certificate(certificate: Certificate[Proof], path: str | Path) -> Path
 
 
 def hashes_of_code(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each C source and header in a folder, by name.
-
-    Parameters
-    ----------
-    folder
-        Folder of the C files.
-
-    Raises
-    ------
-    MeasurementError
-        If there are none, or one cannot be read.
-    """
+    """Return the SHA-256 of each C source and header in a folder, by name."""
     try:
         files = sorted(f for f in folder.iterdir() if f.suffix in (".c", ".h"))
         result = {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}

@@ -300,14 +300,7 @@ def declared_assumptions(model: FlatModel, design: ObserverDesign) -> Assumption
 def contracts(polytope: ErrorPolytope, lyapunov: Array, decay: float) -> bool:
     """Return whether √(eᵀPe) falls with e^(−decay·T) at every corner, decided in fractions.
 
-    Parameters
-    ----------
-    polytope
-        All that one sample can do to the error.
-    lyapunov
-        P, shape (n, n).
-    decay
-        In 1/s.
+    ``lyapunov``: P, shape (n, n).
     """
     p = exact(lyapunov)
     if not is_positive_definite(p):
@@ -323,12 +316,7 @@ def contracts(polytope: ErrorPolytope, lyapunov: Array, decay: float) -> bool:
 def within_condition(lyapunov: Array, condition: float) -> bool:
     """Return whether 1 ⪯ P ⪯ condition, decided in fractions up to a millionth.
 
-    Parameters
-    ----------
-    lyapunov
-        P, shape (n, n).
-    condition
-        Largest eigenvalue over the smallest.
+    ``lyapunov``: P, shape (n, n).
     """
     p, one = exact(lyapunov), identity(len(lyapunov))
     margin = Fraction(1, 10**6)

@@ -201,13 +201,8 @@ def _slopes(
 def hull(ranges: Callable[[Bounds], tuple[Array, Array, Mask]], edges: Array) -> tuple[Array, Array]:
     """Return bounds of many functions over a range, from cells that are halved where they are too wide.
 
-    Parameters
-    ----------
-    ranges
-        Takes cells and returns lower and upper bounds, shape (cells, functions), and which cells reach over
-        the edge of a piece; of these what is narrower than 1e-7 rad is left out.
-    edges
-        Of the first cells, ascending.
+    ``ranges``: takes cells and returns lower and upper bounds, shape (cells, functions), and which cells
+    reach over the edge of a piece; of these what is narrower than 1e-7 rad is left out.
     """
     cells: Bounds = (edges[:-1], edges[1:])
     points = ranges((edges, edges))

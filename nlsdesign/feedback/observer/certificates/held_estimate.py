@@ -300,15 +300,7 @@ class _Table:
 
 
 def held_assumptions(model: FlatModel, design: AdaptiveDesign) -> Assumptions:
-    """Return the whole table, and half a count of the encoder that the deck declares.
-
-    Parameters
-    ----------
-    model
-        Its readings say how the angle is measured.
-    design
-        The adaptive observer.
-    """
+    """Return the whole table, and half a count of the encoder that the deck declares."""
     return declared_assumptions(model, _nominal(design))
 
 

@@ -11,7 +11,6 @@ from nlsdesign.bench.discrepancy.effects import (
     ALL,
     Candidate,
     Effect,
-    EffectFunction,
     Unknown,
     angle_sensor_eccentricity,
     backlash,
@@ -22,8 +21,8 @@ from nlsdesign.bench.discrepancy.effects import (
     permanent_set,
     self_heating,
     stress_softening,
-    wrapped,
 )
+from nlsdesign.bench.discrepancy.effects.candidate import EffectFunction, wrapped
 from nlsdesign.bench.discrepancy.effects.places import stretched
 from nlsdesign.bench.discrepancy.selection.comparison import moved_numbers
 from nlsdesign.components import (

@@ -17,9 +17,10 @@ from nlsdesign.bench.discrepancy.reporting.window_refit import fitted_over_windo
 from nlsdesign.bench.discrepancy.screening.acting_effort import Acting
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison, Judged
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
 from nlsdesign.bench.identification.filters import smoothing
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.measurement import Role
 from nlsdesign.components import (
     ROTATION,

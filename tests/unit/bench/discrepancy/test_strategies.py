@@ -32,9 +32,10 @@ from nlsdesign.bench.discrepancy.fitting.strategies import (
 from nlsdesign.bench.discrepancy.fitting.unpredictable import Key, Tally
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.selection.hypothesis_fit import FreeBlock, GroupFit, HypothesisFit
-from nlsdesign.bench.identification import Fit, Parameter
+from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.block import Drive
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Evidence
+from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.components import Fixed
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly

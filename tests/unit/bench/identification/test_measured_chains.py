@@ -13,7 +13,8 @@ from nlsdesign.bench.discrepancy import refit
 from nlsdesign.bench.discrepancy.screening.causality import lagging_forces
 from nlsdesign.bench.discrepancy.screening.other_rig import out_of_reach
 from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.bench.identification import Column, Record, RecordSet, load_records
+from nlsdesign.bench.identification import Record, RecordSet, load_records
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import (
     TRANSLATION,
     Assembly,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
 from nlsdesign.bench.identification.equation_error.noise import (
     Noise,
@@ -16,6 +16,7 @@ from nlsdesign.bench.identification.equation_error.noise import (
     estimate_noise,
     independent_number,
 )
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.residuals import effective_size
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck

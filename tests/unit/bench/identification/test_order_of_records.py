@@ -12,10 +12,11 @@ import pytest
 from nlsdesign.bench.discrepancy import ALL, diagnose, write_verdict
 from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.effects import backlash
-from nlsdesign.bench.identification import Column, Record, RecordSet, load_records
+from nlsdesign.bench.identification import Record, RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.least_squares import declared_parameter, fit
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.measurement import in_canonical_order
 from nlsdesign.bench.identification.records.quality import Finding
 from nlsdesign.components import Assembly
