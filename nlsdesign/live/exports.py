@@ -28,17 +28,7 @@ _OLD = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class ExportedDesign:
-    """One file.
-
-    Parameters
-    ----------
-    name
-        Of the file.
-    media_type
-        For browsers.
-    content
-        Bytes.
-    """
+    """One file."""
 
     name: str
     media_type: str
@@ -63,15 +53,7 @@ class ExportDesign(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the export of the last good design.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such export.
-        ValueRangeError
-            If there is no design yet.
-        """
+        """Return the export of the last good design."""
         if self.what not in EXPORTS:
             raise unknown_name("export", self.what[:80], EXPORTS)
         if shown is None:

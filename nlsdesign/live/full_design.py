@@ -26,17 +26,7 @@ _DIFFERS = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class FullDesign:
-    """What the whole design came to.
-
-    Parameters
-    ----------
-    state
-        ``"solved"``, ``"infeasible"`` or ``"not solved"``.
-    design
-        Where it is solved.
-    message
-        Otherwise.
-    """
+    """What the whole design came to."""
 
     state: str
     design: CamDesign | None

@@ -15,17 +15,7 @@ _NAME = 60
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A design that was kept under a name.
-
-    Parameters
-    ----------
-    name
-        Given by the designer.
-    question
-        What was asked.
-    answer
-        What was answered.
-    """
+    """A design that was kept under a name."""
 
     name: str
     question: LiveQuestion

@@ -34,20 +34,7 @@ class LiveTask(ABC):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the function that does it and its arguments, picklable.
-
-        Parameters
-        ----------
-        question
-            As it stands.
-        shown
-            The last good design.
-
-        Raises
-        ------
-        ValueRangeError
-            If it cannot be done now.
-        """
+        """Return the function that does it and its arguments, picklable."""
 
 
 @dataclass(frozen=True)
@@ -64,15 +51,7 @@ class SettleDesign(LiveTask):
 
 @dataclass(frozen=True)
 class ToleranceCloud(LiveTask):
-    """Torque of made springs around the design: :class:`CloudAnswer`.
-
-    Parameters
-    ----------
-    draws
-        Number of made springs.
-    seed
-        Of the draws.
-    """
+    """Torque of made springs around the design: :class:`CloudAnswer`."""
 
     draws: int = 200
     seed: int = 1
@@ -80,13 +59,7 @@ class ToleranceCloud(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the analysis on the finished assembly.
-
-        Raises
-        ------
-        ValueRangeError
-            If the number of draws or the seed is out of range.
-        """
+        """Return the analysis on the finished assembly."""
         for what, number, least, most in (
             ("draws", self.draws, _FEWEST_DRAWS, MOST_DRAWS),
             ("seed", self.seed, 0, 2**31 - 1),
@@ -127,13 +100,7 @@ class DiagnoseRecords(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the diagnosis of the machine as it is declared, not as it is designed.
-
-        Raises
-        ------
-        ValueRangeError
-            If there are too many records, or they are too large.
-        """
+        """Return the diagnosis of the machine as it is declared, not as it is designed."""
         files = [file for file in Path(self.folder).iterdir() if file.is_file()]
         size = sum(file.stat().st_size for file in files)
         if not 1 <= len(files) <= _MOST_FILES or size > _MOST_BYTES:

@@ -39,17 +39,7 @@ MOST_EVENTS, EVENT_WINDOW = 200, 1e-7
 
 @dataclass(frozen=True)
 class Event:
-    """A change of mode at a point in time.
-
-    Parameters
-    ----------
-    time
-        In s.
-    name
-        Full name of the element.
-    what
-        For instance "sticks".
-    """
+    """A change of mode at a point in time."""
 
     time: float
     name: str

@@ -29,17 +29,7 @@ MOST_HELD: Final = 10_000_000
 
 @dataclass(frozen=True, eq=False)
 class BoundAxes:
-    """A set of axes with its values.
-
-    Parameters
-    ----------
-    columns
-        Of the axes.
-    count
-        Number of rows.
-    row
-        The values of one row, by its number.
-    """
+    """A set of axes with its values."""
 
     columns: tuple[SweepColumn, ...]
     count: int

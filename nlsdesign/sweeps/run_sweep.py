@@ -88,22 +88,7 @@ def _answers(columns: Sequence[SweepColumn]) -> tuple[str, ...]:
 def sweep_task(
     actuator: Assembly | Mapping[str, Assembly], *, axes: Sequence[AxisSet], ask: SweepQuestion
 ) -> SweepTask:
-    """Check a sweep before anything is computed.
-
-    Parameters
-    ----------
-    actuator, axes, ask
-        As for :func:`sweep`.
-
-    Raises
-    ------
-    ArrangementError
-        If there is no deck, or several and no axis ``deck``.
-    ValueRangeError
-        If axes collide, or an answer has the name of an axis.
-    NlsError
-        If a name does not exist, or a value does not fit it.
-    """
+    """Check a sweep before anything is computed."""
     assemblies = {actuator.name: actuator} if isinstance(actuator, Assembly) else dict(actuator)
     if not assemblies:
         raise ArrangementError("sweep", "has no deck", next_step="give an assembly")

@@ -147,32 +147,13 @@ class SweepTable:
 
 
 def about_text(about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> str:
-    """Return what stands in ``sweep.json``.
-
-    Parameters
-    ----------
-    about
-        What was asked.
-    columns
-        Of the table.
-    """
+    """Return what stands in ``sweep.json``."""
     content = {"format": FORMAT, **about, "columns": [asdict(column) for column in columns]}
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
 def read_about(folder: Path) -> tuple[dict[str, Any], tuple[SweepColumn, ...]]:
-    """Return what ``sweep.json`` says, and the columns.
-
-    Parameters
-    ----------
-    folder
-        Of a sweep.
-
-    Raises
-    ------
-    MeasurementError
-        If there is no such file, or it is of another format.
-    """
+    """Return what ``sweep.json`` says, and the columns."""
     path = folder / ABOUT_FILE
     if not is_there(path):
         raise MeasurementError(str(path), "no such file",

@@ -321,13 +321,7 @@ class Fit:
     white: Array | None = None
 
     def standard_error(self, name: str) -> float:
-        """Return the standard error of a parameter in SI.
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return the standard error of a parameter in SI."""
         i = [p.name for p in self.parameters].index(name)
         return float(np.sqrt(self.covariance[i, i])) * abs(self.parameters[i].slope(self.values[name]))
 
@@ -391,27 +385,10 @@ def fit(
 ) -> Fit:
     """Fit parameters to everything that the records say.
 
-    Parameters
-    ----------
-    evidence
-        Records seen by blocks.
-    parameters
-        What is free; each must be free in at least one block or have a prior.
-    evaluations
-        Bound on the number of evaluations.
-    tolerance
-        Ends too when the predicted gain is below this share of the cost: enough to tell a bad hypothesis.
-    least
-        Ends too when the predicted gain is below this.
-    known
-        Sum of squares by block and record that another model reaches. If this is given, then where a body
-        flies freely outlying residuals count as Huber says, and a record that is worse than what is known
-        counts ever less, see :func:`~.losses.bounded_total`. Without it every residual counts alike.
-
-    Raises
-    ------
-    ConvergenceError
-        If the fit ends without a finite cost.
+    ``parameters``: what is free; each must be free in at least one block or have a prior. ``known``: sum of
+    squares by block and record that another model reaches. If this is given, then where a body flies freely
+    outlying residuals count as Huber says, and a record that is worse than what is known counts ever less,
+    see :func:`~.losses.bounded_total`. Without it every residual counts alike.
     """
     rows = StackedRows(evidence, parameters, known)
     low, high, start = box(parameters)
@@ -575,26 +552,7 @@ class Profile:
 def profile_of(
     fit: Fit, name: str, refit: Callable[[str, float], Fit], *, points: int = 9, reach: float = 3.0
 ) -> Profile:
-    """Hold a number at several values and fit the others again.
-
-    Parameters
-    ----------
-    fit
-        Ended.
-    name
-        Of the number.
-    refit
-        Fits everything but the named number, which it holds at the given value in SI.
-    points
-        How many values, odd.
-    reach
-        So many standard errors to either side.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is no such number in the fit, or there are less than five points.
-    """
+    """Hold a number at several values and fit the others again."""
     names = [p.name for p in fit.parameters]
     if name not in names or points < 5:
         raise ValueRangeError(f"profile of '{name}' with {points} points", "needs a fitted number and five")

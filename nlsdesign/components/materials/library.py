@@ -49,13 +49,7 @@ class Property:
     conditions: Mapping[str, Quantity]
 
     def at(self, condition: str) -> str:
-        """Return a condition as text; a dash where the source does not state it.
-
-        Parameters
-        ----------
-        condition
-            For instance ``"frequency"``.
-        """
+        """Return a condition as text; a dash where the source does not state it."""
         return self._text(self.conditions[condition]) if condition in self.conditions else "–"
 
     @property

@@ -34,25 +34,7 @@ _JUST_ABOVE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class CamProfile:
-    """Lever arm over the angle and what the elements do meanwhile; arrays of shape (n,), in SI.
-
-    Parameters
-    ----------
-    angles
-        From zero to the last angle of the target.
-    extensions
-        δ(θ), counted from angle zero.
-    lever_arms
-        h(θ); the first is the limit from above.
-    forces
-        Force of one element.
-    torques
-        N·h·F.
-    elements
-        N.
-    pretension
-        e₀.
-    """
+    """Lever arm over the angle and what the elements do meanwhile; arrays of shape (n,), in SI."""
 
     angles: Array
     extensions: Array
@@ -76,22 +58,8 @@ def energy_profile(
 ) -> CamProfile:
     """Return the closed-form cam for the rubber, pretension and number of elements of an actuator.
 
-    Parameters
-    ----------
-    actuator
-        Assembly with a cam spring; its present cam does not matter.
-    target
-        Torque curve.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-    points
-        Number of angles.
-
-    Raises
-    ------
-    InfeasibleError
-        If the rubber cannot store the energy below the target, or carries no force at angle zero that
-        could give its slope.
+    ``actuator``: assembly with a cam spring; its present cam does not matter. ``spring``: path of the cam
+    spring; decided from the structure if it is left out.
     """
     model = flatten(actuator)
     law = elastic_law(model, spring)

@@ -59,43 +59,19 @@ class ElasticLaw:
     def force(self, extension: ArrayLike) -> Array:
         """Return the force at the numbers of the model.
 
-        Parameters
-        ----------
-        extension
-            In m, any shape.
-
-        Returns
-        -------
-        numpy.ndarray
-            Of the same shape, in N.
+        Result: of the same shape, in N.
         """
         return self._evaluated(extension, 0)
 
     def stiffness(self, extension: ArrayLike) -> Array:
         """Return d(force)/d(extension) at the numbers of the model.
 
-        Parameters
-        ----------
-        extension
-            In m, any shape.
-
-        Returns
-        -------
-        numpy.ndarray
-            Of the same shape, in N/m.
+        Result: of the same shape, in N/m.
         """
         return self._evaluated(extension, 1)
 
     def without_knots(self, longest: float, share: float) -> ElasticLaw:
-        """Return the law with rounded knots.
-
-        Parameters
-        ----------
-        longest
-            Extension in m up to which the law is looked at.
-        share
-            Width of the rounding relative to that range.
-        """
+        """Return the law with rounded knots."""
         places = np.linspace(0.0, longest, 101).reshape(1, -1)
         numbers = np.repeat(self.numbers[:, None], places.size, axis=1)
         extension, parameters = ca.SX.sym("extension"), ca.SX.sym("parameters", len(self.parameters))

@@ -198,22 +198,6 @@ def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: 
 
     Each cause draws from a generator of its own, seeded by the seed and its name, so that another cause more
     or less, or another design with the same names, changes no other deviation.
-
-    Parameters
-    ----------
-    causes
-        In the order of the columns.
-    count
-        Number of draws.
-    seed
-        Any whole number from zero.
-    reading
-        How spreads are read.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (count, causes).
     """
     columns = [reading.drawn(np.random.default_rng([seed, *cause.name.encode()]), count) for cause in causes]
     return np.column_stack(columns) if columns else np.zeros((count, 0))

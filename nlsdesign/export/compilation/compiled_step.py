@@ -42,18 +42,7 @@ class Natively:
         return _step(function)
 
     def columns(self, graph: ColumnGraph) -> ColumnRun:
-        """Return compiled code that runs samples of many columns.
-
-        Parameters
-        ----------
-        graph
-            (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
-
-        Raises
-        ------
-        ExportError
-            If the compiler is missing or fails, or its result cannot be loaded.
-        """
+        """Return compiled code that runs samples of many columns."""
         return CompiledColumns(sampled_run_in_c(graph), kept=len(graph.results[1]))
 
 

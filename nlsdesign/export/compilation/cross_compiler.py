@@ -69,13 +69,7 @@ ALL_PLATFORMS = tuple(PLATFORMS)
 
 
 def host_platform() -> str:
-    """Return the name of the platform this program runs on.
-
-    Raises
-    ------
-    ExportError
-        If nothing can be built for it.
-    """
+    """Return the name of the platform this program runs on."""
     processor = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
         machine.machine().lower(), machine.machine()
     )

@@ -189,19 +189,7 @@ _ROUNDING = 1e-9
 
 
 class RangeAtRest(NamedTuple):
-    """A signal that leaves the stated range of its law at some angles.
-
-    Parameters
-    ----------
-    name, unit
-        Of the signal.
-    first, last
-        Nearest to zero and furthest from it of the angles outside, in rad.
-    furthest
-        Value furthest outside.
-    minimum, maximum
-        The range.
-    """
+    """A signal that leaves the stated range of its law at some angles."""
 
     name: str
     unit: str

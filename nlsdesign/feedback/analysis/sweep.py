@@ -56,23 +56,11 @@ class PointView(View):
 
     @abstractmethod
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return name, unit and description of each number.
-
-        Parameters
-        ----------
-        model
-            The model that is swept.
-        """
+        """Return name, unit and description of each number."""
 
     @abstractmethod
     def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
-        """Return the numbers, in the order of the columns, and findings in words.
-
-        Parameters
-        ----------
-        point
-            The model at rest at one angle.
-        """
+        """Return the numbers, in the order of the columns, and findings in words."""
 
     def over(self, points: RestPoints) -> Columns:
         """Return what :meth:`at` gives at each angle."""

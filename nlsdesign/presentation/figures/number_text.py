@@ -18,13 +18,6 @@ def root_mean_square(values: ArrayLike) -> float:
 def significant(value: float, digits: int = 3) -> str:
     """Return a number with the given number of significant digits, typeset.
 
-    Parameters
-    ----------
-    value
-        Any number.
-    digits
-        Significant digits.
-
     Examples
     --------
     >>> significant(0.012345), significant(1234.5), significant(-3.4e-9, 2), significant(0.0)

@@ -146,13 +146,7 @@ def look(number: int) -> Look:
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Let a function draw in the common style, independent of the user's settings of matplotlib.
-
-    Parameters
-    ----------
-    draw
-        Function that returns a figure.
-    """
+    """Let a function draw in the common style, independent of the user's settings of matplotlib."""
 
     @functools.wraps(draw)
     def wrapped(*arguments: P.args, **named: P.kwargs) -> Figure:
@@ -230,23 +224,12 @@ def _short(axis: Axis) -> bool:
 def described(figure: Figure, text: str) -> Figure:
     """Attach the alternative text of a figure, for readers who cannot see it.
 
-    Parameters
-    ----------
-    figure
-        Changed in place.
-    text
-        What it shows, in one or two sentences; not empty.
+    ``text``: what it shows, in one or two sentences; not empty.
     """
     figure.set_label(" ".join(text.split()))
     return figure
 
 
 def alternative_text(figure: Figure) -> str:
-    """Return the text attached by :func:`described`, or an empty text.
-
-    Parameters
-    ----------
-    figure
-        Any figure.
-    """
+    """Return the text attached by :func:`described`, or an empty text."""
     return str(figure.get_label() or "")

@@ -81,15 +81,7 @@ class PublishedNumber:
 
 
 def range_table(title: str, traces: Mapping[str, Trace]) -> TableSection:
-    """Return the table of laws that were used beyond their stated range; the caption tells if there are none.
-
-    Parameters
-    ----------
-    title
-        Heading.
-    traces
-        Results by their label in the report.
-    """
+    """Return the table of laws used beyond their stated range; the caption tells if there are none."""
     rows = tuple(
         (label, w.name, f"{w.minimum:g} to {w.maximum:g}", typeset_unit(w.unit), compact(w.furthest, 4),
          compact(w.time, 4))

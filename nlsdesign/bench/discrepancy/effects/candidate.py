@@ -93,19 +93,9 @@ def wrapped(
 ) -> Assembly:
     """Return the assembly with an element inside a wrapper; sensors go on reading what they read.
 
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    path
-        Path of the element, for instance ``"spring.rubber"``. A tie keeps its name and takes the wrapper; any
-        other wrapper takes its own name beside the former neighbours.
-    name
-        Name of the wrapper; for a tie, of the element inside.
-    wrapper
-        Makes the wrapper from the name and the element.
-    read_outside
-        Whether sensors of the element's own motion and effort read those of the wrapper from now on.
+    ``path``: path of the element, for instance ``"spring.rubber"``. A tie keeps its name and takes the
+    wrapper; any other wrapper takes its own name beside the former neighbours. ``name``: name of the wrapper;
+    for a tie, of the element inside.
     """
     owner, _, last = path.rpartition(".")
     old = assembly.element(path)

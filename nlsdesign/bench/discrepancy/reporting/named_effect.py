@@ -100,13 +100,7 @@ class NamedEffect:
     evidence: EffectEvidence | None = None
 
     def headline(self, assembly: Assembly) -> str:
-        """Return effect and place in words, such as ``second relaxation in the rubber``.
-
-        Parameters
-        ----------
-        assembly
-            Holds the part.
-        """
+        """Return effect and place in words, such as ``second relaxation in the rubber``."""
         return effect_in_words(assembly, self.name, self.location)
 
     def numbers_in_words(self) -> str:
@@ -117,13 +111,7 @@ class NamedEffect:
         )
 
     def words(self, assembly: Assembly) -> str:
-        """Return what it is, how large, and what speaks for it.
-
-        Parameters
-        ----------
-        assembly
-            Holds the part.
-        """
+        """Return what it is, how large, and what speaks for it."""
         text = f"{capitalised(self.headline(assembly))} (`{self.name}` at `{self.location}`)"
         text += f": {self.numbers_in_words()}." if self.parameters else "."
         if math.isfinite(self.probability):

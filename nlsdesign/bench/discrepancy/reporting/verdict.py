@@ -99,23 +99,7 @@ class Gap(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordGap:
-    """Error of one block on one record before and after, in the unit of the block.
-
-    Parameters
-    ----------
-    block, record, role
-        Which.
-    before, after, noise_floor
-        Root mean square of the filtered error of the refitted declared model, of the model with the effects,
-        and of the noise alone.
-    rows
-        Samples that count.
-    unit
-        Of the three.
-    signal, beside
-        Standard deviation of what the error is a part of, filtered alike, and its name: the measured signal,
-        or the effort of the drive.
-    """
+    """Error of one block on one record before and after, in the unit of the block."""
 
     block: str
     record: str

@@ -70,11 +70,6 @@ class Channel:
         In s, ascending, shape (n,).
     values
         Shape (n,).
-
-    Raises
-    ------
-    MeasurementError
-        If there are too few samples, the lengths differ, a number is not finite, or time does not ascend.
     """
 
     name: str
@@ -109,12 +104,8 @@ class Channel:
     def resolution(self, step: float | None = None, quantum: float = 0.0) -> Resolution:
         """Return noise and count, scaled to a clock.
 
-        Parameters
-        ----------
-        step
-            Of the new clock in s; the channel's own by default.
-        quantum
-            Declared size of one count; 0 to estimate it from the samples.
+        ``step``: of the new clock in s; the channel's own by default. ``quantum``: declared size of one
+        count; 0 to estimate it from the samples.
         """
         share = math.sqrt(self.step / step) if step else 1.0
         return Resolution(share * noise_of(self.values), share * (quantum or quantum_of(self.values)))
@@ -141,24 +132,7 @@ class Resampled(NamedTuple):
 def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
     """Put channels on one uniform clock.
 
-    Parameters
-    ----------
-    channels
-        Each with its own times; at least one.
-    rate
-        In Hz.
-
-    Returns
-    -------
-    Resampled
-        The clock runs from the latest first sample to the earliest last sample of the channels.
-
-    Raises
-    ------
-    ValueRangeError
-        If the rate is not positive.
-    MeasurementError
-        If the channels do not run at the same time, or one has a gap longer than the new step.
+    ``channels``: each with its own times; at least one.
     """
     if not (rate > 0.0 and math.isfinite(rate)):
         raise ValueRangeError(f"rate {rate:g} Hz", "must be positive", next_step="give for instance 500")
@@ -283,18 +257,8 @@ def lag_between(delayed: Channel, reference: Channel, *, longest: float | None =
     standard error is that of the least-squares shift, with the long-run variance of its score (Newey and
     West 1987) in place of that of white noise.
 
-    Parameters
-    ----------
-    delayed, reference
-        Both show the same motion; units and offsets may differ, the sign may not.
-    longest
-        Largest lag to either side in s; a quarter of the shorter record by default.
-
-    Raises
-    ------
-    MeasurementError
-        If a channel is constant, the correlation is below 0.7 everywhere, is largest at the end of the range,
-        or is as large at another lag.
+    ``delayed``, ``reference``: both show the same motion; units and offsets may differ, the sign may not.
+    ``longest``: largest lag to either side in s; a quarter of the shorter record by default.
     """
     step = max(delayed.step, reference.step)
     span = min(delayed.time[-1] - delayed.time[0], reference.time[-1] - reference.time[0])

@@ -481,17 +481,7 @@ def split(
 def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
     """Return the part before a time, for fitting, and the part after it, held out.
 
-    Parameters
-    ----------
-    record
-        To be cut.
-    at
-        Time in s; the sample there belongs to the first part.
-
-    Raises
-    ------
-    MeasurementError
-        If one of the parts would hold less than two samples.
+    ``at``: time in s; the sample there belongs to the first part.
     """
     trace = record.trace
     cut = int(np.searchsorted(trace.time, at, side="right"))

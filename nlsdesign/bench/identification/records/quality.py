@@ -91,15 +91,7 @@ _TURN = {"rad": 2.0 * np.pi, "deg": 360.0}
 
 @dataclass(frozen=True)
 class Finding:
-    """What is odd about data that can be read.
-
-    Parameters
-    ----------
-    place
-        File, column and rows.
-    text
-        What it is.
-    """
+    """What is odd about data that can be read."""
 
     place: str
     text: str

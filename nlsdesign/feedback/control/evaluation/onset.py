@@ -327,18 +327,7 @@ def linear_onset(
     Infinite and not a number where it is stable up to the end of the range; zero where it is unstable already
     at its beginning.
 
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    gain
-        Name of a parameter of the controller.
-    between
-        Smallest and largest gain that are looked at.
-    largest
-        Angle of the spring in rad up to which it is looked at, of either sign.
-    mode
-        Of the plant's dry friction; sliding by default.
+    ``mode``: of the plant's dry friction; sliding by default.
     """
     angles = np.linspace(-largest, largest, 21)
 

@@ -633,21 +633,8 @@ def step_response(
 ) -> StepResponse:
     """Return the answer to a step of the desired torque.
 
-    Parameters
-    ----------
-    loop
-        Load fixed, or held by its inputs at zero.
-    end, begin
-        Desired torque after and before the step, in N·m; the loop has half a second to come to rest before.
-    stop
-        Time after the step in s.
-    translate
-        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is no step, it is beyond the current limit, or the run is shorter than 0.1 s.
+    ``end``, ``begin``: desired torque after and before the step, in N·m; the loop has half a second to come
+    to rest before.
     """
     if begin == end or not stop >= 0.1:
         raise ValueRangeError(f"step from {begin:g} to {end:g} N·m in {stop:g} s", "needs a step and 0.1 s")

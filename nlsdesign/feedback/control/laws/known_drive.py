@@ -245,16 +245,7 @@ def torque_limit(plant: FlatModel) -> TorqueLimit:
     r·|T| = k·I_max − friction, or the torque of the spring at rest at the end of the contour of its cam,
     whichever is less. A one-sided spring has one direction only, and that one counts.
 
-    Parameters
-    ----------
-    plant
-        Continuous, load fixed or prescribed; friction in its smooth form.
-
-    Raises
-    ------
-    ArrangementError
-        If a load moves freely: nothing holds the far end of the spring. Or if the plant has no motor that is
-        driven by a current and turns a series spring, or sharp dry friction.
+    ``plant``: continuous, load fixed or prescribed; friction in its smooth form.
     """
     drive = KnownDrive(plant)
     loose = [b.name for b in plant.bodies if not b.prescribed and b.name != drive.body.name]

@@ -53,18 +53,7 @@ class LoopNames:
 
 
 def loop_names(plant: FlatModel) -> LoopNames:
-    """Return the names of a plant by which its torque loop is wired, decided from its structure.
-
-    Parameters
-    ----------
-    plant
-        With one series spring and one motor that is driven by a current.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not decide, or the motor is not driven by a current.
-    """
+    """Return the names of a plant by which its torque loop is wired, decided from its structure."""
     body, motor = motor_of(plant)
     if motor.command is None or plant.variable(motor.command).unit != "A":
         raise ArrangementError(

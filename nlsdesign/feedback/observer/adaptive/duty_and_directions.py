@@ -47,11 +47,6 @@ class Duty:
         Amplitude in N·m; by default half of the torque at rest at the end of the cam's contour.
     frequencies
         In Hz.
-
-    Raises
-    ------
-    ValueRangeError
-        If torque or a frequency is not positive, or there is no frequency.
     """
 
     torque: float | None = None
@@ -270,26 +265,12 @@ class UncertainDirections:
     left_out: float
 
     def values(self, nominal: Mapping[str, float], at: Array) -> dict[str, float]:
-        """Return the numbers at a point.
-
-        Parameters
-        ----------
-        nominal
-            Declared values by name.
-        at
-            Coordinates along the directions, shape (directions,).
-        """
+        """Return the numbers at a point."""
         factors = np.exp(self.slopes @ at)
         return {name: nominal[name] * float(f) for name, f in zip(self.names, factors, strict=True)}
 
     def in_words(self, direction: int) -> str:
-        """Return the numbers that change most along a direction, per standard deviation.
-
-        Parameters
-        ----------
-        direction
-            Counted from zero.
-        """
+        """Return the numbers that change most along a direction, per standard deviation."""
         column = self.slopes[:, direction]
         order = np.argsort(-np.abs(column))
         largest = [int(i) for i in order if abs(column[i]) >= 0.3 * abs(column[order[0]])][:4]

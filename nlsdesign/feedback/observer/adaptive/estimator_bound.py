@@ -48,21 +48,7 @@ class EstimatorBound:
 
 @dataclass(frozen=True)
 class SensedTorque:
-    """What is estimated from what.
-
-    Parameters
-    ----------
-    estimate
-        Output or signal that is wanted.
-    measured
-        State that is measured.
-    quantum
-        Of its encoder.
-    sample_time
-        In s.
-    substeps
-        Runge–Kutta steps per sample.
-    """
+    """What is estimated from what."""
 
     estimate: str
     measured: str

@@ -109,13 +109,7 @@ class Certificate(Generic[ProofT]):
 
 
 def certificate_text(certificate: Certificate[Proof]) -> str:
-    """Return the JSON text of a certificate.
-
-    Parameters
-    ----------
-    certificate
-        What is proved.
-    """
+    """Return the JSON text of a certificate."""
     name, text = certificate.deck
     content: dict[str, Any] = {
         "format": certificate.proof.form,

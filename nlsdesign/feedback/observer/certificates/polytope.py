@@ -111,13 +111,7 @@ class ErrorPolytope:
 
 
 def error_polytope(design: ObserverDesign) -> ErrorPolytope:
-    """Return what one sample of a finished observer can do to its error.
-
-    Parameters
-    ----------
-    design
-        The observer with its table.
-    """
+    """Return what one sample of a finished observer can do to its error."""
     plant, compact = design.step.plant, design.compact
     n, seen = len(plant.states), tuple(int(np.argmax(row)) for row in plant.output_matrix)
 

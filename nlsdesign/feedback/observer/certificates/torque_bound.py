@@ -278,23 +278,7 @@ class TorqueErrorBound:
 def torque_bound(model: FlatModel, design: ObserverDesign, assumptions: Assumptions) -> TorqueErrorBound:
     """Return a bound on the torque error that holds for every motion and every current.
 
-    Parameters
-    ----------
-    model
-        Continuous; the deck's actuator.
-    design
-        Its observer, in the minimal form.
-    assumptions
-        Ranges.
-
-    Raises
-    ------
-    ArrangementError
-        If a correction enters the inner states, or the torque depends on more than angle and inner states.
-    ValueRangeError
-        If the angles reach beyond the table.
-    UnknownNameError
-        If a parameter with a range does not exist.
+    ``model``: continuous; the deck's actuator.
     """
     return _Bounding(model, design, assumptions).bound()
 

@@ -404,22 +404,7 @@ def _memory(observer: FlatModel) -> tuple[list[int], list[int]]:
 def check_stability(
     observer: FlatModel, *, finer: int = 10, speeds: tuple[float, ...] = (0.0, 1.0)
 ) -> ErrorStability:
-    """Check, and where the structure allows prove, that the estimation error vanishes.
-
-    Parameters
-    ----------
-    observer
-        As :func:`~nlsdesign.feedback.observer.scheduling.scheduled.design_observer` gave it.
-    finer
-        How many times finer than its table the angles are.
-    speeds
-        Estimated speeds in rad/s at which the matrices are taken.
-
-    Raises
-    ------
-    ValueRangeError
-        If the model has no table over an angle.
-    """
+    """Check, and where the structure allows prove, that the estimation error vanishes."""
     tables, bodies = observer.tables, observer.bodies
     if len(tables) != 1 or [body.motion for body in bodies] != [tables[0].argument]:
         raise ValueRangeError(

@@ -146,17 +146,7 @@ class FittedGain(Protocol):
     """What chooses the correction for all angles together, from the whole plant."""
 
     def fitted(self, plant: AngleScheduledPlant, sample_time: float, angles: Array) -> GainRule:
-        """Return the rule for each angle.
-
-        Parameters
-        ----------
-        plant
-            In the form that an observer is designed on.
-        sample_time
-            T in s.
-        angles
-            Angles that stand for the range, shape (N,).
-        """
+        """Return the rule for each angle."""
         ...
 
 
