@@ -248,7 +248,7 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
 
 
 def _written(result: _Evaluation, out: Path) -> list[Path]:
-    from ..foundation.writing import make_folder, write_table
+    from ..foundation.files import make_folder, write_table
     from ..presentation import figures
 
     make_folder(out)

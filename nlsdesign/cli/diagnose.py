@@ -81,10 +81,9 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..bench.identification import load_records
     from ..components.assembly.deck_writer import declare
     from ..foundation.deck import load_deck
+    from ..foundation.files import discard, make_folder
     from ..foundation.locations import version
     from ..foundation.progress import Steps
-    from ..foundation.writing import make_folder
-    from ..foundation.written_files import discard
     from ..model import flatten
     from ..presentation.report import verdict_sections, write_report
 
@@ -166,8 +165,8 @@ def _regenerated(
 
 def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list[Section]]:
     """Write the observer of the better model; return data, text and sections on it."""
-    from ..foundation.writing import write_text
-    from ..presentation.report import regeneration_sections
+    from ..foundation.files import write_text
+    from ..presentation.report import diagnosis_sections as regeneration_sections
     from ..regeneration import write_regeneration
 
     files, lacking = write_regeneration(result, out)

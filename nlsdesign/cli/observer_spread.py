@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import ArrangementError
-from ..foundation.prefixes import shared_prefix, without_power
 from ..foundation.quantity import typeset_unit
+from ..foundation.written_numbers import shared_prefix, without_power
 from .observer_kinds import CASCADE, DesignedObserver, designed_observer
 from .output import next_command, show_table
 
@@ -68,7 +68,7 @@ def write_errors(
 
     ``files``: written before; the page lists them too.
     """
-    from ..foundation.writing import write_table, write_text
+    from ..foundation.files import write_table, write_text
     from ..presentation import figures
     from ..presentation.report import write_observer_report
 

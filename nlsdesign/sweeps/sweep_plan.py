@@ -13,8 +13,8 @@ from typing import Any
 from ..foundation.errors import ValueRangeError
 from .axes import AxisSet, BoundAxes
 from .axis_values import Subject
-from .changes import row_of_factor
-from .sweep_columns import SALTELLI, SweepColumn
+from .point_deck import row_of_factor
+from .sweep_table import SALTELLI, SweepColumn
 
 _PROBES = 64
 _MOST_POINTS = 100_000_000

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ...foundation.errors import ExportError
-from ...foundation.writing import write_bytes
+from ...foundation.files import write_bytes
 from ..compilation import cross_compiler
 from ..compilation.cross_compiler import Platform, cache_folder, compile_library
 from ..files import shell

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ...foundation.errors import ExportError, ValueRangeError, nearest
-from ...foundation.writing import draft
+from ...foundation.files import draft
 from ...model.flat import FlatModel
 from ..c.c_text import identifier
 from ..compilation.cross_compiler import ALL_PLATFORMS, Platform, chosen_platforms

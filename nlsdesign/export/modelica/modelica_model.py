@@ -9,9 +9,9 @@ from pathlib import Path
 import casadi as ca
 
 from ...foundation.errors import ExportError
+from ...foundation.files import write_text
 from ...foundation.locations import version
 from ...foundation.quantity import NOT_STATED
-from ...foundation.writing import write_text
 from ...model import FlatModel, Variable
 from ..c.c_text import comment
 from ..c.provenance import origin_lines, stamped

@@ -11,9 +11,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ...foundation.errors import ExportError, UnitError, ValueRangeError
+from ...foundation.files import draft
 from ...foundation.locations import version as package_version
 from ...foundation.quantity import BASE, Quantity, parse_unit
-from ...foundation.writing import draft
 from ..cosimulation.cosimulate import check_order, check_signals, unpacked_fmus
 from ..cosimulation.fmu_description import FmuDescription, FmuScalar
 from ..cosimulation.wires import Wire, as_wire, check_wires, delay_of, gain_to, split_name

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ....foundation.errors import MeasurementError, UnitError, nearest
+from ....foundation.files import text_of
 from ....foundation.quantity import parse_unit, same_dimension, typeset_unit
-from ....foundation.reading import text_of
 from ....model import FlatModel
 from .toml_fields import globs_at, number_at, table_at, text_at
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, missing_library
-from ....foundation.reading import is_there
+from ....foundation.files import is_there
 from .csv_files import read_csv
 from .mat_elements import check_mat
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError
-from ....foundation.prefixes import prefixed
 from ....foundation.quantity import typeset_unit
+from ....foundation.written_numbers import prefixed
 from ....model import FlatModel
 from ....model.roles import measured_motion, spring_torque
 from ....simulation.buffered import Translate, as_it_is

@@ -13,8 +13,8 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.data_frames import Axis, data_set
 from ....foundation.errors import ArrangementError, ConvergenceError, unknown_name
-from ....foundation.prefixes import shared_prefix
 from ....foundation.quantity import three_digits
+from ....foundation.written_numbers import shared_prefix
 from ....model import FlatModel
 from ....simulation.buffered import Translate, as_it_is
 from ....simulation.prior import Prior, declared_prior
