@@ -1,7 +1,7 @@
-"""Text files that are read and written: clear errors, files that appear whole or not at all, and their digests.
+"""Text files that are read and written: whole or not at all, with clear errors, known by their digests.
 
-Every file of the package is written here. What was written into a folder is known by its digest, so that nothing is
-replaced that somebody has changed or brought.
+Every file of the package is written here. What was written into a folder is known by its digest, so that
+nothing is replaced that somebody has changed or brought.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Parallel map over processes, and what an interrupt leaves behind.
 
 Results of a map are in order and independent of the number of processes. ``__main__`` runs the program in
-:func:`guarded` before anything else is imported. An interrupt is raised in the main thread as usual, so that
-every part of the package cleans up. What a library swallows, or does not let through in time, a watch ends: it
-ends the processes that were started and removes what is temporary. All temporary folders of a run stand in one
-whose name is known before it exists.
+:func:`guarded` before anything else is imported. An interrupt is raised in the main thread as usual, so
+that every part of the package cleans up. What a library swallows, or does not let through in time, a watch
+ends: it ends the processes that were started and removes what is temporary. All temporary folders of a run
+stand in one whose name is known before it exists.
 """
 
 from __future__ import annotations

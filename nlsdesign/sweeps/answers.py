@@ -1,4 +1,4 @@
-"""Answers of a sweep: quantiles with bounds, a surface over two axes, and whether the axes are independent."""
+"""Answers of a sweep: quantiles with bounds, surfaces over two axes, and whether axes are independent."""
 
 from __future__ import annotations
 

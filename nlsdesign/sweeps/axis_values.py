@@ -15,8 +15,7 @@ from ..components.assembly.named_parts import Assembly
 from ..foundation.errors import NlsError, UnitError, ValueRangeError, brief, unknown_name
 from ..foundation.quantity import BASE, Quantity, parse_unit, same_dimension
 from ..foundation.written_numbers import split_number
-from .point_deck import ASK, DECK, pieces_of_rubber
-from .sweep_plan import row_of_factor
+from .changes import ASK, DECK, pieces_of_rubber, row_of_factor
 from .sweep_table import SweepColumn
 
 Given = float | int | str | Quantity

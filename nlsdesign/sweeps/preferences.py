@@ -1,4 +1,4 @@
-"""What is better in an answer of a sweep, what a point must keep, and the points in the order that follows."""
+"""What is better in an answer of a sweep, what a point must keep, and the order of the points."""
 
 from __future__ import annotations
 

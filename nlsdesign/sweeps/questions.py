@@ -27,7 +27,7 @@ from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from .axis_values import in_unit, si_unit
-from .point_deck import ASK
+from .changes import ASK
 from .run_sweep import same_bits
 from .sweep_question import SweepQuestion, answer, worst
 from .sweep_table import SweepColumn

@@ -1,7 +1,7 @@
 """The run of a sweep: points go out, rows come in, parts are written, and at the end the table.
 
-Batches within a point run as compiled code where there is a compiler, else in CasADi, with the same bits. NumPy has
-elementary functions of its own, so a table would depend on who computed it.
+Batches within a point run as compiled code where there is a compiler, else in CasADi, with the same bits.
+NumPy has elementary functions of its own, so a table would depend on who computed it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ..simulation.column_graph import ColumnGraph, NotByColumnsError
 from ..simulation.column_runs import ColumnRun
 from .axes import AxisSet
 from .axis_values import Subject
-from .point_deck import DECK
+from .changes import DECK
 from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
 from .sweep_parts import Parts
 from .sweep_plan import PointPlan

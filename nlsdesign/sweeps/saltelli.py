@@ -1,4 +1,4 @@
-"""Saltelli's plan: the points that Sobol indices with totals need, and how points of a sweep are known as one."""
+"""Saltelli's plan: the points that Sobol indices with totals need, and how to see that points are one."""
 
 from __future__ import annotations
 

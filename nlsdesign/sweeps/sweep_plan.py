@@ -13,7 +13,7 @@ from typing import Any
 from ..foundation.errors import ValueRangeError
 from .axes import AxisSet, BoundAxes
 from .axis_values import Subject
-from .point_deck import row_of_factor
+from .changes import row_of_factor
 from .sweep_table import SALTELLI, SweepColumn
 
 _PROBES = 64

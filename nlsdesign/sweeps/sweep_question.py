@@ -18,7 +18,7 @@ from ..components.assembly.named_parts import Assembly
 from ..foundation.errors import ValueRangeError, WorkSharingError, brief
 from ..foundation.quantity import Quantity
 from .axis_values import with_settings
-from .point_deck import ASK, changed_assembly
+from .changes import ASK, changed_assembly
 from .sweep_table import SweepColumn
 
 

@@ -1,7 +1,8 @@
 """The table of a sweep: one row per point, in the order of the points, with what was asked beside it.
 
-Columns go between Python, NumPy and Arrow here. Arrow's own conversions load pandas where it is installed, 50 MB for
-nothing, and its reading ahead keeps memory of every file; a driver that runs for days has neither.
+Columns go between Python, NumPy and Arrow here. Arrow's own conversions load pandas where it is installed,
+50 MB for nothing, and its reading ahead keeps memory of every file; a driver that runs for days has
+neither.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from ..foundation.arrays import Mask
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, MeasurementError, missing_library, unknown_name
 from ..foundation.files import is_there, text_of
-from .point_deck import changed_assembly
+from .changes import changed_assembly
 from .sweep_parts import rows_in_order
 
 DONE: Final = "done"

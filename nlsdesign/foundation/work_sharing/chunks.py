@@ -1,7 +1,7 @@
 """Chunks of points, what a worker does with one, and which code answers.
 
-Each point of a chunk is answered, and a failure is an answer. Work that cannot be sent, and workers that run
-other code, are refused.
+Each point of a chunk is answered, and a failure is an answer. Work that cannot be sent, and workers that
+run other code, are refused.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """One function asked of many points by a team of workers; outcomes as they come, and no point lost.
 
-Points are taken from their source only when a worker is free, in chunks that take about the same time whatever a
-point costs. A chunk that is lost with its worker is tried again point by point; a point that ends workers twice on
-its own is recorded as failed. :func:`spread_over` sends the maps within one computation to the same engine.
+Points are taken from their source only when a worker is free, in chunks that take about the same time
+whatever a point costs. A chunk that is lost with its worker is tried again point by point; a point that
+ends workers twice on its own is recorded as failed. :func:`spread_over` sends the maps within one
+computation to the same engine.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What every executor offers, and the two that need no library: this process, and processes of this machine.
 
-A team of workers takes chunks and gives back outcomes or losses. Each process has a pipe of its own, so that a dead
-one loses its own chunk only.
+A team of workers takes chunks and gives back outcomes or losses. Each process has a pipe of its own, so
+that a dead one loses its own chunk only.
 """
 
 from __future__ import annotations

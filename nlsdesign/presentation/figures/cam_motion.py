@@ -1,4 +1,4 @@
-"""Cam, cable, rubber and contact point over the angle, still and as a moving picture of one frame per angle."""
+"""Cam, cable, rubber and contact point over the angle, still and as one frame per angle."""
 
 from __future__ import annotations
 

@@ -1,12 +1,13 @@
 """One style for all figures: colours, sizes, legends, alternative texts, and numbers as text.
 
-Colours are those of Okabe and Ito (Color Universal Design, 2008), purple and orange darkened to a contrast of 3:1
-with white. Each has a second value for dark pages. A figure is drawn once, in the light colours; inline in a report
-each of them becomes a CSS variable (see :mod:`nlsdesign.presentation.figures.svg`), so one rendering serves light,
-dark and print. Colour never carries meaning alone: lines differ in dashes, points in shape.
+Colours are those of Okabe and Ito (Color Universal Design, 2008), purple and orange darkened to a contrast
+of 3:1 with white. Each has a second value for dark pages. A figure is drawn once, in the light colours;
+inline in a report each of them becomes a CSS variable (see :mod:`nlsdesign.presentation.figures.svg`), so
+one rendering serves light, dark and print. Colour never carries meaning alone: lines differ in dashes,
+points in shape.
 
-A colour means the same on every page: ``AFTER``, ``BEFORE``, ``HOLDS``, ``LIMIT``. Only pictures of the mechanism
-give the colours to parts, and say so beside them.
+A colour means the same on every page: ``AFTER``, ``BEFORE``, ``HOLDS``, ``LIMIT``. Only pictures of the
+mechanism give the colours to parts, and say so beside them.
 """
 
 from __future__ import annotations

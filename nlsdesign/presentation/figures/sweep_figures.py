@@ -1,4 +1,4 @@
-"""Figures of a sweep: histograms, points against each other, parallel coordinates, surfaces, shares of variance.
+"""Figures of a sweep: histograms, points, parallel coordinates, surfaces, shares of variance.
 
 Points come in kinds, each with a look of its own, and each point is a link to its row.
 """

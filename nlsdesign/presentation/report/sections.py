@@ -1,4 +1,4 @@
-"""Sections of a report: chapters, texts, figures with their numbers, tables, key numbers and lists of files."""
+"""Sections of a report: chapters, texts, figures, tables, key numbers and lists of files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables that reports share: numbers of a deck, points of a sweep, the paper against the model, calculations."""
+"""Tables that reports share: numbers of a deck, points of a sweep, paper against model, calculations."""
 
 from __future__ import annotations
 

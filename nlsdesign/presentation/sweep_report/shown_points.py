@@ -1,4 +1,4 @@
-"""Which points of a sweep a page shows, by a rule that keeps what matters, and their rows in readable units."""
+"""Which points of a sweep a page shows, by a rule that keeps what matters, and their rows."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ from nlsdesign.sweeps import (
 from nlsdesign.sweeps import (
     run_sweep as same_bits,
 )
-from nlsdesign.sweeps.point_deck import changed_assembly
+from nlsdesign.sweeps.changes import changed_assembly
 from nlsdesign.sweeps.questions import QUICK
 from nlsdesign.sweeps.sweep_plan import PointPlan
 from tests.sweeping import AREA, INERTIA, actuator, question
