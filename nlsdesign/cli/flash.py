@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..foundation.errors import ExportError, ValueRangeError
+from ..foundation.prefixes import prefixed
 from ..foundation.quantity import typeset_unit
-from ..foundation.written_numbers import prefixed
-from .observer_kinds import DesignedObserver, designed_observer
 from .units import Bytes, Number
 
 if TYPE_CHECKING:
-    from ..feedback.observer import GridByTorqueError
+    from ..feedback.observer import DesignedObserver, GridByTorqueError
     from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
     from ..model import FlatModel
 
@@ -91,6 +90,7 @@ def sized_observer(
 
     ``part_of``: makes what is exported of the observer; by default that is the observer alone.
     """
+    from ..feedback.observer import designed_observer
     from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
 
     each = 4 if real == "float" else 8
