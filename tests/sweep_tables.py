@@ -9,7 +9,8 @@ import numpy as np
 
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.foundation.deck import load_deck
-from nlsdesign.sweeps.sweep_table import STATE_COLUMNS, SweepColumn, SweepTable
+from nlsdesign.sweeps.sweep_columns import STATE_COLUMNS, SweepColumn
+from nlsdesign.sweeps.sweep_table import SweepTable
 
 DECK = "austin2015_as_printed"
 AREA, INERTIA, RUBBER = "spring.rubber.area", "motor.inertia", "spring.rubber"

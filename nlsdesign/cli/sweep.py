@@ -62,8 +62,8 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     executor = _executor(given)
+    from ..sweeps.sweep_columns import libraries
     from ..sweeps.sweep_file import read_sweep_file
-    from ..sweeps.sweep_table import libraries
 
     libraries()
     task = read_sweep_file(file)

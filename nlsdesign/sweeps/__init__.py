@@ -9,8 +9,9 @@ from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
 from .questions import AngleQuestion, DesignQuestion, DiagnosisQuestion, LoopQuestion, SpreadQuestion
 from .run_sweep import SweepTask, sweep
 from .saltelli import SaltelliSample
+from .sweep_columns import SweepColumn
 from .sweep_question import FunctionQuestion, SweepQuestion
-from .sweep_table import SweepColumn, SweepTable, read_sweep
+from .sweep_table import SweepTable, read_sweep
 
 __all__ = [
     "AngleQuestion",

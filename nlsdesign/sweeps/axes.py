@@ -19,7 +19,7 @@ from ..foundation.errors import ValueRangeError, brief, unknown_name
 from ..model import flatten
 from ..simulation.prior import LONGEST_ROW, declared_prior
 from .axis_values import Given, Subject
-from .sweep_table import SweepColumn
+from .sweep_columns import SweepColumn
 
 _BLOCK: Final = 1024
 _MOST_SOBOL: Final = 2**30

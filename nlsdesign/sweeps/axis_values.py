@@ -16,7 +16,7 @@ from ..foundation.errors import NlsError, UnitError, ValueRangeError, brief, unk
 from ..foundation.quantity import BASE, Quantity, parse_unit, same_dimension
 from ..foundation.written_numbers import split_number
 from .changes import ASK, DECK, pieces_of_rubber, row_of_factor
-from .sweep_table import SweepColumn
+from .sweep_columns import SweepColumn
 
 Given = float | int | str | Quantity
 _UNIT: Final = "unit"

@@ -29,8 +29,8 @@ from ..model.transform import with_outputs
 from .axis_values import in_unit, si_unit
 from .changes import ASK
 from .run_sweep import same_bits
+from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer, worst
-from .sweep_table import SweepColumn
 
 _HALF_POWER = math.sqrt(0.5)
 _FREQUENCIES = 200

@@ -26,20 +26,12 @@ from ..simulation.column_runs import ColumnRun
 from .axes import AxisSet
 from .axis_values import Subject
 from .changes import DECK
+from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn, libraries
 from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
 from .sweep_parts import Parts
 from .sweep_plan import PointPlan
 from .sweep_question import PointWork, SweepQuestion
-from .sweep_table import (
-    DONE,
-    FAILED,
-    RESULTS_FILE,
-    STATE_COLUMNS,
-    SweepColumn,
-    SweepTable,
-    libraries,
-    read_sweep,
-)
+from .sweep_table import SweepTable, read_sweep
 
 _FIRST_PART: Final = 2.0
 _LATEST_PART: Final = 15.0

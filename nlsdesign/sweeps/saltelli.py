@@ -12,7 +12,7 @@ from ..foundation.arrays import Array
 from ..foundation.errors import ValueRangeError, missing_library
 from .axes import MOST_HELD, AxisSet, BoundAxes, require_fractions, require_seed
 from .axis_values import Given, Subject
-from .sweep_table import SALTELLI
+from .sweep_columns import SALTELLI
 
 
 class SaltelliForm(NamedTuple):

@@ -19,7 +19,7 @@ from ..foundation.arrays import Array, Mask
 from ..foundation.errors import missing_library
 from .answers import codes, dependent_axes
 from .saltelli import SaltelliForm, saltelli_plan
-from .sweep_table import SALTELLI
+from .sweep_columns import SALTELLI
 
 FEWEST_POINTS: Final = 200
 FEWEST_BLOCKS: Final = 16

@@ -20,21 +20,10 @@ from ..components.assembly.named_parts import Assembly
 from ..foundation.errors import ExportError, MeasurementError
 from ..foundation.files import make_folder, write_text
 from ..foundation.work_sharing import CodeIdentity, code_identity
+from .sweep_columns import RESULTS_FILE, SweepColumn, arrow_column, libraries, numpy_column, read_columns
 from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
 from .sweep_plan import PointPlan
-from .sweep_table import (
-    ABOUT_FILE,
-    DECK_FILE,
-    DECKS_FOLDER,
-    RESULTS_FILE,
-    SweepColumn,
-    about_text,
-    arrow_column,
-    libraries,
-    numpy_column,
-    read_about,
-    read_columns,
-)
+from .sweep_table import ABOUT_FILE, DECK_FILE, DECKS_FOLDER, about_text, read_about
 
 CODE_FILE: Final = "code.json"
 LOCK_FILE: Final = ".running"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..foundation.arrays import Mask
 from ..foundation.errors import ExportError, MeasurementError
 from ..foundation.files import draft
-from .sweep_table import (
+from .sweep_columns import (
     DONE,
     RESULTS_FILE,
     SweepColumn,

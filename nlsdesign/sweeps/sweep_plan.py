@@ -14,7 +14,7 @@ from ..foundation.errors import ValueRangeError
 from .axes import AxisSet, BoundAxes
 from .axis_values import Subject
 from .changes import row_of_factor
-from .sweep_table import SALTELLI, SweepColumn
+from .sweep_columns import SALTELLI, SweepColumn
 
 _PROBES = 64
 _MOST_POINTS = 100_000_000

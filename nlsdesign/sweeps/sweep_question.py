@@ -19,7 +19,7 @@ from ..foundation.errors import ValueRangeError, WorkSharingError, brief
 from ..foundation.quantity import Quantity
 from .axis_values import with_settings
 from .changes import ASK, changed_assembly
-from .sweep_table import SweepColumn
+from .sweep_columns import SweepColumn
 
 
 class SweepQuestion(ABC):
