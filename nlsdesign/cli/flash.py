@@ -161,8 +161,8 @@ def _sized(designed: DesignedObserver, exported: FlatModel, real: str, *, needed
 def _measured(exported: FlatModel, real: str, *, needed: bool) -> int | None:
     """Return the flash of code and tables in bytes."""
     from ..export import export_c
-    from ..export.target.cross_build import controller_sizes
-    from ..export.target.processors import CORTEX_M4F
+    from ..export.compilation.processors import CORTEX_M4F
+    from ..export.compilation.target_build import controller_sizes
 
     with tempfile.TemporaryDirectory() as folder:
         source = export_c(exported, Path(folder), real=real, name="part")
