@@ -1,8 +1,8 @@
 """Columns of a sweep: what was chosen, what was answered, how each point went.
 
 They go between Python, NumPy and Arrow here, and so do the files of a sweep. Arrow's own conversions load
-pandas where it is installed, 50 MB for nothing, and its reading ahead keeps memory of every file; a driver that
-runs for days has neither.
+pandas where it is installed, 50 MB for nothing, and its reading ahead keeps memory of every file; a driver
+that runs for days has neither.
 """
 
 from __future__ import annotations
