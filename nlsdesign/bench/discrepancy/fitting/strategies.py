@@ -17,8 +17,8 @@ from ....components.assembly.named_parts import Assembly
 from ....foundation.errors import ConvergenceError
 from ....model import flatten
 from ...identification.equation_error.evidence import Bench, Evidence
-from ...identification.estimation.least_squares import Fit, fit, predicted_cost
-from ...identification.estimation.parameters import Parameter
+from ...identification.least_squares import Fit, fit, predicted_cost
+from ...identification.parameters import Parameter
 from ..blocks.tearing import blocks_of
 from .unpredictable import Key, Tally, diverges, quickest, unpredictable
 

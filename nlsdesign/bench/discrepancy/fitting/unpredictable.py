@@ -15,9 +15,9 @@ import numpy as np
 
 from ....foundation.errors import ConvergenceError
 from ...identification.equation_error.evidence import Evidence
-from ...identification.estimation.least_squares import Fit
-from ...identification.statistics.filters import derivative
-from ...identification.statistics.metrics import rmse
+from ...identification.filters import derivative
+from ...identification.least_squares import Fit
+from ...identification.residuals import rmse
 
 Key: TypeAlias = tuple[str, str]
 """Names of a block and of a record."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ....foundation.quantity import to_resolution
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter
 
 
 class FittedNumber(NamedTuple):

@@ -7,8 +7,8 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....model import flatten
 from ...identification.equation_error.filter_choice import rate_span
-from ...identification.statistics.filters import derivative
-from ...identification.statistics.residuals import Binned, shapes
+from ...identification.filters import derivative
+from ...identification.residuals import Binned, shapes
 from ..screening.acting_effort import Acting
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis

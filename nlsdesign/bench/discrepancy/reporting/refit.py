@@ -17,9 +17,8 @@ from ....foundation.errors import MeasurementError
 from ....model import flatten
 from ....model.derived_deck import derived
 from ...identification.equation_error.evidence import Bench
-from ...identification.estimation.least_squares import Fit
-from ...identification.records.canonical_order import in_canonical_order
-from ...identification.records.measurement import RecordSet
+from ...identification.least_squares import Fit
+from ...identification.records.measurement import RecordSet, in_canonical_order
 from ...identification.records.quality import Finding
 from ..blocks.tearing import blocks_of
 from ..screening.drive_check import drive_findings

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 from ....components.assembly.named_parts import Assembly
 from ....foundation.arrays import Array
 from ....foundation.quantity import significant, three_digits, typeset_unit
-from ...identification.estimation.least_squares import Fit
-from ...identification.statistics.residuals import Binned
+from ...identification.least_squares import Fit
+from ...identification.residuals import Binned
 from ..effects.plain_names import capitalised, simpler_forms, title
 from ..planning.experiment import Experiment
 from ..selection.measures import DECLARED

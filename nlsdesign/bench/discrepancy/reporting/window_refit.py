@@ -10,14 +10,13 @@ from ....foundation.errors import MeasurementError
 from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ...identification.equation_error.block import Drive
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import declared_parameter
-from ...identification.output_error.multiple_shooting import coloured_sigma, fit_by_simulation
-from ...identification.output_error.prediction import predict_in_windows
-from ...identification.output_error.simulation_error import Shots, Weights
-from ...identification.output_error.wiring import Wiring
+from ...identification.least_squares import Fit
+from ...identification.multiple_shooting import coloured_sigma, fit_by_simulation, predict_in_windows
+from ...identification.parameters import declared_parameter
 from ...identification.records.measurement import Record, RecordSet
-from ...identification.statistics.metrics import rmse
+from ...identification.residuals import rmse
+from ...identification.simulation_error import Shots, Weights
+from ...identification.windowed_simulation import Wiring
 from ..blocks.shown_values import shown_values
 from .verdict import RecordGap
 

@@ -14,7 +14,7 @@ from ....model.readings import reading_of
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench
-from ...identification.statistics.filters import derivative
+from ...identification.filters import derivative
 from ..selection.comparison import Judged
 
 

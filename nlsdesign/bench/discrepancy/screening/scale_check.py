@@ -12,9 +12,9 @@ from ....model import FlatModel, flatten
 from ....model.readings import ReadingNames, reading_of
 from ....model.structure import MovingBody, top_part
 from ...identification.equation_error.filter_choice import rate_span
+from ...identification.filters import derivative
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...identification.statistics.filters import derivative
 from ..blocks.shown_values import shown_values
 from ..effects.places import efforts_of_ties
 from ..effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on

@@ -16,7 +16,7 @@ from ....model import Variable, flatten
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
-from ...identification.estimation.least_squares import Fit
+from ...identification.least_squares import Fit
 from ...identification.records.measurement import Record
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from ....components.assembly.named_parts import Assembly
 from ....foundation.quantity import to_resolution
-from ...identification.estimation.least_squares import Fit
+from ...identification.least_squares import Fit
 from ..effects.candidate import Candidate, Unknown
 from ..fitting.unpredictable import Key, Tally, like_the_others
 

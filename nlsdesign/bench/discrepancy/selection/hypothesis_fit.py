@@ -11,8 +11,8 @@ from ....foundation.errors import ConvergenceError
 from ....model import Variable
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter, declared_parameter, free_parameter
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter, declared_parameter, free_parameter
 from ..effects.candidate import Unknown
 from ..fitting.strategies import FitProblem, Plain, Start, explains_enough, method_for, refusal
 from ..fitting.unpredictable import Key, Tally

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter, box
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter, box
 from ..effects.candidate import Unknown
 from .measures import EffectNumber, Standing
 

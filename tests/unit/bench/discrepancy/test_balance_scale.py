@@ -11,8 +11,8 @@ from nlsdesign.bench.discrepancy.blocks.balance_scale import BalanceTerms, scale
 from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.estimation.least_squares import fit
-from nlsdesign.bench.identification.estimation.parameters import Parameter, declared_parameter
+from nlsdesign.bench.identification.least_squares import fit
+from nlsdesign.bench.identification.parameters import Parameter, declared_parameter
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import Assembly, DriveSaturation, assembly, tie
 from nlsdesign.components.assembly.deck_template import load_template
