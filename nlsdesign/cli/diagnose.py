@@ -166,7 +166,7 @@ def _regenerated(
 def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list[Section]]:
     """Write the observer of the better model; return data, text and sections on it."""
     from ..foundation.files import write_text
-    from ..presentation.report import diagnosis_sections as regeneration_sections
+    from ..presentation.report import regeneration_sections
     from ..regeneration import write_regeneration
 
     files, lacking = write_regeneration(result, out)

@@ -266,8 +266,7 @@ def _drawn(
     about: tuple[Path, str, Sequence[str], Mapping[str, str]],
 ) -> list[Path]:
     """Write the picture and the page beside the table."""
-    from ..presentation.figures import over_time as run_over_time
-    from ..presentation.figures import write_figures
+    from ..presentation.figures import run_over_time, write_figures
     from ..presentation.report import FigureSection, FileSection, TableSection, TextSection, write_report
 
     out, deck_name, warnings, taken = about
