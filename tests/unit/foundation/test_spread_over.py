@@ -23,9 +23,7 @@ from nlsdesign.foundation.work_sharing import (
     Executor,
     InThisProcess,
     Processes,
-)
-from nlsdesign.foundation.work_sharing import (
-    shared_map as spread_over,
+    spread_over,
 )
 from nlsdesign.foundation.work_sharing.chunks import sendable
 from nlsdesign.foundation.work_sharing.shared_map import _Caller

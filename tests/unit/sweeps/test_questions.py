@@ -35,10 +35,8 @@ from nlsdesign.sweeps import (
     SpreadQuestion,
     Subject,
     SweepTable,
+    run_sweep,
     sweep,
-)
-from nlsdesign.sweeps import (
-    run_sweep as same_bits,
 )
 from nlsdesign.sweeps.changes import changed_assembly
 from nlsdesign.sweeps.questions import QUICK
@@ -128,7 +126,7 @@ def test_workers_without_a_compiler_write_the_same_bytes(
     inertia = SOFT.quantities()[INERTIA].number
     machines = [inertia, 1.3 * inertia, 1.5 * inertia]
     spread_of(tmp_path / "compiled", machines, Processes(2))
-    monkeypatch.setattr(same_bits, "quickest", lambda: as_it_is)
+    monkeypatch.setattr(run_sweep, "quickest", lambda: as_it_is)
     monkeypatch.setattr(column_runs, "MANY", 2)
     column_runs._column_run.cache_clear()
     table = spread_of(tmp_path / "interpreted", machines, InThisProcess())
