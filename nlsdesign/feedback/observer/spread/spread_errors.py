@@ -153,7 +153,7 @@ class SpreadErrors:
             "amplitude": self.torque,
             "draws": int(self.drawn.shape[1]),
             "draws_that_did_not_run": self.lost,
-            "errors": [dict(zip(keys, row, strict=True)) for row in self._numbers()],
+            "errors": [dict(zip(keys, row, strict=True)) for row in _numbers(self)],
             "causes": {name: dict(self.ranked_causes(name)) for name in self.observers},
             "least_over_the_spread": self.best,
         }
@@ -180,24 +180,12 @@ class SpreadErrors:
         heads = ["observer", "frequency [Hz]", *(f"{name} [{self.unit}]" for name in numbers)]
         rows = [
             [name, f"{f:g}", *(f"{v:.9g}" for v in values), "" if bound is None else f"{bound:.9g}"]
-            for name, f, *values, bound in self._numbers()
+            for name, f, *values, bound in _numbers(self)
         ]
         write_table(folder / "errors.csv", [heads, *rows])
         text = json.dumps(self.content(), indent=2, ensure_ascii=False) + "\n"
         write_text(folder / "errors.json", text)
         return [folder / "errors.csv", folder / "errors.json"]
-
-    def _numbers(self) -> list[tuple[Any, ...]]:
-        """Return observer, frequency, exact, median, 90 %, rms and bound, one row per sine."""
-        return [
-            (
-                name, f, float(self.exact[i, k]), float(self.quantile(name, 0.5)[k]),
-                float(self.quantile(name, 0.9)[k]), float(self.rms(name)[k]),
-                float(self.bound[k]) if len(self.bound) else None,
-            )
-            for i, name in enumerate(self.observers)
-            for k, f in enumerate(self.frequencies)
-        ]  # fmt: skip
 
     @property
     def shown_in(self) -> str:
@@ -220,6 +208,19 @@ class SpreadErrors:
         lines = [head, "observer  Hz  exact numbers  median  90 %  rms  no estimator below"]
         lines += ["  ".join(row) for row in self.rows()]
         return "\n".join([*lines, f"least over the spread: {self.best}"])
+
+
+def _numbers(errors: SpreadErrors) -> list[tuple[Any, ...]]:
+    """Return observer, frequency, exact, median, 90 %, rms and bound, one row per sine."""
+    return [
+        (
+            name, f, float(errors.exact[i, k]), float(errors.quantile(name, 0.5)[k]),
+            float(errors.quantile(name, 0.9)[k]), float(errors.rms(name)[k]),
+            float(errors.bound[k]) if len(errors.bound) else None,
+        )
+        for i, name in enumerate(errors.observers)
+        for k, f in enumerate(errors.frequencies)
+    ]  # fmt: skip
 
 
 def observer_errors(
