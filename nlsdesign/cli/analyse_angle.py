@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..foundation.files import make_folder
 from ..foundation.quantity import typeset_unit
+from ..foundation.text_files import make_folder
 from .output import (
     deck_option,
     examples,

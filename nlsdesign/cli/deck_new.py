@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import ExportError, NlsError, UnitError, nearest, unknown_name
-from ..foundation.files import write_text
 from ..foundation.quantity import Quantity, same_dimension, typeset_unit
+from ..foundation.text_files import write_text
 from .output import examples, json_option, next_command, show_json
 from .readiness import shown_command
 from .units import parse_number, split_number

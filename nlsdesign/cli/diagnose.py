@@ -81,9 +81,9 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..bench.identification import load_records
     from ..components.assembly.deck_writer import declare
     from ..foundation.deck import load_deck
-    from ..foundation.files import discard, make_folder
     from ..foundation.locations import version
     from ..foundation.progress import Steps
+    from ..foundation.text_files import discard, make_folder
     from ..model import flatten
     from ..presentation.report import verdict_sections, write_report
 
@@ -165,7 +165,7 @@ def _regenerated(
 
 def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list[Section]]:
     """Write the observer of the better model; return data, text and sections on it."""
-    from ..foundation.files import write_text
+    from ..foundation.text_files import write_text
     from ..presentation.report import regeneration_sections
     from ..regeneration import write_regeneration
 

@@ -17,9 +17,9 @@ from typing import Any, Protocol, SupportsFloat, runtime_checkable
 import click
 
 from ..foundation.errors import NlsError, brief, unknown_name
-from ..foundation.files import is_there, listed_files, make_folder, text_of
 from ..foundation.locations import bundled, folder
 from ..foundation.quantity import with_unit
+from ..foundation.text_files import is_there, listed_files, make_folder, text_of
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files

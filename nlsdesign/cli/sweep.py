@@ -81,7 +81,7 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
 
 def _require_room(folder: Path) -> None:
     """Refuse, before any point is computed, a page that would replace what somebody has changed."""
-    from ..foundation.files import WORDS, file_state
+    from ..foundation.text_files import WORDS, file_state
 
     for path in (folder / name for name in ("sweep.html", "points.csv")):
         state = file_state(path)

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name, visible
-from .files import is_there, text_of
 from .locations import folder
 from .quantity import Quantity, parse_unit
+from .text_files import is_there, text_of
 
 _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"

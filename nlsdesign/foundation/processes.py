@@ -25,7 +25,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from .files import remove_drafts
+from .text_files import remove_drafts
 
 if TYPE_CHECKING:
     from multiprocessing.pool import IMapIterator

@@ -12,8 +12,8 @@ import numpy as np
 from ..foundation.arrays import Array
 from ..foundation.data_frames import Axis, data_frame, data_set
 from ..foundation.errors import MeasurementError, unknown_name
-from ..foundation.files import write_table
 from ..foundation.quantity import parse_unit, with_unit
+from ..foundation.text_files import write_table
 from ..model import Variable
 from .events import Event
 

@@ -14,8 +14,8 @@ from ..design.jobs.job_file import built, job_in
 from ..feedback.control import TorqueGains
 from ..foundation.deck import Deck, load_deck, read_deck
 from ..foundation.errors import DeckError, NlsError, UnitError, brief, unknown_name
-from ..foundation.files import text_of
 from ..foundation.quantity import parse_unit, same_dimension
+from ..foundation.text_files import text_of
 from ..foundation.written_numbers import split_number
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import unit_of_field

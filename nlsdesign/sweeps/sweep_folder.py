@@ -18,7 +18,7 @@ import numpy as np
 from ..components.assembly.deck_writer import deck_digest, deck_text
 from ..components.assembly.named_parts import Assembly
 from ..foundation.errors import ExportError, MeasurementError
-from ..foundation.files import make_folder, write_text
+from ..foundation.text_files import make_folder, write_text
 from ..foundation.work_sharing import CodeIdentity, code_identity
 from .sweep_columns import RESULTS_FILE, SweepColumn, arrow_column, libraries, numpy_column, read_columns
 from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order

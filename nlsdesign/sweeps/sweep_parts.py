@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..foundation.arrays import Mask
 from ..foundation.errors import ExportError, MeasurementError
-from ..foundation.files import draft
+from ..foundation.text_files import draft
 from .sweep_columns import (
     DONE,
     RESULTS_FILE,

@@ -16,7 +16,7 @@ from ..components.assembly.named_parts import Assembly
 from ..foundation.arrays import Mask
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, MeasurementError, unknown_name
-from ..foundation.files import is_there, text_of
+from ..foundation.text_files import is_there, text_of
 from .changes import changed_assembly
 from .sweep_columns import DONE, RESULTS_FILE, SweepColumn, give_back, libraries, numpy_column, read_columns
 from .sweep_parts import rows_in_order

@@ -10,9 +10,9 @@ from typing import Any
 from ...foundation.deck import NUMBER_FIELDS, Deck, read_deck
 from ...foundation.errors import DeckError, nearest, unknown_name
 from ...foundation.extensions import extension_files
-from ...foundation.files import text_of
 from ...foundation.locations import folder
 from ...foundation.quantity import Quantity, same_dimension, with_unit
+from ...foundation.text_files import text_of
 
 EVIDENCE = ("measured curve", "data sheet", "range")
 """Grades of evidence, best first."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError, UnitError, nearest
-from ...foundation.files import text_of
 from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
+from ...foundation.text_files import text_of
 from ...foundation.written_numbers import name_and_unit
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
-from ...foundation.files import write_text
 from ...foundation.quantity import Quantity
+from ...foundation.text_files import write_text
 from ..statics.contour import Contour, turn
 from .arc_path import ArcPath
 from .cam_part import CamPart

@@ -16,9 +16,9 @@ from pathlib import Path
 import casadi as ca
 
 from ...foundation.errors import ExportError
-from ...foundation.files import write_text
 from ...foundation.locations import version
 from ...foundation.quantity import NOT_STATED, parse_unit
+from ...foundation.text_files import write_text
 from ...model import FlatModel, Variable
 from ...model.function_steps import Instruction, read_instructions
 from ..c.c_text import comment

@@ -18,8 +18,8 @@ import numpy as np
 from ...foundation.arrays import Array, Mask
 from ...foundation.data_frames import Axis, data_frame, data_set
 from ...foundation.errors import unknown_name
-from ...foundation.files import write_table
 from ...foundation.quantity import typeset_unit
+from ...foundation.text_files import write_table
 from ...model import FlatModel, Variable
 from ...model.roles import measured_motion
 from .rest_points import RestPoint, RestPoints, rest_points

@@ -22,7 +22,7 @@ from secrets import token_hex
 from typing import Any, Final
 
 from ..errors import ValueRangeError, WorkSharingError, missing_library
-from ..files import is_there, text_of
+from ..text_files import is_there, text_of
 from .chunks import (
     Chunk,
     ChunkLoss,

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...foundation.arrays import Array, Indices
 from ...foundation.errors import ExportError, nearest
-from ...foundation.files import write_bytes
+from ...foundation.text_files import write_bytes
 from .style import STYLE, TONES, alternative_text
 
 _SVG = "{http://www.w3.org/2000/svg}"

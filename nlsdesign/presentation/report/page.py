@@ -12,8 +12,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ...foundation.errors import ExportError, ValueRangeError
-from ...foundation.files import write_text
 from ...foundation.locations import version
+from ...foundation.text_files import write_text
 from ..figures.style import TONES
 from .sections import Chapter, Html, PagePosition, Section, breakable, prose, visible, words
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...foundation.command_words import typed_command
 from ...foundation.errors import MissingLibraryError, NlsError, visible
-from ...foundation.files import write_table, write_text
+from ...foundation.text_files import write_table, write_text
 from ...sweeps import SweepTable
 from ...sweeps.point_deck import point_deck_texts
 from ...sweeps.preferences import NotBelow, Preference, RankedPoints, Requirement, rank_points

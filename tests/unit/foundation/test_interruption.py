@@ -17,7 +17,7 @@ HEAD = """
 import os, subprocess, sys, tempfile, time
 from pathlib import Path
 from nlsdesign.foundation.processes import guarded
-from nlsdesign.foundation.files import draft
+from nlsdesign.foundation.text_files import draft
 
 def begun():
     Path("begun").write_text("")

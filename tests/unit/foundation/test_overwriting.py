@@ -10,7 +10,7 @@ import pytest
 
 from nlsdesign.cli import overwriting
 from nlsdesign.foundation.errors import ExportError
-from nlsdesign.foundation.files import (
+from nlsdesign.foundation.text_files import (
     LIST_NAME,
     discard,
     file_state,

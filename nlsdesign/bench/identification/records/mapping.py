@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from ....foundation.errors import MeasurementError, UnitError, nearest
-from ....foundation.files import text_of
 from ....foundation.quantity import parse_unit, same_dimension, typeset_unit
+from ....foundation.text_files import text_of
 from ....model import FlatModel
 
 _FASTEST = 1e6

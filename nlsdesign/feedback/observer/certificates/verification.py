@@ -12,7 +12,7 @@ from typing import Protocol, TypeAlias, cast
 import numpy as np
 
 from ....foundation.errors import MeasurementError, NlsError
-from ....foundation.files import text_of
+from ....foundation.text_files import text_of
 from ....foundation.written_numbers import prefixed
 from ....model import FlatModel
 from ..adaptive.adaptive_observer import AdaptiveDesign
