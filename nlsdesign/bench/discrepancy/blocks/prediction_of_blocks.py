@@ -13,8 +13,8 @@ from ....foundation.symbolic import depends
 from ....model import flatten
 from ....simulation import RangeWarning, Trace, range_warnings, simulate
 from ...identification.equation_error.block import Block
+from ...identification.equation_error.block_noise import measured_inputs
 from ...identification.equation_error.evidence import Bench
-from ...identification.equation_error.filter_choice import measured_inputs
 from ...identification.records.measurement import Record, RecordSet
 from .tearing import blocks_of
 

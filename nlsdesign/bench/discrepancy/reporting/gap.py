@@ -6,7 +6,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....model import flatten
-from ...identification.equation_error.filter_choice import rate_span
+from ...identification.equation_error.block_noise import rate_span
 from ...identification.filters import derivative
 from ...identification.residuals import Binned, shapes
 from ..screening.acting_effort import Acting
