@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..foundation.arrays import Array, Mask
 from ..foundation.errors import missing_library
-from .answers import codes, dependent_axes
+from .answer_statistics import codes, dependent_axes
 from .saltelli import SaltelliForm, saltelli_plan
 from .sweep_columns import SALTELLI
 

@@ -8,7 +8,7 @@ from .chunks import CodeIdentity, PointOutcome, code_identity
 from .dask_scheduler import DaskScheduler
 from .mpi_ranks import MpiRanks
 from .shared_map import shared_map, spread_over
-from .workers import Executor, InThisProcess, Processes
+from .teams import Executor, InThisProcess, Processes
 
 __all__ = [
     "CodeIdentity",

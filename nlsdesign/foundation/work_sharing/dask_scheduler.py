@@ -34,7 +34,7 @@ from .chunks import (
     refused,
     sendable,
 )
-from .workers import Finished, Team
+from .teams import Finished, Team
 
 _CHUNKS_PER_WORKER: Final = 2
 _AGAIN: Final = 0.5

@@ -20,7 +20,7 @@ from .chunks import (
     refused,
     sendable,
 )
-from .workers import Finished, Team
+from .teams import Finished, Team
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from typing import Any, Final
 from ..errors import WorkSharingError
 from ..processes import mapped_by
 from .chunks import Chunk, ChunkLoss, PointOutcome, sendable
-from .workers import Executor, Team
+from .teams import Executor, Team
 
 _MOST_DEATHS: Final = 2
 _TICK: Final = 0.5

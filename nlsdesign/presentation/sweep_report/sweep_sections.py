@@ -10,7 +10,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.quantity import three_digits, typeset_unit, with_unit
 from ...sweeps import SweepColumn, SweepTable
-from ...sweeps.answers import AnswerSurface, BoundedQuantile, answer_quantiles, answer_surface
+from ...sweeps.answer_statistics import AnswerSurface, BoundedQuantile, answer_quantiles, answer_surface
 from ...sweeps.preferences import NearIsBetter, RankedPoints
 from ...sweeps.sensitivity import AnswerSensitivity
 from ..figures import Figure

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError
-from nlsdesign.sweeps.answers import AnswerSurface, answer_quantiles, answer_surface, dependent_axes
+from nlsdesign.sweeps.answer_statistics import AnswerSurface, answer_quantiles, answer_surface, dependent_axes
 from nlsdesign.sweeps.preferences import (
     LargerIsBetter,
     NearIsBetter,
