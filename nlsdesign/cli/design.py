@@ -233,7 +233,7 @@ def _with_progress(job: DesignJob, note: Callable[[str], None]) -> Any:
 def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Target:
     """Return the target; one that follows from a task is worked out, shown and drawn first."""
     from ..design import Target, TaskTarget
-    from ..foundation.writing import make_folder
+    from ..foundation.text_files import make_folder
     from ..model import flatten
     from ..presentation.figures import curve_of_task, motor_over_task, write_figures
 
