@@ -13,8 +13,7 @@ import numpy as np
 from ...components.assembly.deck_writer import write_deck
 from ...foundation.errors import NlsError
 from ...foundation.quantity import parse_unit, with_unit
-from ...foundation.writing import make_folder, write_text
-from ...foundation.written_files import discard
+from ...foundation.text_files import discard, make_folder, write_text
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
 from ..drawing.machined_cam import MachinedCam

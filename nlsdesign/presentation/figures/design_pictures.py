@@ -9,10 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...design import CamDesign, CamPart
-from .design_figures import design_picture, limit_margins
-from .made_springs import tolerance_bars
+from .curves import torque_against_target
+from .design_figures import design_picture, limit_margins, tolerance_bars
 from .svg import write_figures
-from .torque import torque_against_target
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 
