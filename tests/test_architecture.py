@@ -75,7 +75,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
     ),
     "bench.discrepancy": (
-        {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
+        {"tearing"}, {"prediction"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
         {"diagnose"},
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
@@ -353,7 +353,7 @@ def test_what_is_allowed_passes(tmp_path: Path) -> None:
             "may not know bench.discrepancy",
         ),
         (
-            "bench/discrepancy/selection/excess",
+            "bench/discrepancy/selection/measures",
             "from ....components.transmission import cam",
             "bench.discrepancy may not know components",
         ),
@@ -370,7 +370,7 @@ def test_what_is_allowed_passes(tmp_path: Path) -> None:
         ("components/core/part", "from ..transmission import cam", "core may not know transmission"),
         ("components/sensing/encoder", "from ..transmission import cam", "sensing may not know transmission"),
         ("components/core/part", "from ... import components", "front of its room"),
-        ("bench/discrepancy/blocks/cut", "from ..effects import x", "blocks may not know effects"),
+        ("bench/discrepancy/tearing", "from .effects import x", "tearing may not know effects"),
         ("components/spring", "", "components.spring is in no inner room"),
         ("helpers", "", "nlsdesign.helpers is in no room of the house"),
         ("presentation/report/html", "import matplotlib.pyplot as plt", "only in presentation.figures"),

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Column, Record, RecordSet
 from nlsdesign.bench.identification.equation_error import evidence
 from nlsdesign.bench.identification.equation_error.evidence import Bench

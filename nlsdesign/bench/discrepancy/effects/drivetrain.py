@@ -25,9 +25,8 @@ from ....components import (
 )
 from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity
-from ..fitting.strategies import Continuation, PlainButLong
-from .candidate import Unknown, free_name, wrapped
-from .effect import Edit, Effect, Form
+from ..fitting import Continuation, PlainButLong
+from .effect import Edit, Effect, Form, Unknown, free_name, wrapped
 from .friction import number, tied
 from .places import (
     domain_of,

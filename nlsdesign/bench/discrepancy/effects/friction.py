@@ -21,8 +21,7 @@ from ....components import (
 from ....components.core.domain import Domain
 from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity
-from .candidate import SOURCE, Unknown, free_name, numbers_of, wrapped
-from .effect import Edit, Effect, Form
+from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, numbers_of, wrapped
 from .places import (
     beside,
     domain_of,

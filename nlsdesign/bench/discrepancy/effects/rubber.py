@@ -22,8 +22,7 @@ from ....components import (
     series,
 )
 from ....foundation.quantity import Quantity
-from .candidate import SOURCE, Unknown
-from .effect import Edit, Effect, Form
+from .effect import SOURCE, Edit, Effect, Form, Unknown
 from .friction import number
 from .places import beside, effort_over_motion, laws, lumped_springs_without
 from .sizes import LONGEST

@@ -23,8 +23,7 @@ from ....components import (
 )
 from ....components.core.domain import Domain
 from ....foundation.quantity import Quantity
-from .candidate import SOURCE, Unknown, free_name
-from .effect import Edit, Effect, Form, Places
+from .effect import SOURCE, Edit, Effect, Form, Places, Unknown, free_name
 from .places import turning_bodies, turns_per_turn
 from .sizes import LONGEST, QUICKEST
 

@@ -35,9 +35,9 @@ from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.filters import derivative
-from ..blocks.shown_values import shown_values
-from ..blocks.tearing import blocks_of
-from .candidate import Candidate, Unknown, wrapped
+from ..prediction import shown_values
+from ..tearing import blocks_of
+from .effect import Candidate, Unknown, wrapped
 from .friction import tied
 from .places import stretched
 

@@ -27,7 +27,7 @@ from ...identification.equation_error.evidence import Bench, Evidence, Floor
 from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter, box
 from ...identification.records.measurement import Record
-from ..effects.candidate import Unknown
+from ..effects.effect import Unknown
 from ..selection.hypothesis import Hypothesis
 
 Values = Mapping[str, float]

@@ -29,7 +29,7 @@ from ...identification.estimation.least_squares import Fit, StackedRows
 from ...identification.estimation.levenberg_marquardt import ENOUGH, minimise
 from ...identification.estimation.parameters import box
 from ...identification.statistics.residuals import effective_size
-from ..fitting.unpredictable import Key, Tally
+from ..fitting import Key, Tally
 
 SEGMENTS = 6
 """Pieces of a record whose sums of squares are kept apart: their scatter is the standard error of a sum."""

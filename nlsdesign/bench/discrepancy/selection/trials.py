@@ -8,23 +8,21 @@ from dataclasses import dataclass, field, replace
 
 from ....foundation.errors import ConvergenceError
 from ....foundation.processes import parallel_map
-from ..effects.candidate import Candidate, EffectFunction
+from ..effects.effect import Candidate, EffectFunction
 from .comparison import Comparison
 from .criteria import (
     Criteria,
     Rival,
     choose,
+    distance_to_next,
     imitates,
     is_undecided,
     objections,
     objections_of_numbers,
     predicts_records,
 )
-from .excess import excesses
-from .hypothesis import Hypothesis
-from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record, total_excess
-from .probability import distance_to_next
-from .standing import standing_of
+from .hypothesis import Hypothesis, excesses
+from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record, standing_of, total_excess
 
 _LOOKED_AT_TWICE = 4
 """So many of the best are judged on all samples where the coarse look sees nothing open."""

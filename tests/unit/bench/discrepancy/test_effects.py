@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.effects import (
     ALL,
     Candidate,
@@ -26,6 +25,7 @@ from nlsdesign.bench.discrepancy.effects import (
 )
 from nlsdesign.bench.discrepancy.effects.places import stretched
 from nlsdesign.bench.discrepancy.selection.comparison import moved_numbers
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.components import (
     ROTATION,
     TRANSLATION,

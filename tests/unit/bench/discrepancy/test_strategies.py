@@ -10,28 +10,29 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from nlsdesign.bench.discrepancy import fitting as strategies
 from nlsdesign.bench.discrepancy.effects import backlash
-from nlsdesign.bench.discrepancy.effects.candidate import Candidate, Unknown
-from nlsdesign.bench.discrepancy.fitting import strategies
-from nlsdesign.bench.discrepancy.fitting.strategies import (
+from nlsdesign.bench.discrepancy.effects.effect import Candidate, Unknown
+from nlsdesign.bench.discrepancy.fitting import (
     EXPENSIVE_STEP,
     LONG_STEP,
     MOST_STARTS,
     Continuation,
     FitProblem,
+    Key,
     Limits,
     Plain,
     RobustOverFreeFlight,
     Smooth,
     Start,
     Strategy,
+    Tally,
     best_fit,
     method_for,
     refusal,
 )
-from nlsdesign.bench.discrepancy.fitting.unpredictable import Key, Tally
+from nlsdesign.bench.discrepancy.selection.comparison import FreeBlock, GroupFit, HypothesisFit
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
-from nlsdesign.bench.discrepancy.selection.hypothesis_fit import FreeBlock, GroupFit, HypothesisFit
 from nlsdesign.bench.identification import Fit, Parameter
 from nlsdesign.bench.identification.equation_error.block import Drive
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Evidence

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Column, Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Floor
 from nlsdesign.bench.identification.equation_error.noise import Noise, estimate_noise
