@@ -75,8 +75,8 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
     ),
     "bench.discrepancy": (
-        {"tearing"}, {"prediction"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
-        {"diagnose"},
+        {"tearing"}, {"prediction"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"},
+        {"reporting"}, {"diagnose"},
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
     "feedback.observer": ({"scheduling"}, {"certificates", "adaptive"}, {"spread"}),

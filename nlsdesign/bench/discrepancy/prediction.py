@@ -1,4 +1,4 @@
-"""What a model predicts of a measured record, block by block, and what a measured signal shows of the model."""
+"""What a model predicts of a measured record, block by block, and what a signal shows of the model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an effect of the catalogue is: a row with a name, and how it edits an assembly at the places it can have."""
+"""What an effect of the catalogue is: a row with a name, and how it edits an assembly wherever it can sit."""
 
 from __future__ import annotations
 

@@ -24,9 +24,9 @@ from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ..selection.comparison import Comparison
-from ..selection.criteria import Criteria, is_complete, is_more_than_noise, objections_of_numbers
+from ..selection.criteria import Change, Criteria, is_complete
 from ..selection.hypothesis import Hypothesis, excesses
-from ..selection.measures import DECLARED, Excesses, gain, standing_of
+from ..selection.measures import DECLARED, Excesses, standing_of
 
 AT_END = 3.4
 """Prior standard deviations at which a refit is stopped: twice the declared range is 3.46."""
@@ -65,10 +65,10 @@ def with_numbers_let_go(
         return None  # numbers without a response explain nothing; the hypothesis stays as it is
     before, after = _blocks(every), _blocks(excesses(free, comparison.bench, criteria))
     left, now = (sum(e.excess for e in each.values()) for each in (before, after))
-    if now > (1.0 - criteria.least_share) * left or not is_more_than_noise(criteria, gain(before, after)):
+    if now > (1.0 - criteria.least_share) * left or not Change(criteria, before, after).is_more_than_noise:
         return None
     stands = [
-        not objections_of_numbers(criteria, standing_of(c.unknowns, free.fits.values())) for c in free.added
+        not criteria.objections_of_numbers(standing_of(c.unknowns, free.fits.values())) for c in free.added
     ]
     return free if all(stands) and wrong_numbers(free) else None
 

@@ -14,7 +14,7 @@ An effect may be named if
  4. no record is predicted worse than without it, and records left out as a whole are predicted better.
 Of several such effects the one that predicts best is taken, unless a simpler one predicts about as well.
 
-Probability that a name is right, calibrated on cases with known answers.
+The probability that a name is right is calibrated on cases with known answers:
 
     ln(p/(1 − p)) = a + b·ln(r) + c·m,   r = (left by the best other name + n)/(left by the named + n)
 
@@ -105,164 +105,168 @@ class Criteria:
             for f in fields(self)
         ]
 
+    def is_beyond_noise(
+        self, mean_square: float, effective_size: float, known_from: float = math.inf
+    ) -> bool:
+        """Tell whether the mean square of a block, in units of the noise floor, is more than noise.
 
-def is_beyond_noise(
-    criteria: Criteria, mean_square: float, effective_size: float, known_from: float = math.inf
-) -> bool:
-    """Tell whether a mean square in units of the noise floor is more than noise.
+        The floor is a mean square itself, of the squares that it is known from. The ratio of the
+        two scatters by what both do.
+        """
+        scatter = self.significant * math.sqrt(2.0 / max(effective_size, 1.0) + 2.0 / max(known_from, 1.0))
+        return mean_square > 1.0 + max(self.least_excess, scatter)
 
-    The floor is a mean square itself; the ratio of two scatters by what both do.
+    def is_beyond_prior(self, squares: float, expected: float) -> bool:
+        """Tell whether refitted numbers lie outside their declared ranges, taken together.
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    mean_square
-        Of the residuals of a block.
-    effective_size
-        How many independent residuals these are equivalent to.
-    known_from
-        How many independent squares of noise the floor is known from.
-    """
-    scatter = criteria.significant * math.sqrt(2.0 / max(effective_size, 1.0) + 2.0 / max(known_from, 1.0))
-    return mean_square > 1.0 + max(criteria.least_excess, scatter)
+        Noise alone gives the expected sum of squares: one for each number, more where the noise is coloured.
+        """
+        return squares > self.prior_per_number * expected
 
+    def is_more_than_noise(self, gained: Gain) -> bool:
+        """Tell whether a gain in prediction is more than noise gives, and does not rest on a single piece."""
+        return gained.rest >= self.noise_margin
 
-def is_beyond_prior(criteria: Criteria, squares: float, expected: float) -> bool:
-    """Tell whether refitted numbers lie outside their declared ranges, taken together.
+    def is_outstanding(self, distance: float) -> bool:
+        """Tell whether an effect explains so much more than any other that it is one, although much is left.
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    squares
-        Sum of squared departures in standard deviations of the prior.
-    expected
-        What noise alone gives: one for each number, more where the noise is coloured.
-    """
-    return squares > criteria.prior_per_number * expected
+        The distance is the natural logarithm of how many times as much the best other name leaves.
+        """
+        return distance >= math.log(self.stands_out)
 
+    def is_far_from_closed(self, first: Excess, now: Excess) -> bool:
+        """Tell whether a block has more left than an inexact form of a named effect leaves."""
+        return now.excess > self.inexact * first.excess
 
-def is_more_than_noise(criteria: Criteria, gained: Gain) -> bool:
-    """Tell whether a gain in prediction is more than noise gives, and does not rest on a single piece.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    gained
-        From one hypothesis to another.
-    """
-    return gained.rest >= criteria.noise_margin
+    def objections_of_numbers(self, standing: Standing) -> list[str]:
+        """Return in words what the numbers of an effect have against it."""
+        words = []
+        if standing.exclusion < self.exclusion:
+            words.append(f"its numbers are {standing.exclusion:.1f} standard errors from no effect")
+        bounded = [n.name for n in standing.numbers if n.at_bound]
+        unknown = [n.name for n in standing.numbers if n.error > self.widest and not n.at_bound]
+        words += [f"{_listed(bounded)} at a bound of the search"] if bounded else []
+        words += [f"{_listed(unknown)} not known"] if unknown else []
+        return words
 
 
-def predicts_records(criteria: Criteria, before: Excesses, after: Excesses) -> bool:
-    """Tell whether whole records are predicted better with an effect, its numbers fitted to the others.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before, after
-        Of the hypotheses without and with the effect, each record with the numbers of the others. Nothing is
-        asked where only declared numbers are open.
-    """
-    if not any(one.open for name, one in before.items() if name != DECLARED):
-        return True
-    return gain(before, after).value >= criteria.noise_margin
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 1} more are" if len(names) > 1 else " is"
+    return f"{names[0]}{more}"
 
 
-def records_made_worse(criteria: Criteria, before: Excesses, after: Excesses) -> dict[str, float]:
-    """Return the records that are predicted worse than before, with the factor by which their squares grow.
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What a hypothesis leaves over, compared with another one on the same rows, as the rule sees it."""
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before, after
-        Of the hypotheses without and with an effect.
-    """
-    squares = {"before": dict[str, float](), "after": dict[str, float](), "margin": dict[str, float]()}
-    for name, one in before.items():
-        for record, pieces in one.pieces.items():
-            for when, value in (
-                ("before", sum(pieces)),
-                ("after", sum(after[name].pieces[record])),
-                ("margin", criteria.noise_margin * after[name].colour),
-            ):
-                squares[when][record] = squares[when].get(record, 0.0) + value
-    then, now = squares["before"], squares["after"]
-    return {
-        record: now[record] / max(then[record], 1e-300)
-        for record in then
-        if now[record] > (1.0 + criteria.worse) * then[record] + squares["margin"][record]
-    }
+    criteria: Criteria
+    before: Excesses
+    after: Excesses
 
+    @property
+    def gain(self) -> Gain:
+        """Gain in prediction over all blocks."""
+        return gain(self.before, self.after)
 
-def unexplained(criteria: Criteria, first: Excesses, last: Excesses) -> list[str]:
-    """Return the blocks that were open and of whose excess too little is accounted for.
+    @property
+    def is_more_than_noise(self) -> bool:
+        """Whether prediction gains more than noise gives."""
+        return self.criteria.is_more_than_noise(self.gain)
 
-    Declared numbers that stay far from their values are no objection where a block was open: they are
-    mentioned in ``where``.
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of the excess of each open block that is explained."""
+        return explained(self.before, self.after)
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    first, last
-        Of the refitted declared model and of the last hypothesis.
-    """
-    shares = explained(first, last)
-    if len(shares) > 1:
-        shares.pop(DECLARED, None)
-    return [n for n, share in shares.items() if last[n].open and share < criteria.closed_share]
+    @property
+    def predicts_records(self) -> bool:
+        """Whether whole records are predicted better, where each is judged by the numbers of the others.
 
+        Nothing is asked where only declared numbers are open.
+        """
+        if not any(one.open for name, one in self.before.items() if name != DECLARED):
+            return True
+        return self.gain.value >= self.criteria.noise_margin
 
-def stands_out(criteria: Criteria, distance: float) -> bool:
-    """Tell whether an effect explains so much more than any other that it is one, although much is left.
+    def records_made_worse(self) -> dict[str, float]:
+        """Return the records that are predicted worse, with the factor by which their squares grow."""
+        then, now, margin = (dict[str, float]() for _ in range(3))
+        for name, one in self.before.items():
+            for record, pieces in one.pieces.items():
+                last = self.after[name]
+                then[record] = then.get(record, 0.0) + sum(pieces)
+                now[record] = now.get(record, 0.0) + sum(last.pieces[record])
+                margin[record] = margin.get(record, 0.0) + self.criteria.noise_margin * last.colour
+        return {
+            record: now[record] / max(then[record], 1e-300)
+            for record in then
+            if now[record] > (1.0 + self.criteria.worse) * then[record] + margin[record]
+        }
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    distance
-        How many times as much the best other name leaves, natural logarithm.
-    """
-    return distance >= math.log(criteria.stands_out)
+    def unexplained(self) -> list[str]:
+        """Return the blocks that were open and of whose excess too little is accounted for.
 
+        Declared numbers that stay far from their values are no objection where a block was open: they are
+        mentioned in ``where``.
+        """
+        shares = self.shares
+        if len(shares) > 1:
+            shares.pop(DECLARED, None)
+        return [n for n, share in shares.items() if self.after[n].open and share < self.criteria.closed_share]
 
-def is_far_from_closed(criteria: Criteria, first: Excess, now: Excess) -> bool:
-    """Tell whether a block has more left than an inexact form of a named effect leaves.
+    def is_superfluous(self) -> bool:
+        """Tell whether the hypothesis without an effect predicts about as well as the one with it."""
+        if not self.is_more_than_noise:
+            return True
+        return total_excess(self.before) <= self.criteria.richer * total_excess(self.after)
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    first, now
-        What the refitted declared model leaves, and what the present hypothesis leaves.
-    """
-    return now.excess > criteria.inexact * first.excess
+    def objections(self, standing: Standing) -> tuple[str, ...]:
+        """Return in words why an effect may not be named, by what its numbers say too; nothing if it may."""
+        words, shares = [], self.shares
+        best, gained = max(shares.values(), default=0.0), self.gain
+        if best < self.criteria.least_share or total_excess(self.after) >= total_excess(self.before):
+            words.append(
+                f"it explains {100.0 * max(best, 0.0):.0f} % of what is left, "
+                f"less than {100.0 * self.criteria.least_share:.0f} %"
+            )
+        only_declared = all(name == DECLARED for name in shares)
+        if not only_declared and not self.criteria.is_more_than_noise(gained):
+            words.append(
+                "without its best piece of a record the prediction gains "
+                f"{gained.rest:.3g} squares of the noise"
+            )
+        words += self._strain()
+        words += self.criteria.objections_of_numbers(standing)
+        words += [
+            f"record '{record}' is predicted worse, {factor:.2g} times the squares"
+            for record, factor in sorted(self.records_made_worse().items())
+        ]
+        return tuple(words)
+
+    def _strain(self) -> list[str]:
+        """Return in words that declared numbers are driven out of their ranges: it is another effect, then."""
+        now = self.after.get(DECLARED)
+        if now is None or not now.open:
+            return []
+        least = max(self.before[DECLARED].chi2, self.criteria.prior_per_number * now.rows)
+        if now.chi2 <= self.criteria.strain * least:
+            return []
+        return [f"it drives the declared numbers {now.fit:.1f} standard deviations of their spread away"]
+
+    def is_undecided(self, standing: Standing) -> bool:
+        """Tell whether an effect explains what is left, but the records do not determine its numbers."""
+        explains = max(self.shares.values(), default=0.0) >= self.criteria.closed_share
+        unknown = self.criteria.objections_of_numbers(standing)
+        return explains and bool(unknown) and list(self.objections(standing)) == unknown
 
 
 def is_complete(last: Excesses) -> bool:
-    """Tell whether nothing is left beyond the noise in any block.
-
-    Parameters
-    ----------
-    last
-        Of the last hypothesis.
-    """
+    """Tell whether nothing is left beyond the noise in any block."""
     return not any(each.open for name, each in last.items() if name != DECLARED)
 
 
 def lacking(now: Excesses) -> list[str]:
-    """Return the blocks that are open, the largest excess first; declared numbers only where no block is.
-
-    Parameters
-    ----------
-    now
-        Of the present hypothesis.
-    """
+    """Return the blocks that are open, the largest excess first; declared numbers only where no block is."""
     names = [n for n, e in now.items() if e.open]
     blocks = sorted((n for n in names if n != DECLARED), key=lambda n: -now[n].excess)
     return blocks or names
@@ -298,120 +302,21 @@ class Rival(Generic[T]):
     standing: Standing = field(default_factory=Standing)
     simpler: tuple[str, ...] = ()
 
+    def left_in(self, block: str) -> float:
+        """Return the excess that it leaves in a block."""
+        return self.excesses[block].excess
 
-def left_by(rival: Rival[T], block: str) -> float:
-    """Return the excess that a rival leaves in a block.
+    def change(self, criteria: Criteria, before: Excesses) -> Change:
+        """Return what it changes in what the hypothesis that it adds to leaves over."""
+        return Change(criteria, before, self.excesses)
 
-    Parameters
-    ----------
-    rival
-        Of several.
-    block
-        Name.
-    """
-    return rival.excesses[block].excess
+    def objections(self, criteria: Criteria, before: Excesses) -> tuple[str, ...]:
+        """Return in words why it may not be named; nothing if it may."""
+        return self.change(criteria, before).objections(self.standing)
 
-
-def is_undecided(criteria: Criteria, before: Excesses, rival: Rival[T]) -> bool:
-    """Tell whether an effect explains what is left, but the records do not determine its numbers.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before
-        Of the hypothesis without the effect.
-    rival
-        With it.
-    """
-    explains = max(explained(before, rival.excesses).values(), default=0.0) >= criteria.closed_share
-    unknown = objections_of_numbers(criteria, rival.standing)
-    return explains and bool(unknown) and list(objections(criteria, before, rival)) == unknown
-
-
-def objections(criteria: Criteria, before: Excesses, rival: Rival[T]) -> tuple[str, ...]:
-    """Return in words why an effect may not be named; nothing if it may.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before
-        Of the hypothesis without the effect.
-    rival
-        With it.
-    """
-    words, after = [], rival.excesses
-    shares = explained(before, after)
-    best = max(shares.values(), default=0.0)
-    gained = gain(before, after)
-    if best < criteria.least_share or total_excess(after) >= total_excess(before):
-        words.append(
-            f"it explains {100.0 * max(best, 0.0):.0f} % of what is left, "
-            f"less than {100.0 * criteria.least_share:.0f} %"
-        )
-    if not all(name == DECLARED for name in shares) and not is_more_than_noise(criteria, gained):
-        words.append(
-            f"without its best piece of a record the prediction gains {gained.rest:.3g} squares of the noise"
-        )
-    words += _strained(criteria, before, after)
-    return (*words, *objections_of_numbers(criteria, rival.standing), *_worse(criteria, before, after))
-
-
-def _strained(criteria: Criteria, before: Excesses, after: Excesses) -> list[str]:
-    """Return in words whether an effect drives declared numbers out of their ranges: it is another, then."""
-    now = after.get(DECLARED)
-    if now is None or not now.open:
-        return []
-    least = max(before[DECLARED].chi2, criteria.prior_per_number * now.rows)
-    if now.chi2 <= criteria.strain * least:
-        return []
-    return [f"it drives the declared numbers {now.fit:.1f} standard deviations of their spread away"]
-
-
-def objections_of_numbers(criteria: Criteria, standing: Standing) -> list[str]:
-    """Return in words what the numbers of an effect have against it.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    standing
-        Of the fitted numbers.
-    """
-    words = []
-    if standing.exclusion < criteria.exclusion:
-        words.append(f"its numbers are {standing.exclusion:.1f} standard errors from no effect")
-    bounded = [n.name for n in standing.numbers if n.at_bound]
-    unknown = [n.name for n in standing.numbers if n.error > criteria.widest and not n.at_bound]
-    words += [f"{_listed(bounded)} at a bound of the search"] if bounded else []
-    words += [f"{_listed(unknown)} not known"] if unknown else []
-    return words
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - 1} more are" if len(names) > 1 else " is"
-    return f"{names[0]}{more}"
-
-
-def _worse(criteria: Criteria, before: Excesses, after: Excesses) -> list[str]:
-    worse = records_made_worse(criteria, before, after)
-    return [f"record '{r}' is predicted worse, {f:.2g} times the squares" for r, f in sorted(worse.items())]
-
-
-def is_superfluous(criteria: Criteria, without: Excesses, with_it: Excesses) -> bool:
-    """Tell whether the hypothesis without an effect predicts about as well as that with it.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    without, with_it
-        Of the two hypotheses.
-    """
-    if not is_more_than_noise(criteria, gain(without, with_it)):
-        return True
-    return total_excess(without) <= criteria.richer * total_excess(with_it)
+    def is_undecided(self, criteria: Criteria, before: Excesses) -> bool:
+        """Tell whether it explains what is left, but the records do not determine its numbers."""
+        return self.change(criteria, before).is_undecided(self.standing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -445,9 +350,9 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     def left(rival: Rival[T]) -> float:
         after = rival.excesses.items()
         spoilt = sum(max(0.0, e.excess - before[n].excess) for n, e in after if n != block)
-        return left_by(rival, block) + spoilt
+        return rival.left_in(block) + spoilt
 
-    able = [rival for rival in rivals if not objections(criteria, before, rival)]
+    able = [rival for rival in rivals if not rival.objections(criteria, before)]
     able = [rival for rival in able if explained(before, rival.excesses).get(block, 0.0) > 0.0] or able
     if not able:
         return None
@@ -460,7 +365,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
         """
         here, there = ({block: each.excesses[block]} for each in (rival, best))
         gains = gain(here, there), gain(rival.excesses, best.excesses)
-        within = not any(is_more_than_noise(criteria, each) for each in gains)
+        within = not any(criteria.is_more_than_noise(each) for each in gains)
         nested = rival.effect in best.simpler
         return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
 
@@ -473,7 +378,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
             alike[rival.effect] = rival
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     taken = alike.pop(next(reversed(alike)))
-    unknown = [rival for rival in rivals if is_undecided(criteria, before, rival)]
+    unknown = [rival for rival in rivals if rival.is_undecided(criteria, before)]
     if any(imitates(criteria, taken, rival, block) for rival in unknown):
         return None
     return Choice(taken, tuple(alike.values()))
@@ -496,8 +401,8 @@ def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -
         Where something is lacking.
     """
     here, there = ({block: each.excesses[block]} for each in (taken, other))
-    less = criteria.richer * left_by(other, block) < left_by(taken, block)
-    return less and is_more_than_noise(criteria, gain(here, there))
+    less = criteria.richer * other.left_in(block) < taken.left_in(block)
+    return less and Change(criteria, here, there).is_more_than_noise
 
 
 @dataclass(frozen=True)
@@ -551,7 +456,7 @@ def distance_to_next(criteria: Criteria, choice: Choice[T], rivals: Sequence[Riv
     names = {choice.taken.effect, *(each.effect for each in choice.equals), *choice.taken.simpler}
     # A form that contains it is no other name for what is there.
     forms = {rival.effect for rival in rivals if choice.taken.effect in rival.simpler}
-    others = [left_by(rival, block) for rival in rivals if rival.effect not in names | forms]
+    others = [rival.left_in(block) for rival in rivals if rival.effect not in names | forms]
     margin = criteria.noise_margin
-    own = left_by(choice.taken, block)
+    own = choice.taken.left_in(block)
     return math.log((min(others) + margin) / (own + margin)) if others else 0.0

@@ -1,4 +1,4 @@
-"""A hypothesis about what is missing: an assembly with effects, fitted to records, and what it leaves over."""
+"""A hypothesis about what is missing: an assembly with effects, fitted to records; what it leaves over."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...identification.equation_error.evidence import Bench
 from ...identification.estimation.least_squares import Fit
 from ..effects.effect import Candidate, Unknown
 from ..fitting import Key, Tally, like_the_others
-from .criteria import Criteria, is_beyond_noise, is_beyond_prior
+from .criteria import Criteria
 from .measures import DECLARED, Excess
 
 
@@ -120,7 +120,7 @@ def excesses(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> dict[s
     # What scatters the residuals of an open block is not noise, and excuses no number.
     closed = not any(each.open for each in result.values())
     expected = hypothesis.expected_prior if closed else float(count)
-    typical, beyond = math.sqrt(prior / max(count, 1)), is_beyond_prior(criteria, prior, expected)
+    typical, beyond = math.sqrt(prior / max(count, 1)), criteria.is_beyond_prior(prior, expected)
     result[DECLARED] = Excess(
         DECLARED, "1", 1.0, typical, typical, prior, count, float(max(count, 1)), beyond
     )
@@ -142,6 +142,6 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Cr
         predicted,
         rows,
         effective,
-        is_beyond_noise(criteria, predicted / max(rows, 1), effective, bench.known_from(block)),
+        criteria.is_beyond_noise(predicted / max(rows, 1), effective, bench.known_from(block)),
         {record: t.segments or (t.squares,) for record, t in tallies.items()},
     )

@@ -14,18 +14,7 @@ from ....foundation.errors import ConvergenceError
 from ..effects.effect import Candidate, EffectFunction
 from ..effects.unnamed_tables import unnamed_part
 from .comparison import Comparison
-from .criteria import (
-    Criteria,
-    is_complete,
-    is_far_from_closed,
-    is_more_than_noise,
-    is_superfluous,
-    lacking,
-    objections_of_numbers,
-    records_made_worse,
-    stands_out,
-    unexplained,
-)
+from .criteria import Change, Criteria, is_complete, lacking
 from .hypothesis import Hypothesis, excesses
 from .measures import explained, gain, gains_by_record, standing_of, total_excess
 from .trials import Skipped, Step, Trials, Tried, account, rival_of
@@ -155,7 +144,7 @@ class Revision:
 
     def _is_superfluous(self, without: list[Step], with_it: list[Step]) -> bool:
         after = (self.trials.excesses_of(each[-1].chosen) for each in (without, with_it))
-        return is_superfluous(self.trials.criteria, *after)
+        return Change(self.trials.criteria, *after).is_superfluous()
 
     def rebuilt(self, steps: Sequence[Step], changed: Mapping[int, Candidate] | None = None) -> list[Step]:
         """Return the steps anew, some perhaps changed; nothing if one of them no longer fits.
@@ -215,7 +204,7 @@ def objections_of_all(criteria: Criteria, last: Hypothesis) -> list[list[str]]:
         With the effects.
     """
     return [
-        objections_of_numbers(criteria, standing_of(each.unknowns, last.fits.values())) for each in last.added
+        criteria.objections_of_numbers(standing_of(each.unknowns, last.fits.values())) for each in last.added
     ]
 
 
@@ -331,8 +320,8 @@ class _Search:
         if not steps:
             return []
         first, last = (self.trials.excesses_of(each) for each in (start, steps[-1].chosen))
-        left = unexplained(self.trials.criteria, first, last)
-        kept = [s for s in steps if s.block not in left or stands_out(self.trials.criteria, s.distance)]
+        left = Change(self.trials.criteria, first, last).unexplained()
+        kept = [s for s in steps if s.block not in left or self.trials.criteria.is_outstanding(s.distance)]
         if len(kept) == len(steps):
             return steps
         shares, least = explained(first, last), self.trials.criteria.closed_share
@@ -382,7 +371,7 @@ class _Search:
         Beside an effect that was named, what little is left over is the inexactness of its form.
         """
         first, now = (self.trials.excesses_of(each)[block] for each in (start, present))
-        return not present.added or is_far_from_closed(self.trials.criteria, first, now)
+        return not present.added or self.trials.criteria.is_far_from_closed(first, now)
 
     def _most_effects(self, present: Hypothesis) -> int:
         most = int(self.trials.criteria.most_effects)
@@ -457,8 +446,7 @@ def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criter
         if tried is None:
             continue
         after = excesses(tried, comparison.bench, criteria)
-        if is_more_than_noise(criteria, gain(before, after)) and not records_made_worse(
-            criteria, before, after
-        ):
+        change = Change(criteria, before, after)
+        if change.is_more_than_noise and not change.records_made_worse():
             present = tried
     return present
