@@ -1,7 +1,8 @@
 """C code for the controller, FMUs for everybody else, and co-simulation of FMUs."""
 
-from .c.controller_code import CSource, export_c
-from .c.examples import write_examples
+from .c.controller_code import export_c
+from .c.programs import write_examples
+from .c.writer import CSource
 from .compilation.compiled_step import Natively, natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...foundation.arrays import Array
-from ..c.controller_code import CSource
-from ..c.structures import member_paths
-from ..files import filled
+from ..c.c_text import Real
+from ..c.writer import CSource, CWriter
 from .cross_compiler import compile_library
 
 
@@ -40,10 +39,12 @@ class CompiledStep:
 
     def __init__(self, source: CSource, parameters: Sequence[float] | None = None) -> None:
         self._source = source
-        self._type: Any = ctypes.c_double if source.real == "double" else ctypes.c_float
+        self._type: Any = ctypes.c_double if source.real is Real.DOUBLE else ctypes.c_float
         with tempfile.TemporaryDirectory(prefix="nlsdesign-step-", ignore_cleanup_errors=True) as folder:
             adapter = Path(folder) / "adapter.c"
-            adapter.write_text(_adapter(source), encoding="utf-8")
+            adapter.write_text(
+                source.writer.filled("adapter.c", _conversions(source.writer)), encoding="utf-8"
+            )
             library = compile_library(
                 [adapter, source.source], Path(folder) / "step.so", include=[source.header.parent.resolve()]
             )
@@ -103,19 +104,11 @@ class CompiledStep:
         return np.array(values[:count], dtype=float)
 
 
-def _adapter(source: CSource) -> str:
+def _conversions(c: CWriter) -> dict[str, list[str]]:
     """Return C that converts between the named structures and vectors in the order of the model."""
-    model, name, real = source.model, source.name, source.real
-    x, u, p, y = (
-        list(member_paths(group).values())
-        for group in (model.states, model.inputs, model.parameters, model.outputs)
-    )
-    values = {
-        "name": name,
-        "real": real,
-        "parameters": [f"to->{path} = p[{i}];" for i, path in enumerate(p)],
-        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(u)],
-        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(y)],
-        "states": [f"x[{i}] = state->states.{path};" for i, path in enumerate(x)],
+    return {
+        "parameters": [f"to->{path} = p[{i}];" for i, path in enumerate(c.parameters)],
+        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(c.inputs)],
+        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(c.outputs)],
+        "states": [f"x[{i}] = state->states.{path};" for i, path in enumerate(c.states)],
     }
-    return filled("adapter.c", values)

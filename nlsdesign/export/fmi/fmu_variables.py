@@ -18,7 +18,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Variable
-from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
+from ..c.guarded_step import FIRST_INDEX_BIT, STATUS_BITS
 from .event_variables import indicator_variables, mode_variables
 from .expression_walk import EVERYTHING, Interval, ranges
 from .terminals import with_flange_outputs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..c.controller_code import CSource
+from ..c.writer import CSource
 from ..compilation.cross_compiler import STRICT, run_compiler
 from ..files import filled, shell
 from .elf_file import SectionSizes, section_sizes

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
-from ..c.c_text import real_type
-from ..c.controller_code import CSource
-from ..c.self_test import number_rows, sample_inputs
-from ..c.structures import member_paths
+from ..c.c_text import Real
+from ..c.programs import sample_inputs
+from ..c.writer import CSource
 from ..compilation.running_c import CompiledStep
 from .cross_build import controller_object, controller_sizes, image, sized_object
 from .elf_file import SectionSizes, section_sizes
@@ -123,7 +122,7 @@ def measure_on_target(
         folder = Path(name)
         alone, added = controller_sizes(source, processor, folder)
         state = _state_size(source, processor, folder)
-        given = sample_inputs(source.model, real_type(source.real)) if inputs is None else inputs
+        given = sample_inputs(source.model, source.real) if inputs is None else inputs
         run = None if reason else _run(source, processor, folder, np.asarray(given, dtype=float))
     return TargetMeasurement(source, processor, alone, added, state, run, reason)
 
@@ -133,15 +132,14 @@ def _state_size(source: CSource, processor: Processor, folder: Path) -> int:
 
 
 def _run(source: CSource, processor: Processor, folder: Path, given: Array) -> TargetRun:
-    real = real_type(source.real)
-    u, y = member_paths(source.model.inputs).values(), member_paths(source.model.outputs).values()
+    real, c = source.real, source.writer
     controller_object(source, processor, folder)
     values: dict[str, str | list[str]] = {
-        "real": real.name,
+        "real": real,
         "samples": str(len(given)),
-        "given": number_rows("given", given.tolist(), real),
-        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(u)],
-        "outputs": [f"say_real(outputs.{path});" for path in y],
+        "given": real.table("given", given.tolist()),
+        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(c.inputs)],
+        "outputs": [f"say_real(outputs.{path});" for path in c.outputs],
     }
     first, *rows = emulated(image(source, processor, folder, main="target_run.c", values=values), processor)
     counted = _instructions(*first[1:4])
@@ -153,7 +151,7 @@ def _run(source: CSource, processor: Processor, folder: Path, given: Array) -> T
         )
     table = np.array(rows, dtype=np.uint32)
     words = np.ascontiguousarray(table[:, 5:])
-    outputs = words.view(np.float32 if real.name == "float" else np.float64)
+    outputs = words.view(np.float32 if real is Real.FLOAT else np.float64)
     step = CompiledStep(source)
     expected = [step(row) for row in given.tolist()]
     here = np.array([each for each, _ in expected]).reshape(outputs.shape).astype(outputs.dtype)

@@ -18,14 +18,14 @@ from hypothesis import strategies as st
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import CompiledStep, export_c
-from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.c.status_bits import (
+from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_SATURATED,
     OUT_OF_TABLE,
     OUTPUT_HELD,
     PARAMETER_REFUSED,
     STATE_RESTARTED,
+    GuardedModel,
     index_bit,
 )
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_program, run_compiler

@@ -17,8 +17,7 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from nlsdesign.export import ALL_PLATFORMS, export_fmu
-from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.c.status_bits import INPUT_HELD, INPUT_SATURATED, index_bit
+from nlsdesign.export.c.guarded_step import INPUT_HELD, INPUT_SATURATED, GuardedModel, index_bit
 from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
 from nlsdesign.export.fmi.fmu import fmi_headers, universal_binary
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError

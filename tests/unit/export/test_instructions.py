@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.export import files
-from nlsdesign.export.c.c_text import DOUBLE, FLOAT, Real, comment, identifier, real_type, string
+from nlsdesign.export.c.c_text import Real, comment, identifier, string
 from nlsdesign.export.c.instructions import print_statements
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library
 from nlsdesign.foundation.errors import ExportError
@@ -63,25 +63,27 @@ def compiled(expressions: list[ca.SX], real: Real, folder) -> ctypes.CDLL:
     text = "\n".join(
         [
             "#include <math.h>",
-            f"void f(const {real.name} x[], {real.name} y[]);",
+            f"void f(const {real} x[], {real} y[]);",
             '__attribute__((visibility("default")))',
-            f"void f(const {real.name} x[], {real.name} y[])",
+            f"void f(const {real} x[], {real} y[])",
             "{",
             *lines,
             "}",
             "",
         ]
     )
-    (folder / f"{real.name}.c").write_text(text)
-    library = compile_library([folder / f"{real.name}.c"], folder / f"{real.name}.so", flags=STRICT)
+    (folder / f"{real}.c").write_text(text)
+    library = compile_library([folder / f"{real}.c"], folder / f"{real}.so", flags=STRICT)
     return ctypes.CDLL(str(library))
 
 
-@pytest.mark.parametrize(("real", "tolerance"), [(DOUBLE, 2e-14), (FLOAT, 3e-5)], ids=["double", "float"])
+@pytest.mark.parametrize(
+    ("real", "tolerance"), [(Real.DOUBLE, 2e-14), (Real.FLOAT, 3e-5)], ids=["double", "float"]
+)
 def test_every_operation_computes_what_casadi_computes(real, tolerance, tmp_path):
     names, expressions = list(EXPRESSIONS), list(EXPRESSIONS.values())
     library = compiled(expressions, real, tmp_path)
-    kind = ctypes.c_double if real is DOUBLE else ctypes.c_float
+    kind = ctypes.c_double if real is Real.DOUBLE else ctypes.c_float
     reference = ca.Function("f", [X], expressions)
     points = np.random.default_rng(3).uniform(-1.8, 1.8, (200, 3))
     points = np.vstack([points, [[1.0, 1.0, 1.0], [0.5, -0.5, 1.5], [-1.0, 0.25, 0.25]]])
@@ -94,7 +96,7 @@ def test_every_operation_computes_what_casadi_computes(real, tolerance, tmp_path
             assert abs(float(one) - other) <= scale * tolerance * (1 + abs(float(one))), (name, point)
 
 
-def text_of(expression: ca.SX, real: Real = DOUBLE) -> str:
+def text_of(expression: ca.SX, real: Real = Real.DOUBLE) -> str:
     return "\n".join(
         print_statements(ca.Function("f", [X], [expression]), [["p", "q", "r"]], [["y"]], real=real)
     )
@@ -107,13 +109,13 @@ def test_a_choice_is_one_choice_and_limits_are_no_library_calls():
 
 
 def test_float_text_has_only_float_numbers_and_functions():
-    text = text_of(2.5 * ca.tanh(A) + ca.fabs(B) ** 1.5, FLOAT)
+    text = text_of(2.5 * ca.tanh(A) + ca.fabs(B) ** 1.5, Real.FLOAT)
     assert text == "y = 2.5f * tanhf(p) + powf(fabsf(q), 1.5f);"
 
 
 def test_what_no_result_needs_is_not_written():
     function = ca.Function("f", [X], [A + 1, ca.exp(B)])
-    text = "\n".join(print_statements(function, [["p", "q", "r"]], [["y"], ["z"]], real=DOUBLE))
+    text = "\n".join(print_statements(function, [["p", "q", "r"]], [["y"], ["z"]], real=Real.DOUBLE))
     assert text == "y = p + 1.0;\nz = exp(q);" or text == "y = 1.0 + p;\nz = exp(q);"
     assert "r" not in text.replace("exp", "")
 
@@ -125,24 +127,24 @@ def test_an_operation_without_counterpart_is_named_as_such():
 
 def test_literals_read_back_as_the_same_number():
     values = [0.1, 1.0, -2.0, 1e300, 5e-324, 1 / 3, 123456789.0, 1e16]
-    assert [float(DOUBLE.literal(v)) for v in values] == values
+    assert [float(Real.DOUBLE.literal(v)) for v in values] == values
     for value in (0.1, 1.0, 3.4e38, 1e-40, 1 / 3, 16777216.0):
-        assert np.float32(FLOAT.literal(value)[:-1]) == np.float32(value)
-        assert FLOAT.literal(value).endswith("f")
-        assert set(FLOAT.literal(value)) & set(".e")
+        assert np.float32(Real.FLOAT.literal(value)[:-1]) == np.float32(value)
+        assert Real.FLOAT.literal(value).endswith("f")
+        assert set(Real.FLOAT.literal(value)) & set(".e")
 
 
 def test_a_constant_that_float_cannot_hold_is_refused():
     with pytest.raises(ExportError, match="too large for float") as caught:
-        FLOAT.literal(1e39)
+        Real.FLOAT.literal(1e39)
     assert "double" in (caught.value.next_step or "")
     with pytest.raises(ExportError, match="NaN"):
-        DOUBLE.literal(float("nan"))
+        Real.DOUBLE.literal(float("nan"))
 
 
 def test_an_unknown_number_type_is_refused_with_the_nearest():
     with pytest.raises(ExportError, match="did you mean 'float'"):
-        real_type("float32")
+        Real.named("float32")
 
 
 def test_names_and_comments_cannot_break_the_c_text():
@@ -165,7 +167,7 @@ def test_a_shell_is_filled_by_texts_and_rows(monkeypatch):
 
 def test_functions_of_c_stand_in_shells(root):
     """Python fills rows: no text in it is an include, a loop, a return or the head of a fixed function."""
-    quoted = ("#include", "return ", "for (", "int main", "static void", "void ")
+    quoted = ("#include", "return ", "for (", "int main", "static void", "void ", "if (", "} else")
     found = [
         f"{file.name}:{node.lineno}: {node.value!r}"
         for file in sorted((root / "nlsdesign" / "export").rglob("*.py"))

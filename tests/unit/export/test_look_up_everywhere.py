@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.export.c.c_text import FLOAT
-from nlsdesign.export.c.table_lookup import indexed_tables, look_up, table_data
+from nlsdesign.export.c.c_text import Real
+from nlsdesign.export.c.table_lookup import c_tables, look_up
 from nlsdesign.export.compilation.cross_compiler import compile_program
 from nlsdesign.model.flat import Table, Variable
 from tests.unit.export.test_c import looked_up
@@ -38,8 +38,9 @@ def program(spacing: str, folder: Path, spoil=lambda text: text) -> Path:
     else:
         table = Table.over("u", points, COLUMNS, np.arange(float(len(points)))[:, None])
     model = looked_up(table)
-    data = table_data(indexed_tables(model)[0], FLOAT)
-    statements = look_up(model, FLOAT, {"u": "u"}, {0})
+    tables = c_tables(model, Real.FLOAT)
+    data = tables[0].data()
+    statements = look_up(tables, {"u": "u"}, {0})
     (folder / "table.c").write_text("\n".join(data))
     (folder / "statements.c").write_text(spoil("\n".join(statements)) + "\n")
     macros = [f"-DCELLS={len(points) - 1}", "-DLEFT=left_0", "-DSHARE=share_0"]

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from nlsdesign.export import CompiledStep, export_c
-from nlsdesign.export.c.c_text import real_type
+from nlsdesign.export.c.c_text import Real
 from nlsdesign.export.c.controller_code import source_text
-from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.c.status_bits import PARAMETER_REFUSED, index_bit
+from nlsdesign.export.c.guarded_step import PARAMETER_REFUSED, GuardedModel, index_bit
+from nlsdesign.export.c.writer import CWriter
 from nlsdesign.feedback.control import torque_controller
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.model.flat import FlatModel, Variable
@@ -75,11 +75,11 @@ def test_a_refused_parameter_leaves_its_numbers_and_another_one_is_taken(tmp_pat
 
 
 def test_no_step_computes_what_parameters_decide() -> None:
-    text = source_text(smoother(), "s", real_type("double"))
+    text = source_text(CWriter(smoother(), "s", Real.DOUBLE))
     assert "sqrt(" in function(text, "s_derive")
     assert "sqrt(" not in function(text, "s_advance")
     controller = torque_controller(ob.bench(ob.SLOW))
-    text = source_text(controller, "c", real_type("float"))
+    text = source_text(CWriter(controller, "c", Real.FLOAT))
     assert "expf(" in function(text, "c_derive")
     assert "expf(" not in function(text, "c_advance")
 
@@ -94,7 +94,7 @@ def test_parameters_that_are_used_as_they_are_need_no_numbers() -> None:
         "plain", "", (Variable("x", "1", ""),), (Variable("u", "1", ""),), (Variable("p", "1", "", 2.0),),
         (Variable("y", "1", ""),), (), equations, 0.1,
     )  # fmt: skip
-    assert "derive" not in source_text(model, "s", real_type("double"))
+    assert "derive" not in source_text(CWriter(model, "s", Real.DOUBLE))
 
 
 def test_a_number_that_is_not_finite_holds_the_outputs(tmp_path: Path) -> None:
@@ -126,4 +126,4 @@ def test_a_constant_that_is_no_number_is_still_refused() -> None:
         (Variable("y", "1", ""),), (), equations, 0.1,
     )  # fmt: skip
     with pytest.raises(ExportError, match="NaN"):
-        source_text(model, "s", real_type("double"))
+        source_text(CWriter(model, "s", Real.DOUBLE))

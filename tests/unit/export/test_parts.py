@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.export.c.c_text import DOUBLE, FLOAT, Real
+from nlsdesign.export.c.c_text import Real
 from nlsdesign.export.c.guarded_step import first_outputs
-from nlsdesign.export.c.self_test import sample_inputs
+from nlsdesign.export.c.programs import sample_inputs
 from nlsdesign.export.fmi.fmu_documentation import icon
 from nlsdesign.model.flat import FlatModel, Variable
 
@@ -37,10 +37,10 @@ def inverse(start: float) -> FlatModel:
     )
 
 
-@pytest.mark.parametrize("real", [DOUBLE, FLOAT])
+@pytest.mark.parametrize("real", [Real.DOUBLE, Real.FLOAT])
 def test_an_infinite_constant_keeps_its_sign(real: Real) -> None:
-    assert real.literal(float("inf")) == f"(({real.name})INFINITY)"
-    assert real.literal(float("-inf")) == f"(-({real.name})INFINITY)"
+    assert real.literal(float("inf")) == f"(({real})INFINITY)"
+    assert real.literal(float("-inf")) == f"(-({real})INFINITY)"
 
 
 def test_outputs_begin_at_those_of_the_start_or_zero_where_these_are_not_finite() -> None:
@@ -49,7 +49,7 @@ def test_outputs_begin_at_those_of_the_start_or_zero_where_these_are_not_finite(
 
 
 def test_the_inputs_of_the_self_test_sweep_the_range_of_the_input() -> None:
-    given = sample_inputs(inverse(0.5), DOUBLE)[:, 0]
+    given = sample_inputs(inverse(0.5), Real.DOUBLE)[:, 0]
     inside = given[np.isfinite(given) & (given >= 2.0) & (given <= 6.0)]
     assert len(inside) > 0.9 * len(given)
     assert np.min(inside) < 2.6

@@ -12,9 +12,10 @@ import pytest
 
 from nlsdesign.components.assembly.deck_writer import deck_digest, declare
 from nlsdesign.export import export_c
-from nlsdesign.export.c.c_text import DOUBLE, FLOAT, Real
-from nlsdesign.export.c.controller_code import CSource, header_text
+from nlsdesign.export.c.c_text import Real
+from nlsdesign.export.c.controller_code import header_text
 from nlsdesign.export.c.provenance import stamp_of, stamped
+from nlsdesign.export.c.writer import CSource, CWriter
 from nlsdesign.feedback.control import torque_controller
 from nlsdesign.feedback.observer import FixedGrid, design_observer
 from nlsdesign.foundation.deck import ParentDeck, load_deck
@@ -55,14 +56,16 @@ def test_header_and_source_name_the_deck_and_its_digest(name: str, tmp_path: Pat
 def test_a_machine_of_other_names_is_named_as_well(scheme: Scheme) -> None:
     made = renamed(declare(load_deck(DECKS[0])), scheme).assembly
     controller = torque_controller(flatten(made))
-    header = header_text(controller, "law", FLOAT)
+    header = header_text(CWriter(controller, "law", Real.FLOAT))
     assert macro(header, "DECK_DIGEST") == deck_digest(made) != deck_digest(declare(load_deck(DECKS[0])))
 
 
 @pytest.mark.parametrize("name", DECKS)
 def test_the_header_lists_every_number_of_the_deck_with_unit_and_source(name: str) -> None:
     made = declare(load_deck(name))
-    text = " ".join(header_text(observer(name), "eye", DOUBLE).partition("Numbers of the deck")[2].split())
+    text = " ".join(
+        header_text(CWriter(observer(name), "eye", Real.DOUBLE)).partition("Numbers of the deck")[2].split()
+    )
     for full, number in made.quantities().items():
         factor = parse_unit(number.unit).factor
         found = re.search(rf"(?<![\w.]){re.escape(full)} = (\[[^]]*\]|\S+) ", text)
@@ -82,7 +85,7 @@ def test_the_header_lists_every_number_of_the_deck_with_unit_and_source(name: st
 def test_numbers_that_were_changed_are_shown_as_they_are_and_said_to_be_changed() -> None:
     made = declare(load_deck(DECKS[0]))
     model = torque_controller(flatten(made).with_values({"motor.inertia": 7e-4}))
-    header = header_text(model, "law", DOUBLE)
+    header = header_text(CWriter(model, "law", Real.DOUBLE))
     assert "Not as in the deck that was read: motor.inertia." in header
     assert "   motor.inertia = 0.0007 kg*m^2" in header
     assert macro(header, "DECK_DIGEST") == deck_digest(made.with_values({"motor.inertia": 7e-4}))
@@ -93,7 +96,7 @@ def test_parents_are_named_the_latest_first() -> None:
     made = replace(
         declare(load_deck(DECKS[0])), name="better", parent=ParentDeck("bench", "b" * 64, "diagnosed", eldest)
     )
-    header = header_text(torque_controller(flatten(made)), "law", DOUBLE)
+    header = header_text(CWriter(torque_controller(flatten(made)), "law", Real.DOUBLE))
     assert macro(header, "PARENT_DIGEST") == "b" * 64
     first = header.index("Deck better, ")
     second = header.index(f"From bench, {'b' * 12} (diagnosed).")
@@ -102,7 +105,7 @@ def test_parents_are_named_the_latest_first() -> None:
 
 
 def test_a_model_without_a_deck_says_so() -> None:
-    header = header_text(hand_built_observer(), "eye", DOUBLE)
+    header = header_text(CWriter(hand_built_observer(), "eye", Real.DOUBLE))
     assert "Made without a deck." in header
     assert macro(header, "DECK_DIGEST") == ""
     assert "Numbers of the deck" not in header
@@ -112,7 +115,7 @@ def test_what_a_person_wrote_cannot_leave_the_comment_or_the_string() -> None:
     hostile = 'x" */ int main(void) { return 1; } /* \\'
     made = replace(declare(load_deck(DECKS[0])), name=hostile, parent=ParentDeck(hostile, "c" * 64, hostile))
     made = made.with_values({"motor.inertia": made.quantities()["motor.inertia"].with_value(1e-3, hostile)})
-    header = header_text(torque_controller(flatten(made)), "law", DOUBLE)
+    header = header_text(CWriter(torque_controller(flatten(made)), "law", Real.DOUBLE))
     bare = re.sub(r'/\*.*?\*/|"(?:[^"\\]|\\.)*"', "", header, flags=re.DOTALL)
     assert "main" not in bare
 
@@ -167,8 +170,8 @@ def test_a_date_that_is_none_is_refused(given: str, monkeypatch: pytest.MonkeyPa
 # --- interface ------------------------------------------------------------------------------------
 
 
-def interface(model: FlatModel, real: Real = DOUBLE, name: str = "law") -> str:
-    return macro(header_text(model, name, real), "INTERFACE_VERSION")
+def interface(model: FlatModel, real: Real = Real.DOUBLE, name: str = "law") -> str:
+    return macro(header_text(CWriter(model, name, real)), "INTERFACE_VERSION")
 
 
 def test_the_interface_version_follows_the_structures_and_nothing_else() -> None:
@@ -188,5 +191,5 @@ def test_the_interface_version_follows_the_structures_and_nothing_else() -> None
         "another name": replace(model, inputs=(replace(first, name="wish"), *others)),
         "another output": with_outputs(model, [model.outputs[0].name, model.signals[0].name]),
     }
-    versions = [interface(model), interface(model, FLOAT), *(interface(each) for each in more.values())]
+    versions = [interface(model), interface(model, Real.FLOAT), *(interface(each) for each in more.values())]
     assert len(set(versions)) == len(versions)

@@ -13,7 +13,7 @@ import pytest
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import CompiledStep, export_c
-from nlsdesign.export.c.status_bits import OUT_OF_TABLE
+from nlsdesign.export.c.guarded_step import OUT_OF_TABLE
 from nlsdesign.feedback.observer import (
     Assumptions,
     CertifiedGain,
