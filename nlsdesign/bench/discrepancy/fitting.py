@@ -17,7 +17,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -174,28 +174,54 @@ def like_the_others(tallies: Mapping[Key, Tally], unpredictable: Collection[Key]
 Start: TypeAlias = tuple[Parameter, ...]
 """The free numbers of a group of blocks, each with a value to begin at."""
 
-FULL_STARTS = 3
-"""So many starts are fitted to the end, the best by a linear look ahead; the others promise less."""
-EVALUATIONS, COARSE_EVALUATIONS = 40, 20
-"""Bounds of evaluations; fits of laws that suit the records end well below them by themselves."""
-LONG_EVALUATIONS = 6
-"""The same where a step takes so many operations that each evaluation lasts seconds."""
-COARSE_TOLERANCE = 1e-3
-"""A coarse fit ends where it promises to gain less than this share of the cost: enough to compare."""
-POLISHED_TOLERANCE = 2e-5
-"""The same for a fit to all samples of a hypothesis with effects; the declared model is fitted to the end."""
-LEAST_GAIN = 1e-3
-"""Where a body flies freely, a coarse fit ends too where it promises to gain less than this share of the cost
-without the effect: more is not known there."""
-LONG_STEP = 30_000
-"""Operations per step beyond which evaluations are few."""
-EXPENSIVE_STEP = 100_000
-"""Operations per step beyond which a further effect is skipped: its fit would take minutes."""
-MOST_STARTS = 8
-"""Starts beyond which a further effect is skipped where a body flies freely, for the same reason."""
-LEAST_EXPLAINED = 0.3
-"""Share of the excess over the noise that a continuation must explain for the whole effect to be fitted: a
-named effect explains at least half."""
+
+@dataclass(frozen=True)
+class Budget:
+    """How much work fits may be: it counts evaluations and operations, never seconds.
+
+    So every machine gives the same verdict.
+
+    Parameters
+    ----------
+    full_starts
+        So many starts are fitted to the end, the best by a linear look ahead; the others promise less.
+    evaluations, coarse_evaluations
+        Bounds of evaluations; fits of laws that suit the records end well below them by themselves.
+    long_evaluations
+        The same where a step takes so many operations that each evaluation lasts seconds.
+    coarse_tolerance
+        A coarse fit ends where it promises to gain less than this share of the cost: enough to compare.
+    polished_tolerance
+        The same for a fit to all samples of a hypothesis with effects; the declared model is fitted to the
+        end.
+    least_gain
+        Where a body flies freely, a coarse fit ends too where it promises to gain less than this share of the
+        cost without the effect: more is not known there.
+    long_step
+        Operations per step beyond which evaluations are few.
+    expensive_step
+        Operations per step beyond which a further effect is skipped: its fit would take minutes.
+    most_starts
+        Starts beyond which a further effect is skipped where a body flies freely, for the same reason.
+    least_explained
+        Share of the excess over the noise that a continuation must explain for the whole effect to be fitted:
+        a named effect explains at least half.
+    """
+
+    full_starts: int = 3
+    evaluations: int = 40
+    coarse_evaluations: int = 20
+    long_evaluations: int = 6
+    coarse_tolerance: float = 1e-3
+    polished_tolerance: float = 2e-5
+    least_gain: float = 1e-3
+    long_step: int = 30_000
+    expensive_step: int = 100_000
+    most_starts: int = 8
+    least_explained: float = 0.3
+
+
+BUDGET = Budget()
 _HELD = 1e-4
 """Share by which a number that is held may move, because a fit needs an interval."""
 
@@ -292,18 +318,18 @@ class FitProblem:
     def limits(self) -> Limits:
         """Where a plain fit may stop."""
         if self.coarse:
-            limits = Limits(COARSE_EVALUATIONS, COARSE_TOLERANCE)
+            limits = Limits(BUDGET.coarse_evaluations, BUDGET.coarse_tolerance)
         else:
-            limits = Limits(EVALUATIONS, POLISHED_TOLERANCE if self.effects else 0.0)
-        if self.effects and self.instructions > LONG_STEP:
-            limits = replace(limits, evaluations=LONG_EVALUATIONS)
+            limits = Limits(BUDGET.evaluations, BUDGET.polished_tolerance if self.effects else 0.0)
+        if self.effects and self.instructions > BUDGET.long_step:
+            limits = replace(limits, evaluations=BUDGET.long_evaluations)
         return limits
 
 
 class Strategy(ABC):
     """Where the fits of an effect begin."""
 
-    takes_long: ClassVar[bool] = False
+    takes_long: bool = False
     """Whether its fits take much longer than others, so that they are begun first."""
 
     @abstractmethod
@@ -321,18 +347,19 @@ class Strategy(ABC):
 
 @dataclass(frozen=True)
 class Plain(Strategy):
-    """Begin where the unknowns of the effect say."""
+    """Begin where the unknowns of the effect say.
+
+    Parameters
+    ----------
+    takes_long
+        Set where the effect moves faster than the samples, so that each evaluation takes long.
+    """
+
+    takes_long: bool = False
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return nothing: the unknowns say it."""
         return []
-
-
-@dataclass(frozen=True)
-class PlainButLong(Plain):
-    """Begin where the unknowns say; a fit takes long, since the effect moves faster than the samples."""
-
-    takes_long: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -349,12 +376,13 @@ class Continuation(Strategy):
         The assembly with the simpler form of the effect.
     hold
         Multiple of each new number at which it is held while the others are fitted once more.
+    takes_long
+        Two forms are fitted, one after the other.
     """
 
     through: Assembly
     hold: float = 1.2
-
-    takes_long: ClassVar[bool] = True
+    takes_long: bool = True
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return the starts that the simpler form leaves; nothing where it has no response.
@@ -374,14 +402,15 @@ class Continuation(Strategy):
         names = {e.record.name for e in slow}
         records = [r for r in bench.records.of("fit") if r.name in names]
         evidence = [e for block in driven for e in bench.evidence(block, records, values, coarse=True)]
-        limits = Limits(COARSE_EVALUATIONS, COARSE_TOLERANCE)
+        limits = Limits(BUDGET.coarse_evaluations, BUDGET.coarse_tolerance)
         try:
             best = best_fit(evidence, starts, limits)
         except ConvergenceError:
             return []
         if not explains_enough(problem, best.misfit):
             raise ConvergenceError(
-                "fit", f"its simpler form explains less than {100.0 * LEAST_EXPLAINED:.0f} % of what is left"
+                "fit",
+                f"its simpler form explains less than {100.0 * BUDGET.least_explained:.0f} % of what is left",
             )
         try:
             held = [_held(best, name, self.hold) for name in problem.new if name in shared]
@@ -463,7 +492,7 @@ class RobustOverFreeFlight(Smooth):
             starts = [begun[costs.index(min(costs))]]
             if not self._explains_enough(problem.before, slow, min(costs)):
                 limits = replace(limits, evaluations=0)
-        least = LEAST_GAIN * problem.cost_before if problem.new else 0.0
+        least = BUDGET.least_gain * problem.cost_before if problem.new else 0.0
         best = best_fit(slow, starts, replace(limits, least=0.1 * least), known={})
         known = {key: tally.squares for key, tally in problem.before.items()}
         return fit(
@@ -485,19 +514,19 @@ class RobustOverFreeFlight(Smooth):
 
     def _limits(self, problem: FitProblem) -> Limits:
         whole = problem.coarse and problem.effects < 2
-        return replace(problem.limits, evaluations=LONG_EVALUATIONS if whole else LONG_EVALUATIONS // 3)
+        return replace(
+            problem.limits, evaluations=BUDGET.long_evaluations if whole else BUDGET.long_evaluations // 3
+        )
 
     def _explains_enough(self, before: Mapping[Key, Tally], slow: Sequence[Evidence], cost: float) -> bool:
         """Tell whether what a continuation has begun takes enough off the excess over the noise."""
         tallies = [before[e.driven.block.name, e.record.name] for e in slow]
         now = 0.5 * sum(t.squares for t in tallies)
-        return now - cost >= LEAST_EXPLAINED * (now - 0.5 * sum(t.rows for t in tallies))
+        return now - cost >= BUDGET.least_explained * (now - 0.5 * sum(t.rows for t in tallies))
 
 
 def refusal(problem: FitProblem) -> str:
     """Return why a further effect is not fitted at all; empty if it is.
-
-    Bounds count operations and starts, never seconds, so that every machine gives the same verdict.
 
     Parameters
     ----------
@@ -505,8 +534,8 @@ def refusal(problem: FitProblem) -> str:
         To be fitted.
     """
     starts = len(problem.starts)
-    many = problem.beside_free_flight and starts > MOST_STARTS
-    if problem.effects < 2 or not (many or problem.instructions > EXPENSIVE_STEP):
+    many = problem.beside_free_flight and starts > BUDGET.most_starts
+    if problem.effects < 2 or not (many or problem.instructions > BUDGET.expensive_step):
         return ""
     return f"is too expensive to try: {problem.instructions} operations per step, {starts} starts"
 
@@ -551,7 +580,7 @@ def best_fit(
     choices = [(_promise(evidence, start) if several else 0.0, start) for start in starts]
     best: Fit | None = None
     failure = ConvergenceError("fit", "has no start")
-    for promised, start in sorted(choices, key=lambda pair: pair[0])[:FULL_STARTS]:
+    for promised, start in sorted(choices, key=lambda pair: pair[0])[: BUDGET.full_starts]:
         # What does not even promise to reach the best so far is left alone.
         if best is not None and promised >= best.cost:
             continue
@@ -595,7 +624,7 @@ def explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:
         keys = [key for key in misfit if key[0] == block]
         now = 0.5 * sum(problem.before[key].squares for key in keys)
         excess = now - 0.5 * sum(problem.before[key].rows for key in keys)
-        if excess > 0.0 and now - sum(misfit[key] for key in keys) >= LEAST_EXPLAINED * excess:
+        if excess > 0.0 and now - sum(misfit[key] for key in keys) >= BUDGET.least_explained * excess:
             return True
     return False
 

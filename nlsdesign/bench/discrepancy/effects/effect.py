@@ -8,9 +8,15 @@ from typing import Any, NamedTuple, TypeAlias
 
 from ....components import Assembly, Element, Part
 from ....components.sensing.sensors import Sensor
+from ....foundation.quantity import Quantity
 from ..fitting import Plain, Strategy
 
 SOURCE = "fitted to bench records"
+
+
+def number(value: float, unit: str) -> Quantity:
+    """Return a number in SI that a fit is going to change."""
+    return Quantity(value, unit, SOURCE)
 
 
 @dataclass(frozen=True)

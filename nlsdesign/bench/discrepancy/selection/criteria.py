@@ -244,7 +244,7 @@ class Change:
         return tuple(words)
 
     def _strain(self) -> list[str]:
-        """Return in words that declared numbers are driven out of their ranges: it is another effect, then."""
+        """Return in words that declared numbers leave their ranges: it is another effect, then."""
         now = self.after.get(DECLARED)
         if now is None or not now.open:
             return []

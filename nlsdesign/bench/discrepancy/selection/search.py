@@ -286,6 +286,10 @@ class _Search:
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.trials.comparison.coarsely(base)
         revision = Revision(self.trials, start)
+        # The order matters. What is dropped need not be simplified, and a simpler form can only be judged
+        # beside the effects that stay. Only then is it known what all of them leave, and whether a block
+        # with much left may have a name at all. Fits to all samples are the dearest, so they come after
+        # that. What each effect gains is asked of the final set, because dropping any other one changes it.
         steps = revision.simplified(revision.backward(self._forward(start)))
         steps = self._explaining(start, steps)
         last = self._fitted_to_all(start, steps)
