@@ -16,7 +16,10 @@ import time
 import numpy as np
 
 from nlsdesign.foundation.errors import NlsError
-from nlsdesign.live import ChangeLimit, LiveDesign, LiveEdit, MovePoint, gallery_question, to_json
+from nlsdesign.live.answers import to_json
+from nlsdesign.live.edits import ChangeLimit, LiveEdit, MovePoint
+from nlsdesign.live.gallery import gallery_question
+from nlsdesign.live.live_design import LiveDesign
 
 DECKS = (
     "cam-actuator",

@@ -136,7 +136,7 @@ def read_again(made: Any) -> Mapping[str, float]:
 
 def yardstick(points: int, _: Path) -> dict[str, Any]:
     """Return the processor time of a point, one after the other, without the engine."""
-    from nlsdesign.sweeps import sweep_task
+    from nlsdesign.sweeps.run_sweep import sweep_task
 
     given = asked(points)
     task = sweep_task(given["actuator"], axes=given["axes"], ask=given["ask"])

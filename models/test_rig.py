@@ -45,28 +45,7 @@ _SPREAD, _SPREAD_OF_VISCOSITY, _SPREAD_OF_BEARING = 0.06, 0.3, 0.6
 
 
 def test_rig_deck(rig_toml: Path, cam_csv: Path) -> Assembly:
-    """Return the rig as its makers declare it.
-
-    Parameters
-    ----------
-    rig_toml
-        Tables ``rubber``, ``drivetrain`` and ``sensors``, units in the names of the fields.
-    cam_csv
-        Columns ``theta_rad, delta_m, lever_arm_m`` for θ ≥ 0.
-
-    Returns
-    -------
-    Assembly
-        With the spreads that the file states in words: 6 % on the moduli, the inertia and the torque constant
-        (of the product gear_ratio·kT), a factor of 1.3 on the viscosity and of 1.6 on the bearing.
-
-    Raises
-    ------
-    DeckError
-        If a field is missing, or is no number.
-    MeasurementError
-        If the table of the cam cannot be read.
-    """
+    """Return the rig as its makers declare it."""
     numbers = _Numbers(load_deck(rig_toml).tables, rig_toml.name)
     return assembly(
         "test_rig",

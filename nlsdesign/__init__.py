@@ -22,18 +22,7 @@ from .foundation.quantity import (
 
 
 def __getattr__(name: str) -> object:
-    """Return a public name from its module.
-
-    Parameters
-    ----------
-    name
-        For instance ``"flatten"``.
-
-    Raises
-    ------
-    AttributeError
-        If it is not public here; the message names its module, or the nearest public name.
-    """
+    """Return a public name from its module."""
     if name == "__version__":
         return version()
     if name.startswith("_"):

@@ -207,23 +207,9 @@ def regenerate(
 ) -> Regeneration:
     """Design the observer again, and compare it with the one from the declared model.
 
-    Parameters
-    ----------
-    declared, better
-        Model as declared, and as a diagnosis left it.
-    records
-        Bench records; those that no fit has seen are compared, or all where there are none.
-    fits
-        Of the better model, for the spread of its numbers.
-    choice
-        What is estimated; by default the torque of the series spring, every millisecond.
-    progress
-        Told what is being done.
-
-    Returns
-    -------
-    Regeneration
-        With reasons in words where no observer can be designed or nothing can be compared.
+    ``records``: bench records; those that no fit has seen are compared, or all where there are none.
+    ``choice``: what is estimated; by default the torque of the series spring, every millisecond. Result: with
+    reasons in words where no observer can be designed or nothing can be compared.
     """
     choice = choice or ObserverChoice()
     progress("designing the observer of the better model")
@@ -455,20 +441,7 @@ def _failures(spread: Sequence[float]) -> tuple[str, ...]:
 
 
 def write_regeneration(result: Regeneration, folder: Path) -> tuple[dict[Path, str], tuple[str, ...]]:
-    """Write the observer as C and FMU, and the plant of the better model as FMU.
-
-    Parameters
-    ----------
-    result
-        From :func:`regenerate`.
-    folder
-        Is made where it does not exist.
-
-    Returns
-    -------
-    tuple
-        What was written, by path, and in words what could not be written, with the reason.
-    """
+    """Write the observer as C and FMU, and the plant of the better model as FMU."""
     written: dict[Path, str] = {}
     reasons = []
     for name, model in {"observer": result.observer, "plant": result.plant}.items():

@@ -25,17 +25,7 @@ DRAWINGS = {
 
 @dataclass(frozen=True, eq=False)
 class MadeCam:
-    """The designed cam as it is made.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    part
-        Edge, holes and base under the cable.
-    files
-        Drawings that were written.
-    """
+    """The designed cam as it is made."""
 
     design: CamDesign
     part: CamPart
@@ -48,13 +38,7 @@ class MadeCam:
 
 
 def tolerance_of(design: CamDesign) -> ToleranceResult:
-    """Return the tolerance analysis of a design.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is none, with the reason that the design gives.
-    """
+    """Return the tolerance analysis of a design."""
     if design.tolerance is None:
         raise ValueRangeError("design", "; ".join(design.remarks) or "has no tolerance analysis")
     return design.tolerance
@@ -66,12 +50,7 @@ def with_machined_contour(actuator: nls.Assembly, anchor: nls.Quantity | None = 
     The spread of a deck's lever arm is that of the published figure that it was computed from; the errors of
     a machined contour are counted by the tolerance analysis itself.
 
-    Parameters
-    ----------
-    actuator
-        As declared.
-    anchor
-        Place of the cable's anchor in the new design; as declared if it is left out.
+    ``anchor``: place of the cable's anchor in the new design; as declared if it is left out.
     """
     arm = actuator.quantities()["spring.cam.lever_arm"]
     values = {"spring.cam.lever_arm": replace(arm, spread=0.0)}

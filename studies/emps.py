@@ -88,19 +88,8 @@ class Results:
 def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | None:
     """Diagnose the drive without dry friction and offset, refit it with what is named, and judge both.
 
-    Parameters
-    ----------
-    out
-        Folder for ``report.html``, the verdict and the better deck.
-    fast
-        Without effect: no shorter way is needed.
-    data
-        Folder with ``emps.csv``; see :func:`data_folder`.
-
-    Returns
-    -------
-    Results or None
-        ``None`` where the measurements are not on this machine.
+    ``data``: folder with ``emps.csv``; see :func:`data_folder`. Result: ``None`` where the measurements are
+    not on this machine.
     """
     folder = data_folder("emps", data)
     if folder is None:

@@ -88,15 +88,7 @@ class Results:
 
 
 def main(out: Path, fast: bool = False) -> Results:
-    """Fit every law to both sets, print the table and draw it.
-
-    Parameters
-    ----------
-    out
-        Folder for ``report.html``.
-    fast
-        Without effect: no shorter way is needed.
-    """
+    """Fit every law to both sets, print the table and draw it."""
     steps, actuator = nls.progress.Steps(), declared_actuator()
     sets = (fig6_stretches(), bench_stretches(actuator))
     comparisons = []

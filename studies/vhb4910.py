@@ -72,19 +72,8 @@ class Results:
 def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | None:
     """Diagnose the elastic strip with the tests at the slowest and the fastest rate.
 
-    Parameters
-    ----------
-    out
-        Folder for ``report.html``, the verdict and the better deck.
-    fast
-        Without effect: no shorter way is needed.
-    data
-        Folder that holds ``loading_unloading``; see :func:`data_folder`.
-
-    Returns
-    -------
-    Results or None
-        ``None`` where the measurements are not on this machine.
+    ``data``: folder that holds ``loading_unloading``; see :func:`data_folder`. Result: ``None`` where the
+    measurements are not on this machine.
     """
     folder = data_folder("vhb4910", data)
     if folder is None:

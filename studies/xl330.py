@@ -70,19 +70,8 @@ class Results:
 def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | None:
     """Fit the closed loop with and without what the linear model lacks, one gain held out at a time.
 
-    Parameters
-    ----------
-    out
-        Folder for ``report.html`` and the better deck.
-    fast
-        Without effect.
-    data
-        Folder with the logs; see :func:`data_folder`.
-
-    Returns
-    -------
-    Results or None
-        ``None`` where the measurements are not on this machine.
+    ``data``: folder with the logs; see :func:`data_folder`. Result: ``None`` where the measurements are not
+    on this machine.
     """
     folder = data_folder("xl330", data)
     if folder is None:

@@ -11,12 +11,12 @@ import numpy as np
 from nlsdesign.bench.calibration import (
     CalibrationRecords,
     CalibrationTest,
-    Estimate,
     FreeRunTest,
     HungWeightTest,
     LoadCellTest,
     load_calibration,
 )
+from nlsdesign.bench.calibration.estimate import Estimate
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck

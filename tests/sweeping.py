@@ -18,14 +18,8 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import Assembly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.work_sharing import DaskScheduler, Executor, InThisProcess, Processes
-from nlsdesign.sweeps import (
-    FunctionQuestion,
-    GridAxis,
-    SobolSample,
-    SweepSettings,
-    SweepTable,
-    sweep,
-)
+from nlsdesign.sweeps import FunctionQuestion, GridAxis, SobolSample, SweepTable, sweep
+from nlsdesign.sweeps.run_sweep import SweepSettings
 
 ROOT = Path(__file__).parent.parent
 AREA, INERTIA = "spring.rubber.area", "motor.inertia"

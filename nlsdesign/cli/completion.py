@@ -73,13 +73,7 @@ _NAMES: dict[str, tuple[Callable[[], list[str]], bool]] = {
 
 
 def complete_names(program: click.Group) -> None:
-    """Let all parameters of a program that take the name of a deck, material, study or template complete it.
-
-    Parameters
-    ----------
-    program
-        With all its commands.
-    """
+    """Complete the names of decks, materials, studies and templates in all parameters of a program."""
     for command in _commands(program):
         for parameter in command.params:
             kind = (parameter.metavar or "").strip("[]")

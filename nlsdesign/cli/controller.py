@@ -40,13 +40,7 @@ _VELOCITY_BANDWIDTH = click.option(
 
 
 def law_options(command: F) -> F:
-    """Add the options that choose the law of a torque controller.
-
-    Parameters
-    ----------
-    command
-        Takes ``law``, ``bandwidth`` and ``velocity_bandwidth``.
-    """
+    """Add the options that choose the law of a torque controller."""
     return _LAW(_BANDWIDTH(_VELOCITY_BANDWIDTH(command)))
 
 
@@ -58,21 +52,7 @@ def controller_of(
     bandwidth: float | None,
     velocity_bandwidth: float | None,
 ) -> FlatModel:
-    """Return the torque controller that the options of a command ask for.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    sample_time
-        In s.
-    law
-        ``"scheduled"`` or ``"pid"``.
-    bandwidth
-        Of the scheduled law in Hz.
-    velocity_bandwidth
-        Of the velocity loop in Hz.
-    """
+    """Return the torque controller that the options of a command ask for."""
     from ..feedback.control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
 
     if law == "pid" and bandwidth is not None:

@@ -227,22 +227,7 @@ def _show(
 
 
 def pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
-    """Return what ``NAME=VALUE`` options give, by name.
-
-    Parameters
-    ----------
-    option
-        Its name, for messages.
-    given
-        What was written.
-    read
-        Reads a value.
-
-    Raises
-    ------
-    ValueRangeError
-        If one is not ``NAME=VALUE``, is given twice, or its value cannot be read.
-    """
+    """Return what ``NAME=VALUE`` options give, by name."""
     values: dict[str, T] = {}
     for text in given:
         name, sign, value = (part.strip() for part in text.partition("="))
@@ -259,18 +244,7 @@ def pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict
 
 
 def read_wire(text: str) -> Wire:
-    """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``.
-
-    Parameters
-    ----------
-    text
-        What was written.
-
-    Raises
-    ------
-    ValueRangeError
-        If it cannot be read so.
-    """
+    """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``."""
     from ..export import SamplesOf, Wire
 
     late = text.startswith(_LATE)

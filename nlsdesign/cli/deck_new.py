@@ -96,20 +96,7 @@ def on_terminal() -> bool:
 
 
 def refuse_to_replace(file: Path, force: bool) -> None:
-    """Refuse to write over a file that is there, unless that is asked for.
-
-    Parameters
-    ----------
-    file
-        To write.
-    force
-        Whether it may be replaced.
-
-    Raises
-    ------
-    ExportError
-        If the file is there, or its name is too long for a file.
-    """
+    """Refuse to write over a file that is there, unless that is asked for."""
     try:
         there = file.exists()
     except OSError as error:

@@ -101,19 +101,7 @@ def export_code(
 def sampled_part(
     plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]
 ) -> tuple[str, FlatModel, tuple[str, ...]]:
-    """Return what a controller runs, what its files are called, and what is to be known of its size.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    what
-        ``"observer"``, ``"controller"`` or ``"both"``.
-    sample_time
-        In s.
-    chosen
-        Options of observer, law and size by name.
-    """
+    """Return what a controller runs, what its files are called, and what is to be known of its size."""
     law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
     others = {name: value for name, value in chosen.items() if name not in law}
     if what == CONTROLLER:

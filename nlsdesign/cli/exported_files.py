@@ -71,16 +71,6 @@ def exported_files(folder: Path) -> tuple[list[ExportedFile], list[ExportError]]
     """Return the exported files and decks in a folder and below it, and what could not be read.
 
     Files that this package did not write are passed over; links are not followed.
-
-    Parameters
-    ----------
-    folder
-        To look through.
-
-    Raises
-    ------
-    ExportError
-        If there is no such folder, or it cannot be listed.
     """
     files: list[ExportedFile] = []
     problems: list[ExportError] = []
@@ -114,18 +104,7 @@ def _paths(folder: Path) -> Iterator[Path]:
 
 
 def exported_file(path: Path) -> ExportedFile | None:
-    """Return what a file says of itself, ``None`` where this package did not write it.
-
-    Parameters
-    ----------
-    path
-        C source or header, Modelica text, FMU, or deck.
-
-    Raises
-    ------
-    ExportError
-        If it cannot be read, is damaged, or is larger than any export.
-    """
+    """Return what a file says of itself, ``None`` where this package did not write it."""
     try:
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode):

@@ -56,18 +56,8 @@ def export_machine(
 
     What fails leaves the others.
 
-    Parameters
-    ----------
-    plant
-        Flat model of a deck; all files name it.
-    out
-        Folder; C stands in ``c``.
-    sample_time
-        Of observer and controller, in s.
-    observer
-        Of the plant; by default the one that errs least over the spread of the deck.
-    spring, measured
-        Where the structure of the plant leaves them open.
+    ``plant``: flat model of a deck; all files name it. ``out``: folder; C stands in ``c``. ``observer``: of
+    the plant; by default the one that errs least over the spread of the deck.
     """
     from ..export import export_c, export_fmu
     from ..feedback.control import joined

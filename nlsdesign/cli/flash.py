@@ -27,13 +27,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def flash_options(command: F) -> F:
-    """Add ``--flash`` and ``--table-error``.
-
-    Parameters
-    ----------
-    command
-        A command that writes an observer.
-    """
+    """Add ``--flash`` and ``--table-error``."""
     command = click.option(
         "--flash", type=Bytes(), metavar="SIZE",
         help="Most flash of code and tables on a Cortex-M4F, for instance 16kB; the table is made coarser "
@@ -95,29 +89,7 @@ def sized_observer(
 ) -> SizedObserver:
     """Design an observer whose code and tables keep a size.
 
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    sample_time
-        In s.
-    real
-        ``"double"`` or ``"float"``.
-    flash
-        Most bytes on a Cortex-M4F.
-    table_error
-        Torque error that the table may cause, in the unit of the estimate.
-    part_of
-        Makes what is exported of the observer; by default that is the observer alone.
-    chosen
-        Kind, spring and measured state, as for :func:`~nlsdesign.cli.observer_kinds.designed_observer`.
-
-    Raises
-    ------
-    ValueRangeError
-        If the size cannot be met, with what it would cost and the smallest that can be met.
-    ExportError
-        If a size is asked for and no compiler is installed.
+    ``part_of``: makes what is exported of the observer; by default that is the observer alone.
     """
     from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
 
@@ -152,22 +124,7 @@ def sized_observer(
 
 
 def controller_size(controller: FlatModel, real: str, flash: int | None) -> tuple[str, ...]:
-    """Return what is to be known of the size of a controller.
-
-    Parameters
-    ----------
-    controller
-        Discrete.
-    real
-        ``"double"`` or ``"float"``.
-    flash
-        Most bytes on a Cortex-M4F.
-
-    Raises
-    ------
-    ValueRangeError
-        If the code takes more.
-    """
+    """Return what is to be known of the size of a controller."""
     size = _measured(controller, real, needed=flash is not None)
     if size is None:
         return ("the flash of the code was not measured: no compiler",)

@@ -12,15 +12,7 @@ if TYPE_CHECKING:
 
 
 def stretches(frequencies: Sequence[float], verdicts: Sequence[LoopVerdict]) -> Iterator[tuple[str, str]]:
-    """Yield frequencies and what they have in common, for each stretch that does not hold.
-
-    Parameters
-    ----------
-    frequencies
-        In Hz, ascending.
-    verdicts
-        One for each.
-    """
+    """Yield frequencies and what they have in common, for each stretch that does not hold."""
     pairs = zip(map(float, frequencies), verdicts, strict=True)
     for _, group in itertools.groupby(pairs, key=lambda pair: pair[1].state):
         members = list(group)

@@ -30,10 +30,7 @@ CERTIFICATE = "certificate.json"
 def range_options(command: Any) -> Any:
     """Add the options for the ranges over which a bound on the torque is to hold.
 
-    Parameters
-    ----------
-    command
-        Gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
+    ``command``: gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
     """
     for option in (
         click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
@@ -47,13 +44,7 @@ def range_options(command: Any) -> Any:
 
 
 def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ranges that were given.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    """
+    """Return the ranges that were given."""
     named = {name: options[name] for name in ("angles", "speed", "angle_error")}
     return {name: value for name, value in named.items() if value is not None}
 
@@ -81,22 +72,7 @@ class ToProve:
 
 
 def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve) -> Certificate:
-    """Prove what can be proved of an observer.
-
-    Parameters
-    ----------
-    plant, deck
-        Flat model of an actuator, and its deck.
-    chosen
-        Cascade or certified gain.
-    wanted
-        What is to be proved.
-
-    Raises
-    ------
-    ArrangementError
-        If observers of that kind cannot be certified.
-    """
+    """Prove what can be proved of an observer."""
     from ..feedback.observer import ObserverDesign, certify, declared_assumptions
 
     design = chosen.design
@@ -111,31 +87,13 @@ def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProv
 
 
 def with_statement(observer: FlatModel, proved: Proof) -> FlatModel:
-    """Return an observer whose description, and so the head of its C code, ends with what is proved.
-
-    Parameters
-    ----------
-    observer
-        As designed.
-    proved
-        Its certificate.
-    """
+    """Return an observer whose description, and so the head of its C code, ends with what is proved."""
     words = " ".join(proved.statement)
     return replace(observer, description=f"{observer.description}; certified, see {CERTIFICATE}: {words}")
 
 
 def write_proved(proved: Certificate | HeldEstimateCertificate, out: Path, source: CSource) -> Path:
-    """Write the certificate beside the C code, with the hashes of both files.
-
-    Parameters
-    ----------
-    proved
-        Without the hashes.
-    out
-        Folder.
-    source
-        The C code.
-    """
+    """Write the certificate beside the C code, with the hashes of both files."""
     from ..feedback.observer import write_certificate
 
     return write_certificate(replace(proved, code=_hashes(source.header, source.source)), out / CERTIFICATE)
@@ -150,13 +108,7 @@ def _hashes(*files: Path) -> dict[str, str]:
 
 
 def written_anew(proved: Proof) -> WritesCode:
-    """Return what writes the C code of a certificate as the commands do, with its sentences in the head.
-
-    Parameters
-    ----------
-    proved
-        The certificate.
-    """
+    """Return what writes the C code of a certificate as the commands do, with its sentences in the head."""
     from ..export import export_c
 
     def write(observer: FlatModel, folder: Path, /, *, real: str, name: str) -> object:
@@ -166,15 +118,7 @@ def written_anew(proved: Proof) -> WritesCode:
 
 
 def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | None:
-    """Return the adaptive observer of a certificate, designed again from its deck; ``None`` for any other.
-
-    Parameters
-    ----------
-    proved
-        The certificate.
-    model
-        Flat model of its deck.
-    """
+    """Return the adaptive observer of a certificate, designed again from its deck; ``None`` for any other."""
     from ..feedback.observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
 
     if model is None or not isinstance(proved, HeldEstimateCertificate):

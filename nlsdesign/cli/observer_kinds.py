@@ -70,28 +70,10 @@ def designed_observer(
 ) -> DesignedObserver:
     """Design an observer of the torque of a series spring.
 
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    kind
-        One of :data:`KINDS`; the first by default.
-    decay
-        Of a certified gain, in 1/s; as fast as can be proved by default.
-    sample_time
-        In s.
-    spring
-        Path of the spring; decided from the structure if it is left out.
-    measured
-        State that is measured; decided from the structure if it is left out.
-    grid
-        Of its table; by the default torque error if it is left out.
-
-    Raises
-    ------
-    ArrangementError
-        If the model has no spring or no driven body, the structure leaves open which is meant, or there is
-        no observer of that kind.
+    ``kind``: one of :data:`KINDS`; the first by default. ``decay``: of a certified gain, in 1/s; as fast as
+    can be proved by default. ``spring``: path of the spring; decided from the structure if it is left out.
+    ``measured``: state that is measured; decided from the structure if it is left out. ``grid``: of its
+    table; by the default torque error if it is left out.
     """
     from ..feedback import observer
     from ..model.roles import measured_motion, series_spring
@@ -154,16 +136,7 @@ def observer_of(
 ) -> FlatModel:
     """Return the observer of the torque of a series spring; see :func:`designed_observer`.
 
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    sample_time
-        In s.
-    kind
-        One of :data:`KINDS`; the first by default.
-    spring, measured
-        Where the structure leaves them open.
+    ``kind``: one of :data:`KINDS`; the first by default.
     """
     chosen = designed_observer(plant, kind=kind, sample_time=sample_time, spring=spring, measured=measured)
     return chosen.model

@@ -32,26 +32,7 @@ def spread_errors(
     spring: str | None = None,
     measured: str | None = None,
 ) -> SpreadErrors:
-    """Run the chosen observer, the cascade and the published form on one bench, over the spread of the deck.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    chosen
-        Is compared with the others.
-    draws
-        How many machines are drawn.
-    sample_time
-        In s.
-    spring, measured
-        Where the structure leaves them open.
-
-    Raises
-    ------
-    ArrangementError
-        If no number of the deck has a spread.
-    """
+    """Run the chosen observer, the cascade and the published form on one bench, over the deck's spread."""
     from ..export import quickest
     from ..feedback.observer import observer_bench, observer_errors
     from ..feedback.observer.adaptive.adaptive_observer import encoder_quantum
@@ -85,18 +66,7 @@ def write_errors(
 ) -> list[Path]:
     """Write the errors as table, JSON, figure and page.
 
-    Parameters
-    ----------
-    errors
-        Of the observers.
-    out
-        Folder.
-    model
-        The observer.
-    words
-        What is said of it.
-    files
-        Written before; the page lists them too.
+    ``files``: written before; the page lists them too.
     """
     from ..foundation.writing import write_table, write_text
     from ..presentation import figures
@@ -130,13 +100,7 @@ def _rows(errors: SpreadErrors) -> list[tuple[Any, ...]]:
 
 
 def content_of(errors: SpreadErrors) -> dict[str, Any]:
-    """Return the errors as JSON holds them.
-
-    Parameters
-    ----------
-    errors
-        Of the observers.
-    """
+    """Return the errors as JSON holds them."""
     keys = ("observer", "frequency_Hz", "exact", "median", "quantile_90", "rms", "bound")
     return {
         "unit": errors.unit,
@@ -150,17 +114,7 @@ def content_of(errors: SpreadErrors) -> dict[str, Any]:
 
 
 def show_errors(errors: SpreadErrors, kind: str, deck_name: str) -> None:
-    """Print both tables, and where the way goes on.
-
-    Parameters
-    ----------
-    errors
-        Of the observers.
-    kind
-        Whose causes are ranked.
-    deck_name
-        As the command was given it.
-    """
+    """Print both tables, and where the way goes on."""
     unit, causes = typeset_unit(errors.unit), errors.ranked_causes(kind)[:CAUSES]
     factor, shown = shared_prefix([size for _, size in causes], errors.unit)
     title = (

@@ -137,18 +137,7 @@ _NEEDS = {
 
 
 def readiness(declared: Assembly) -> list[Readiness]:
-    """Return for each command that takes a deck whether it takes this one.
-
-    Parameters
-    ----------
-    declared
-        As the deck declares it.
-
-    Raises
-    ------
-    NlsError
-        If the deck has no flat model: then no command takes it.
-    """
+    """Return for each command that takes a deck whether it takes this one."""
     from ..model import flatten
 
     machine = _Machine(declared, flatten(declared))
@@ -175,11 +164,5 @@ def readiness(declared: Assembly) -> list[Readiness]:
 
 
 def shown_command(command: str) -> str:
-    """Return a command with what else it asks for, as ``fit (with records)``.
-
-    Parameters
-    ----------
-    command
-        As it is typed, without ``nlsdesign``.
-    """
+    """Return a command with what else it asks for, as ``fit (with records)``."""
     return f"{command} (with {_NEEDS[command]})" if command in _NEEDS else command

@@ -322,21 +322,7 @@ def _content(run: Trace, names: Sequence[str], warnings: list[str], files: list[
 
 
 def predict_record(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
-    """Drive a deck with a measured record; write its predictions and print their errors.
-
-    Parameters
-    ----------
-    deck_name
-        Name or file.
-    record
-        CSV file.
-    mapping
-        TOML that maps columns to signals.
-    out
-        CSV to write.
-    as_json
-        Whether JSON is printed.
-    """
+    """Drive a deck with a measured record; write its predictions and print their errors."""
     from ..bench.discrepancy import band_errors, predict
     from ..bench.identification import load_record
     from ..components.assembly.deck_writer import declare
@@ -365,13 +351,7 @@ def predict_record(deck_name: str, record: Path, mapping: Path | None, out: Path
 
 
 def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
-    """Return name, rms error and unit of each predicted signal; a signal that is not measured should be zero.
-
-    Parameters
-    ----------
-    measured, predicted
-        At the same times.
-    """
+    """Return name, rms error and unit of each predicted signal; one that is not measured should be zero."""
     import numpy as np
 
     rows = []

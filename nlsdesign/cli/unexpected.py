@@ -31,13 +31,7 @@ FAULT, BROKEN_PIPE, INTERRUPTED, BAD_INPUT = 70, 141, 130, 2
 
 
 def status_of(error: Exception) -> int:
-    """Tell the user of an error that no command has expected, and return the exit status.
-
-    Parameters
-    ----------
-    error
-        Of any kind.
-    """
+    """Tell the user of an error that no command has expected, and return the exit status."""
     if was_interrupted():
         click.echo("interrupted", err=True)
         return INTERRUPTED

@@ -3,9 +3,8 @@
 from .c.controller_code import export_c
 from .c.programs import write_examples
 from .c.writer import CSource
-from .compilation.compiled_step import Natively, natively, quickest
-from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
-from .compilation.running_c import CompiledStep
+from .compilation.compiled_step import natively, quickest
+from .compilation.cross_compiler import ALL_PLATFORMS
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
@@ -17,29 +16,25 @@ from .modelica.modelica_model import export_modelica
 from .ssp.read_ssp import read_ssp
 from .ssp.write_ssp import WrittenSystem, write_ssp
 from .target.processors import CORTEX_M4F, CORTEX_M7, Processor
-from .target.target_run import TargetMeasurement, TargetRun, measure_on_target
+from .target.target_run import TargetMeasurement, measure_on_target
 
 __all__ = [
     "ALL_PLATFORMS",
     "CORTEX_M4F",
     "CORTEX_M7",
-    "PLATFORMS",
     "Authorship",
     "CSource",
     "CoSimulation",
-    "CompiledStep",
     "Convergence",
     "Extrapolated",
     "FmuSystem",
     "Held",
     "Iterated",
     "Late",
-    "Natively",
     "Processor",
     "SamplesOf",
     "Stepping",
     "TargetMeasurement",
-    "TargetRun",
     "Wire",
     "WrittenSystem",
     "convergence",
@@ -47,7 +42,6 @@ __all__ = [
     "export_c",
     "export_fmu",
     "export_modelica",
-    "host_platform",
     "measure_on_target",
     "natively",
     "quickest",

@@ -64,10 +64,7 @@ def origins() -> Mapping[str, str]:
 def cited(text: str) -> list[Reference]:
     """Return the publications that a text cites, in the order of their first citation.
 
-    Parameters
-    ----------
-    text
-        Any; it may be broken into lines.
+    ``text``: any; it may be broken into lines.
     """
     flat = " ".join(text.split())
     places = {key: re.search(rf"(?<!\w){re.escape(key)}(?!\w)", flat) for key in references()}

@@ -10,11 +10,6 @@ import subprocess
 def typed_command(*words: object) -> str:
     """Return words as one line that can be copied into a shell.
 
-    Parameters
-    ----------
-    *words
-        Of the command, each a text, a number or a path.
-
     Examples
     --------
     >>> typed_command("nlsdesign", "deck", "check", "my leg.toml")

@@ -31,19 +31,7 @@ def data_frame(
 ) -> Any:
     """Return a ``pandas.DataFrame`` whose ``attrs["units"]`` holds the units by name.
 
-    Parameters
-    ----------
-    columns
-        Numbers or words, one for each row, by name.
-    units
-        Units of the columns by name, where they have one.
-    index
-        What the rows are numbered by; by their number where none is given.
-
-    Raises
-    ------
-    MissingLibraryError
-        If pandas is not installed, with the command that installs it.
+    ``index``: what the rows are numbered by; by their number where none is given.
     """
     try:
         import pandas
@@ -59,22 +47,7 @@ def data_frame(
 def data_set(
     variables: Mapping[str, tuple[Sequence[str], Any]], *, axes: Sequence[Axis], units: Mapping[str, str]
 ) -> Any:
-    """Return an ``xarray.Dataset`` whose variables and coordinates have their unit in ``attrs["units"]``.
-
-    Parameters
-    ----------
-    variables
-        Names of the axes, and array, by name.
-    axes
-        Coordinates.
-    units
-        Units of the variables by name.
-
-    Raises
-    ------
-    MissingLibraryError
-        If xarray is not installed, with the command that installs it.
-    """
+    """Return an ``xarray.Dataset`` whose variables and coordinates have their unit in ``attrs["units"]``."""
     try:
         import xarray
     except ModuleNotFoundError:

@@ -43,13 +43,7 @@ class Written(float):
         return made
 
     def times(self, factor: float) -> float:
-        """Return the number in SI, correctly rounded.
-
-        Parameters
-        ----------
-        factor
-            Of the unit.
-        """
+        """Return the number in SI, correctly rounded."""
         if self == 0.0 or not math.isfinite(self):
             return float(self) * factor
         return float(Fraction(self.text) * Fraction(factor))
@@ -87,23 +81,7 @@ class ParentDeck:
 
 @dataclass(frozen=True)
 class Deck:
-    """The tables of a deck as they were read, with the place of each name.
-
-    Parameters
-    ----------
-    name, description
-        From the table ``[deck]``.
-    path
-        File, for messages.
-    tables
-        Everything else.
-    places
-        Line and column by full name.
-    head
-        The table ``[deck]`` itself.
-    stands_in
-        Name of the table of the file in which the tables stand; empty where they are the whole file.
-    """
+    """The tables of a deck as they were read, with the place of each name."""
 
     name: str
     description: str
@@ -114,13 +92,7 @@ class Deck:
     stands_in: str = ""
 
     def named(self, name: str) -> str:
-        """Return the name by which something stands in the file.
-
-        Parameters
-        ----------
-        name
-            Within the tables of this deck, joined by dots.
-        """
+        """Return the name by which something stands in the file."""
         return f"{self.stands_in}.{name}" if self.stands_in else name
 
     def place(self, full_name: str) -> str:
@@ -128,11 +100,6 @@ class Deck:
 
         A table that only its inner tables mention stands where the first of them does; what does not stand in
         the file at all has the place of the nearest table above.
-
-        Parameters
-        ----------
-        full_name
-            Names joined by dots.
         """
         named = self.named(full_name)
         inner = [place for name, place in self.places.items() if name.startswith(f"{named}.")]
@@ -147,18 +114,7 @@ class Deck:
         return f"{self.path.name}:{line}:{column}: {named}"
 
     def quantity(self, full_name: str) -> Quantity:
-        """Return the number of that name.
-
-        Parameters
-        ----------
-        full_name
-            For instance ``"spring.rubber.area"``.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest name in the deck.
-        """
+        """Return the number of that name."""
         node: Any = self.tables
         for step in full_name.split("."):
             if not isinstance(node, Mapping) or step not in node:
@@ -171,24 +127,7 @@ class Deck:
         return [name for name, table in _tables("", self.tables) if "value" in table]
 
     def number(self, full_name: str, raw: object) -> Quantity:
-        """Return a number of the deck as a quantity.
-
-        Parameters
-        ----------
-        full_name
-            For messages.
-        raw
-            The table ``{value, unit, source, spread}``.
-
-        Raises
-        ------
-        DeckError
-            If it is not such a table, a field is misspelt, or the value is not a number.
-        UnitError
-            If the unit is missing or unknown.
-        ValueRangeError
-            If the spread is one that only per cent can have.
-        """
+        """Return a number of the deck as a quantity."""
         where = self.place(full_name)
         if not isinstance(raw, dict):
             raise DeckError(
@@ -302,21 +241,7 @@ def _is_folder(path: Path) -> DeckError:
 
 
 def read_deck(text: str, path: Path) -> Deck:
-    """Read a deck from text.
-
-    Parameters
-    ----------
-    text
-        TOML.
-    path
-        Where it came from, for messages.
-
-    Raises
-    ------
-    DeckError
-        If the text is no TOML, ``deck`` is not a table, tables stand in tables without end, or a number has
-        thousands of digits.
-    """
+    """Read a deck from text."""
     deep = _TOO_DEEP.search(text)
     if deep:
         raise _too_deep(f"{path.name}:{text.count(chr(10), 0, deep.start()) + 1}")

@@ -30,10 +30,7 @@ def extended_by(*packages: ModuleType) -> Iterator[None]:
     modules, and
     the rubbers of a file ``materials.toml`` beside its ``__init__.py``. After the block none of it is known.
 
-    Parameters
-    ----------
-    packages
-        Imported packages or modules; those of a block around this one stay.
+    ``packages``: imported packages or modules; those of a block around this one stay.
 
     Examples
     --------
@@ -55,13 +52,7 @@ def extension_modules() -> tuple[ModuleType, ...]:
 
 
 def extension_files(name: str) -> tuple[Path, ...]:
-    """Return the files of a name that stand beside the ``__init__.py`` of the packages that are there.
-
-    Parameters
-    ----------
-    name
-        For instance ``"materials.toml"``.
-    """
+    """Return the files of a name that stand beside the ``__init__.py`` of the packages that are there."""
     folders = [Path(each) for package in _PRESENT.get() for each in getattr(package, "__path__", ())]
     return tuple(file for file in (folder / name for folder in folders) if file.is_file())
 
@@ -72,18 +63,7 @@ def extension_names() -> tuple[str, ...]:
 
 
 def load_extension(name: str) -> ModuleType:
-    """Import a package, or the module of one Python file.
-
-    Parameters
-    ----------
-    name
-        Dotted name of what is installed, or path of a file that ends in ``.py``.
-
-    Raises
-    ------
-    NlsError
-        If there is no such package or file, or it cannot be imported.
-    """
+    """Import a package, or the module of one Python file."""
     try:
         return _from_file(Path(name)) if name.endswith(".py") else importlib.import_module(name)
     except NlsError:

@@ -41,10 +41,7 @@ def usual_temporary_folder() -> Path:
 def guarded(run: Callable[[], None]) -> None:
     """Run the program; SIGINT ends it with status 130, SIGTERM with 143.
 
-    Parameters
-    ----------
-    run
-        The program; it may leave by :class:`SystemExit`.
+    ``run``: the program; it may leave by :class:`SystemExit`.
     """
     guard = _Guard()
     try:

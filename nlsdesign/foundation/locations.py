@@ -24,22 +24,7 @@ _PACKAGE: Final = Path(__file__).resolve().parents[1]
 def folder(name: Literal["models", "studies", "docs"], *, package: Path = _PACKAGE) -> Path:
     """Return the folder of that name that is distributed with the package.
 
-    Parameters
-    ----------
-    name
-        ``"models"``, ``"studies"`` or ``"docs"``.
-    package
-        Folder of the package ``nlsdesign``; another one only in tests.
-
-    Returns
-    -------
-    Path
-        Absolute path of an existing folder.
-
-    Raises
-    ------
-    UnknownNameError
-        If the folder is neither in the package nor beside it in a checkout.
+    ``package``: folder of the package ``nlsdesign``; another one only in tests.
     """
     bundled = package / "_bundled" / name
     if bundled.is_dir():
@@ -60,17 +45,7 @@ def bundled(name: Literal["models", "studies"], module: str = "") -> ModuleType:
     Its name is ``nlsdesign_models`` or ``nlsdesign_studies`` both in a checkout and in a wheel, which never
     collides with a package ``models`` of another project.
 
-    Parameters
-    ----------
-    name
-        Folder.
-    module
-        Module inside; the package itself where none is given.
-
-    Raises
-    ------
-    UnknownNameError
-        If the folder holds no package that can be loaded.
+    ``module``: module inside; the package itself where none is given.
     """
     alias = f"nlsdesign_{name}"
     if alias not in sys.modules:
@@ -88,15 +63,7 @@ def bundled(name: Literal["models", "studies"], module: str = "") -> ModuleType:
 def version(*, package: Path = _PACKAGE) -> str:
     """Return the version, which is written down in ``pyproject.toml`` and nowhere else.
 
-    Parameters
-    ----------
-    package
-        Folder of the package ``nlsdesign``; another one only in tests.
-
-    Returns
-    -------
-    str
-        The version of the checkout that is running, or else of the installed distribution.
+    ``package``: folder of the package ``nlsdesign``; another one only in tests.
     """
     checkout = _checkout_version(package)
     if checkout is not None:

@@ -13,12 +13,7 @@ _PREFIXES = ((1e3, 1e-3, "k"), (1.0, 1.0, ""))
 def shared_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
     """Return the factor by which numbers of one table or line are shown, and their unit, typeset.
 
-    Parameters
-    ----------
-    values
-        In SI; the largest decides, below one it is shown in thousandths.
-    unit
-        Of the numbers, without a prefix.
+    ``values``: in SI; the largest decides, below one it is shown in thousandths.
 
     Examples
     --------
@@ -36,14 +31,7 @@ def shared_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
 def prefixed(value: float, unit: str = "N*m", *, digits: int = 3) -> str:
     """Return a number with the prefix that fits it.
 
-    Parameters
-    ----------
-    value
-        In SI.
-    unit
-        Without a prefix; a torque if none is given.
-    digits
-        Significant ones.
+    ``unit``: without a prefix; a torque if none is given.
 
     Examples
     --------
@@ -56,13 +44,6 @@ def prefixed(value: float, unit: str = "N*m", *, digits: int = 3) -> str:
 
 def without_power(value: float, digits: int = 3) -> str:
     """Return a number with significant digits, and zeros in place of a power of ten.
-
-    Parameters
-    ----------
-    value
-        Any number.
-    digits
-        Significant ones.
 
     Examples
     --------

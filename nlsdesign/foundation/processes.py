@@ -38,12 +38,7 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     Without fork, on one core, or inside such a process or a worker of a sweep, the work is done in this
     process. Within :func:`mapped_by` it is done wherever that says.
 
-    Parameters
-    ----------
-    work
-        An exception in it ends the whole map; its results must be picklable.
-    count
-        Number of calls.
+    ``work``: an exception in it ends the whole map; its results must be picklable.
     """
     global _work
     if _mapper is not None and not _alone and not multiprocessing.current_process().daemon:
@@ -102,10 +97,7 @@ def alone() -> Iterator[None]:
 def at_most(processes: int | None) -> Iterator[None]:
     """Let :func:`parallel_map` take so many processes until the end of the block; without fork it takes none.
 
-    Parameters
-    ----------
-    processes
-        At least one, which is this process; ``None`` for the usual number.
+    ``processes``: at least one, which is this process; ``None`` for the usual number.
     """
     global _asked_for
     before, _asked_for = _asked_for, processes
@@ -119,10 +111,7 @@ def at_most(processes: int | None) -> Iterator[None]:
 def mapped_by(mapper: Mapper) -> Iterator[None]:
     """Let another map do the work of :func:`parallel_map` until the end of the block.
 
-    Parameters
-    ----------
-    mapper
-        Takes work and count, and yields the results in order; what the work raises, it raises.
+    ``mapper``: takes work and count, and yields the results in order; what the work raises, it raises.
     """
     global _mapper
     before, _mapper = _mapper, mapper
@@ -137,14 +126,8 @@ def run_to_end(
 ) -> subprocess.CompletedProcess[str]:
     """Run a program and return what it printed; an interrupt ends it with all that it has started.
 
-    Parameters
-    ----------
-    command
-        Program and arguments.
-    environment
-        Of the program; this one's without it.
-    seconds
-        Most time that it may take; ``subprocess.TimeoutExpired`` is raised beyond it.
+    ``environment``: of the program; this one's without it. ``seconds``: most time that it may take;
+    ``subprocess.TimeoutExpired`` is raised beyond it.
     """
     group = None if sys.platform == "win32" else 0
     with signals_held():

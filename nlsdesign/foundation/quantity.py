@@ -103,16 +103,6 @@ def parse_unit(text: str) -> Unit:
 
     Everything behind a ``/`` is one factor: ``"N*m*s/rad"`` has the radian below the line,
     and ``"1/(N*s)"`` is written ``"1/N/s"``.
-
-    Parameters
-    ----------
-    text
-        Product and quotient of unit symbols with integer powers.
-
-    Raises
-    ------
-    UnitError
-        If a symbol is not known, or there are brackets.
     """
     factor, exponents = 1.0, [0] * len(BASE)
     if "(" in text or ")" in text:
@@ -159,11 +149,6 @@ def typeset_unit(unit: str) -> str:
 
     Machine formats (decks, CSV, FMI, JSON) keep the ASCII form; :func:`parse_unit` reads both.
 
-    Parameters
-    ----------
-    unit
-        As in decks.
-
     Examples
     --------
     >>> typeset_unit("N*m/rad"), typeset_unit("kg*m^2"), typeset_unit("m*s^-2"), typeset_unit("mOhm")
@@ -185,12 +170,7 @@ def _typeset_power(piece: str) -> str:
 def with_unit(number: str, unit: str) -> str:
     """Return a number that is text already with its unit, typeset for people.
 
-    Parameters
-    ----------
-    number
-        For instance ``"0.05"``.
-    unit
-        As in decks; ``"1"`` adds nothing.
+    ``unit``: as in decks; ``"1"`` adds nothing.
 
     Examples
     --------
@@ -311,12 +291,7 @@ class Quantity:
 def changed_source(old: str, source: str) -> str:
     """Return the source of a number that was changed without one.
 
-    Parameters
-    ----------
-    old
-        The number before the change, with unit.
-    source
-        Source of that number. After several changes it is still the first number with a source.
+    ``source``: source of that number. After several changes it is still the first number with a source.
     """
     known = source != NOT_STATED and not source.startswith(_CHANGED)
     return f"{_CHANGED} {old}: {source}" if known else source
@@ -354,13 +329,6 @@ def significant(values: Iterable[float], digits: int = 9) -> tuple[float, ...]:
     What a spline, a solver or a fit gives differs in its last digits from one processor to the next; a number
     that is written down is rounded to what it means, so that everybody writes the same.
 
-    Parameters
-    ----------
-    values
-        Numbers of one row, in one unit.
-    digits
-        How many digits of the largest magnitude stay.
-
     Examples
     --------
     >>> significant([0.0123456789012, 1.2e-19], 6)
@@ -377,12 +345,7 @@ def significant(values: Iterable[float], digits: int = 9) -> tuple[float, ...]:
 def to_resolution(value: float, error: float) -> float:
     """Return a number rounded to at most a thousandth of its standard error.
 
-    Parameters
-    ----------
-    value
-        In any unit.
-    error
-        Standard error in the same unit; where it is zero or not finite, nine significant digits stay.
+    ``error``: standard error in the same unit; where it is zero or not finite, nine significant digits stay.
 
     Examples
     --------
@@ -396,11 +359,6 @@ def to_resolution(value: float, error: float) -> float:
 
 def three_digits(value: float) -> str:
     """Return a number with three significant digits as text for people.
-
-    Parameters
-    ----------
-    value
-        Any number.
 
     Examples
     --------
@@ -418,12 +376,7 @@ def three_digits(value: float) -> str:
 def with_error(value: float, error: float) -> str:
     """Return a number with its standard error as text for people, both to the same digit.
 
-    Parameters
-    ----------
-    value
-        In any unit.
-    error
-        Standard error in the same unit, shown to two digits; left out where it is zero or not finite.
+    ``error``: standard error in the same unit, shown to two digits; left out where it is zero or not finite.
 
     Examples
     --------
@@ -453,31 +406,12 @@ def degrees(value: float) -> float:
 
 
 def same_dimension(unit: str, other: str) -> bool:
-    """Tell whether two units measure the same thing; the radian counts as a dimension.
-
-    Parameters
-    ----------
-    unit, other
-        Units as text.
-    """
+    """Tell whether two units measure the same thing; the radian counts as a dimension."""
     return parse_unit(unit).exponents == parse_unit(other).exponents
 
 
 def convert(value: float, from_unit: str, to_unit: str) -> float:
-    """Convert a value between units of the same dimension.
-
-    Parameters
-    ----------
-    value
-        Value in ``from_unit``.
-    from_unit, to_unit
-        Units as text.
-
-    Raises
-    ------
-    UnitError
-        If the dimensions differ.
-    """
+    """Convert a value between units of the same dimension."""
     if not same_dimension(from_unit, to_unit):
         raise UnitError(f"'{from_unit}'", f"is not of the dimension of '{to_unit}'")
     return value * parse_unit(from_unit).factor / parse_unit(to_unit).factor

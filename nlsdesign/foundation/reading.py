@@ -11,13 +11,7 @@ MOST_BYTES = 2**26
 
 
 def is_there(path: Path) -> bool:
-    """Tell whether something of that name exists; a name that no file can have does not.
-
-    Parameters
-    ----------
-    path
-        As somebody wrote it.
-    """
+    """Tell whether something of that name exists; a name that no file can have does not."""
     try:
         return path.exists()
     except (OSError, ValueError):  # longer than a name may be, or with a zero byte
@@ -25,22 +19,7 @@ def is_there(path: Path) -> bool:
 
 
 def text_of(path: Path, kind: type[NlsError], *, next_step: str = "give a text file in UTF-8") -> str:
-    """Return the text of a file, without the byte order mark that an editor may have put in front.
-
-    Parameters
-    ----------
-    path
-        File.
-    kind
-        Of the error.
-    next_step
-        What to give instead.
-
-    Raises
-    ------
-    NlsError
-        Of that kind, if it is no regular file, is too large, or is not in UTF-8.
-    """
+    """Return the text of a file, without the byte order mark that an editor may have put in front."""
     try:
         if is_there(path) and not path.is_file():
             raise kind(str(path), "cannot be read: it is a folder or a device", next_step=next_step)

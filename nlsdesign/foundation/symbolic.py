@@ -20,26 +20,12 @@ NEWTON_STEPS = 24
 
 
 def symbol(name: str) -> Expression:
-    """Return a scalar symbol.
-
-    Parameters
-    ----------
-    name
-        Name shown in printed expressions.
-    """
+    """Return a scalar symbol."""
     return ca.SX.sym(name)
 
 
 def depends(expression: Expression, on: Expression) -> bool:
-    """Tell whether an expression contains any of the symbols.
-
-    Parameters
-    ----------
-    expression
-        Any shape.
-    on
-        Symbols.
-    """
+    """Tell whether an expression contains any of the symbols."""
     return bool(ca.depends_on(expression, on))
 
 
@@ -47,27 +33,12 @@ def positive_part(value: Expression, width: Expression | float) -> Expression:
     """Return the smooth positive part, C∞, exact to ``width``·ln 2 at zero.
 
     softplus(v) = w·ln(1 + e^(v/w)), written so that it neither overflows nor cancels.
-
-    Parameters
-    ----------
-    value
-        Argument.
-    width
-        Width w of the rounded corner, in the unit of ``value``.
     """
     return ca.fmax(value, 0) + width * ca.log1p(ca.exp(-ca.fabs(value) / width))
 
 
 def smooth_sign(value: Expression, width: Expression | float) -> Expression:
-    """Return tanh(v/w), a C∞ approximation of the sign function.
-
-    Parameters
-    ----------
-    value
-        Argument.
-    width
-        Argument at which 76 % of the step is reached, in the unit of ``value``.
-    """
+    """Return tanh(v/w), a C∞ approximation of the sign function."""
     return ca.tanh(value / width)
 
 
@@ -108,16 +79,8 @@ def uniform_spline(
 ) -> Expression:
     """Evaluate a uniform cubic B-spline with symbolic coefficients.
 
-    Parameters
-    ----------
-    coefficients
-        n coefficients; the knots of the n − 3 spans start at ``lower``.
-    lower
-        First knot of the first whole span.
-    step
-        Distance of the knots.
-    at
-        Argument in [lower, lower + (n − 3)·step]; beyond, the polynomial of the last span continues.
+    ``coefficients``: n coefficients; the knots of the n − 3 spans start at ``lower``. ``at``: argument in
+    [lower, lower + (n − 3)·step]; beyond, the polynomial of the last span continues.
     """
     value: Expression = _spline(len(coefficients))(ca.vertcat(*coefficients), (at - lower) / step)
     return value
@@ -126,13 +89,7 @@ def uniform_spline(
 def uniform_spline_integral(
     coefficients: Sequence[Expression], lower: float, step: Expression | float, at: Expression
 ) -> Expression:
-    """Evaluate the integral from ``lower`` of :func:`uniform_spline`, exactly.
-
-    Parameters
-    ----------
-    coefficients, lower, step, at
-        As for :func:`uniform_spline`.
-    """
+    """Evaluate the integral from ``lower`` of :func:`uniform_spline`, exactly."""
     integral = _spline_integral(len(coefficients))
     value: Expression = step * integral(ca.vertcat(*coefficients), (at - lower) / step)
     return value
@@ -193,15 +150,6 @@ def solve_monotone(
     does not fall strictly inside the bracket is replaced by bisection, because Newton's method can cycle
     where g is flat, steep and flat again. The last step starts from the best point and is never replaced, so
     the derivative is that of the implicit function.
-
-    Parameters
-    ----------
-    residual
-        g as a function of the unknown.
-    unknown
-        The symbol to solve for.
-    guess
-        Starting point of the iteration.
     """
     g = residual(unknown)
     exact = _linear_solution(g, unknown)

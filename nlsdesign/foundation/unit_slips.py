@@ -26,15 +26,6 @@ _RUN_TOGETHER = re.compile(r"^(?P<head>[GMkcmµun]?(?:N|Pa|g|V|A|W|J|Ohm))(?P<ta
 def misspelt_unit(token: str, unit: str, plain: str) -> UnitError | None:
     """Return the error for a symbol that is known and not one of ours, with what to write; else ``None``.
 
-    Parameters
-    ----------
-    token
-        One symbol, without its power.
-    unit
-        The whole unit as it was written.
-    plain
-        The same in ASCII, without blanks.
-
     Examples
     --------
     >>> print(misspelt_unit("kgcm", "kgcm²", "kgcm2"))

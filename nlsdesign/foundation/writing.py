@@ -22,15 +22,7 @@ def draft(target: Path) -> Iterator[Path]:
 
     While a command keeps what others have changed, it goes beside such a target instead.
 
-    Parameters
-    ----------
-    target
-        Final path; its folder is made if it is missing.
-
-    Raises
-    ------
-    ExportError
-        If the folder or file cannot be written.
+    ``target``: final path; its folder is made if it is missing.
     """
     # The name is noted before the file exists, so that an interrupt at any moment leaves none behind.
     name = target.parent / f".{target.name}.{secrets.token_hex(6)}"
@@ -60,18 +52,7 @@ def remove_drafts() -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, with those above it, where it does not exist.
-
-    Parameters
-    ----------
-    folder
-        Of results.
-
-    Raises
-    ------
-    ExportError
-        If it cannot be made.
-    """
+    """Make a folder, with those above it, where it does not exist."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -85,17 +66,7 @@ def write_text(path: Path, text: str) -> None:
 
     What is no character, as in the name of a file that is no UTF-8, is written as in JSON: ``\udcff``.
 
-    Parameters
-    ----------
-    path
-        File; its folder is made if needed.
-    text
-        Content.
-
-    Raises
-    ------
-    ExportError
-        If the folder or file cannot be written.
+    ``path``: file; its folder is made if needed.
     """
     with draft(path) as name:
         name.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
@@ -104,17 +75,7 @@ def write_text(path: Path, text: str) -> None:
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a binary file whole or not at all.
 
-    Parameters
-    ----------
-    path
-        File; its folder is made if needed.
-    content
-        Content.
-
-    Raises
-    ------
-    ExportError
-        If the folder or file cannot be written.
+    ``path``: file; its folder is made if needed.
     """
     with draft(path) as name:
         name.write_bytes(content)
@@ -123,17 +84,7 @@ def write_bytes(path: Path, content: bytes) -> None:
 def write_table(path: Path, rows: Iterable[Sequence[str]]) -> None:
     """Write a table of comma-separated values whole or not at all.
 
-    Parameters
-    ----------
-    path
-        File; its folder is made if needed.
-    rows
-        Head first.
-
-    Raises
-    ------
-    ExportError
-        If the folder or file cannot be written.
+    ``path``: file; its folder is made if needed.
     """
     with draft(path) as name, name.open("w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows(rows)

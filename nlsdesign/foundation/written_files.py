@@ -55,13 +55,7 @@ class Keeping:
     beside: dict[Path, Path] = field(default_factory=dict)
 
     def covers(self, path: Path) -> bool:
-        """Tell whether a file lies in the folder or below.
-
-        Parameters
-        ----------
-        path
-            Of the file.
-        """
+        """Tell whether a file lies in the folder or below."""
         return path.absolute().is_relative_to(self.folder.absolute())
 
 
@@ -72,14 +66,7 @@ _now: ContextVar[Keeping | None] = ContextVar("keeping", default=None)
 def keeping(folder: Path, *, force: bool = False, command: str = "") -> Iterator[Keeping]:
     """Keep what is not as it was written in a folder and below, and list what is written.
 
-    Parameters
-    ----------
-    folder
-        Where a command writes.
-    force
-        Whether everything may be replaced; what is written is listed all the same.
-    command
-        Name of the command.
+    ``force``: whether everything may be replaced; what is written is listed all the same.
     """
     kept = Keeping(folder, force, command)
     token = _now.set(kept)
@@ -90,15 +77,7 @@ def keeping(folder: Path, *, force: bool = False, command: str = "") -> Iterator
 
 
 def file_state(path: Path, *, command: str = "") -> FileState:
-    """Return whether a file is new, as it was written, changed since, or was never written here.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    command
-        Where it is given, what is listed as written by another one is told apart.
-    """
+    """Return whether a file is new, as it was written, changed since, or was never written here."""
     # What stands in the way as a folder is refused by whoever writes.
     if not os.path.lexists(path) or path.is_dir():
         return "new"
@@ -112,33 +91,14 @@ def file_state(path: Path, *, command: str = "") -> FileState:
 
 
 def listed_files(folder: Path) -> list[Path]:
-    """Return the files that were written into a folder and below, those that still exist, sorted.
-
-    Parameters
-    ----------
-    folder
-        To look through.
-    """
+    """Return the files that were written into a folder and below, those that still exist, sorted."""
     lists = sorted(folder.rglob(LIST_NAME)) if folder.is_dir() else []
     return sorted(place for each in lists for name in _listed(each.parent)
                   if (place := each.parent / name).exists())  # fmt: skip
 
 
 def refuse_to_lose(paths: Iterable[Path], *, command: str = "") -> None:
-    """Refuse to begin where a file that would be replaced was changed or brought by somebody.
-
-    Parameters
-    ----------
-    paths
-        Of the files that will be written.
-    command
-        Where it is given, files of other commands are refused too.
-
-    Raises
-    ------
-    ExportError
-        Naming the files.
-    """
+    """Refuse to begin where a file that would be replaced was changed or brought by somebody."""
     states = {path: file_state(path, command=command) for path in paths}
     lost = {path: state for path, state in states.items() if state not in ("new", "as written")}
     if not lost:
@@ -153,20 +113,7 @@ def refuse_to_lose(paths: Iterable[Path], *, command: str = "") -> None:
 
 
 def place_for(target: Path, draft: Path) -> Path:
-    """Return where a finished draft is to go: its target, or a place beside a file that must be kept.
-
-    Parameters
-    ----------
-    target
-        Where it should go.
-    draft
-        The finished file.
-
-    Raises
-    ------
-    ExportError
-        If there is no free name beside it.
-    """
+    """Return where a finished draft is to go: its target, or a place beside a file that must be kept."""
     kept = _now.get()
     if kept is None or kept.force or not kept.covers(target):
         return target
@@ -181,13 +128,7 @@ def place_for(target: Path, draft: Path) -> Path:
 
 
 def note_written(path: Path) -> None:
-    """Write the name and digest of a written file into the list of its folder, while a command keeps one.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    """
+    """Write the name and digest of a written file into the list of its folder, while a command keeps one."""
     kept = _now.get()
     if kept is not None and kept.covers(path):
         writers = {**_writers(path.parent), path.name: kept.command}
@@ -197,10 +138,7 @@ def note_written(path: Path) -> None:
 def discard(path: Path) -> None:
     """Remove what an earlier run has left, unless a command keeps it because somebody changed or brought it.
 
-    Parameters
-    ----------
-    path
-        Of the file; need not exist.
+    ``path``: of the file; need not exist.
     """
     kept = _now.get()
     guarded = kept is not None and kept.covers(path)

@@ -14,16 +14,6 @@ _BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
 def split_number(text: str) -> tuple[float, str]:
     """Return number and unit of ``"5 N·m"``, ``"5N*m"`` or ``"5N.m"``; a full stop in a unit is a product.
 
-    Parameters
-    ----------
-    text
-        Number and unit.
-
-    Raises
-    ------
-    UnitError
-        If it does not begin with a number, or the number has a comma.
-
     Examples
     --------
     >>> split_number("5N.m")
@@ -51,13 +41,7 @@ def _with_comma(text: str, whole: str, behind: re.Match[str]) -> UnitError:
 
 
 def name_and_unit(head: str) -> tuple[str, str | None]:
-    """Return what the head of a column says, ``name [unit]`` or ``name_unit``: its name and its unit.
-
-    Parameters
-    ----------
-    head
-        Without a unit it is the name as it stands, and the unit is ``None``.
-    """
+    """Return what the head of a column says, ``name [unit]`` or ``name_unit``: its name and its unit."""
     match = _BRACKETED.match(head)
     name, _, unit = (match["name"], "", match["unit"]) if match else head.rpartition("_")
     try:

@@ -63,13 +63,7 @@ class LimitMargin:
     active: bool
 
     def shown(self, value: float) -> str:
-        """Return a number in the unit of the limit as text.
-
-        Parameters
-        ----------
-        value
-            In SI.
-        """
+        """Return a number in the unit of the limit as text."""
         return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
 
 
@@ -177,18 +171,7 @@ class DesignView:
     beyond: tuple[str, ...] = ()
 
     def column(self, name: str) -> LiveColumn:
-        """Return one column.
-
-        Parameters
-        ----------
-        name
-            For instance ``"torque"``.
-
-        Raises
-        ------
-        KeyError
-            If there is none of that name.
-        """
+        """Return one column."""
         return {each.name: each for each in self.columns}[name]
 
 
@@ -384,13 +367,7 @@ class AngleAnswer:
 
 
 def to_json(value: Any) -> Any:
-    """Return an answer as what JSON can hold; numbers that are not finite become ``None``.
-
-    Parameters
-    ----------
-    value
-        Any of the classes here, or rows, arrays and numbers.
-    """
+    """Return an answer as what JSON can hold; numbers that are not finite become ``None``."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         content = {f.name: to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
         return content | ({"stale": value.stale} if isinstance(value, LiveAnswer) else {})

@@ -28,17 +28,7 @@ _OLD = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class ExportedDesign:
-    """One file.
-
-    Parameters
-    ----------
-    name
-        Of the file.
-    media_type
-        For browsers.
-    content
-        Bytes.
-    """
+    """One file."""
 
     name: str
     media_type: str
@@ -63,15 +53,7 @@ class ExportDesign(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the export of the last good design.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such export.
-        ValueRangeError
-            If there is no design yet.
-        """
+        """Return the export of the last good design."""
         if self.what not in EXPORTS:
             raise unknown_name("export", self.what[:80], EXPORTS)
         if shown is None:
@@ -84,16 +66,7 @@ def exported_deck(
 ) -> ExportedDesign:
     """Return the machine as a deck.
 
-    Parameters
-    ----------
-    stage
-        Called with what is done now.
-    machine
-        Changed.
-    contour
-        Of its cam.
-    note
-        What the head of the file says; empty for nothing.
+    ``note``: what the head of the file says; empty for nothing.
     """
     text = f"# {note}\n{deck_text(machine)}" if note else deck_text(machine)
     return ExportedDesign(f"{machine.name}.toml", "application/toml", text.encode())
@@ -102,44 +75,21 @@ def exported_deck(
 def exported_svg(
     stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
 ) -> ExportedDesign:
-    """Return the drawing of the cam as SVG.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-    """
+    """Return the drawing of the cam as SVG."""
     return _drawing(machine, contour, "svg", note)
 
 
 def exported_dxf(
     stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
 ) -> ExportedDesign:
-    """Return the drawing of the cam as DXF.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-    """
+    """Return the drawing of the cam as DXF."""
     return _drawing(machine, contour, "dxf", note)
 
 
 def exported_c(
     stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
 ) -> ExportedDesign:
-    """Return cascade observer and PID controller as C, in an archive.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-
-    Raises
-    ------
-    NlsError
-        If the machine has no observer or controller.
-    """
+    """Return cascade observer and PID controller as C, in an archive."""
     from ..export import export_c
     from ..feedback.control import joined, torque_controller
     from ..feedback.observer import CascadeGain, design_observer
@@ -160,18 +110,7 @@ def exported_c(
 def exported_fmu(
     stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
 ) -> ExportedDesign:
-    """Return the plant as an FMU for co-simulation.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-
-    Raises
-    ------
-    NlsError
-        If it cannot be compiled here.
-    """
+    """Return the plant as an FMU for co-simulation."""
     from ..export import export_fmu
 
     stage("compiles the plant")

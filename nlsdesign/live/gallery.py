@@ -64,40 +64,12 @@ def gallery_cards() -> tuple[GalleryCard, ...]:
 
 
 def gallery_question(name: str) -> LiveQuestion:
-    """Return the question with which an actuator of the gallery begins: its own curve as the target.
-
-    Parameters
-    ----------
-    name
-        Of a deck or template.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is none of that name.
-    ArrangementError
-        If it has no cam to design.
-    """
+    """Return the question with which an actuator of the gallery begins: its own curve as the target."""
     return question_of(declare(_deck(name)), name)
 
 
 def question_of_deck(text: str, name: str) -> LiveQuestion:
-    """Return the question with which a deck of one's own begins.
-
-    Parameters
-    ----------
-    text
-        TOML.
-    name
-        Of the file, for messages.
-
-    Raises
-    ------
-    ValueRangeError
-        If the deck is too large.
-    NlsError
-        If it cannot be read, or has no cam to design.
-    """
+    """Return the question with which a deck of one's own begins."""
     size = len(text.encode())
     if size > MOST_DECK_BYTES:
         raise ValueRangeError(
@@ -113,18 +85,6 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
 
     The target is its own torque curve, contour and pretension are free. Rubber of which no strength is
     declared begins with a limit of its own: twice the strain of its own cam.
-
-    Parameters
-    ----------
-    actuator
-        With a cam spring.
-    title
-        For people.
-
-    Raises
-    ------
-    ArrangementError
-        If it has no cam spring, or none whose contour can be designed, or one that gives no torque.
     """
     blank = LiveQuestion(title, ChosenMachine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
     cam = blank.cam

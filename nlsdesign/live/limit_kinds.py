@@ -57,13 +57,7 @@ class LimitKind:
         return f"{'largest' if self.upper else 'least'} {self.words}"
 
     def shown(self, value: float) -> str:
-        """Return a number in the unit in which people read it.
-
-        Parameters
-        ----------
-        value
-            In SI.
-        """
+        """Return a number in the unit in which people read it."""
         if self.shown_unit == "%":
             return f"{100.0 * value:.4g} %"
         return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
@@ -74,30 +68,13 @@ class LimitKind:
         return self.shown_unit if self.shown_unit == "%" else self.unit
 
     def limit(self, value: float) -> Limit:
-        """Return the limit.
-
-        Parameters
-        ----------
-        value
-            In SI.
-
-        Raises
-        ------
-        ValueRangeError
-            If the number is out of the range of this limit, or not finite.
-        """
+        """Return the limit."""
         if not abs(value) < float("inf"):
             raise ValueRangeError(f"{self.title} = {value:g}", "is no finite number")
         return self.kind(**{self.field: value})
 
     def value_of(self, limit: Limit) -> float:
-        """Return the number of a limit of this kind in SI: what is allowed, with its safety factor.
-
-        Parameters
-        ----------
-        limit
-            Of this kind.
-        """
+        """Return the number of a limit of this kind in SI: what is allowed, with its safety factor."""
         return plain(getattr(limit, self.field)) / float(getattr(limit, "safety_factor", 1.0))
 
 

@@ -22,15 +22,7 @@ _NO_LIMITS: Mapping[str, LimitNumber] = {}
 
 
 def in_words(sentence: str, limits: Mapping[str, LimitNumber] = _NO_LIMITS) -> str:
-    """Return a sentence with each limit called what it limits, with its number where it has one.
-
-    Parameters
-    ----------
-    sentence
-        Perhaps with names of classes.
-    limits
-        That hold, by name.
-    """
+    """Return a sentence with each limit called what it limits, with its number where it has one."""
 
     def read(match: re.Match[str]) -> str:
         name = match.group()
@@ -45,39 +37,17 @@ def in_words(sentence: str, limits: Mapping[str, LimitNumber] = _NO_LIMITS) -> s
 
 
 def shown_bound(margin: LimitMargin) -> str:
-    """Return a side of a limit in words: what it bounds, the side, the number with its unit.
-
-    Parameters
-    ----------
-    margin
-        Of a design.
-    """
+    """Return a side of a limit in words: what it bounds, the side, the number with its unit."""
     return f"{margin.of} {'≤' if margin.upper else '≥'} {shown_value(margin, margin.bound)}"
 
 
 def shown_value(margin: LimitMargin, value: float) -> str:
-    """Return a number of a limit in the unit in which people read it.
-
-    Parameters
-    ----------
-    margin
-        To the limit.
-    value
-        In SI.
-    """
+    """Return a number of a limit in the unit in which people read it."""
     return LIMIT_KINDS[margin.limit].shown(value) if margin.limit in LIMIT_KINDS else margin.shown(value)
 
 
 def holding(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
-    """Return what a design sits on in words, without limits that are shown and not kept.
-
-    Parameters
-    ----------
-    question
-        That it answers.
-    margins
-        To all of its limits.
-    """
+    """Return what a design sits on in words, without limits that are shown and not kept."""
     words = [shown_bound(each) for each in margins if each.active and question.keeps(each.limit)]
     if question.contour not in question.free:
         words.append("the contour, which is held")

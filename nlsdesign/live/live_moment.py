@@ -48,24 +48,12 @@ class LiveMoment:
         return replace(self, solved=None)
 
     def with_controls(self, *, can_undo: bool, can_redo: bool) -> LiveMoment:
-        """Return the moment with controls that offer the steps there are.
-
-        Parameters
-        ----------
-        can_undo, can_redo
-            Whether there is a step before and after it.
-        """
+        """Return the moment with controls that offer the steps there are."""
         controls = controls_of(self.question, can_undo=can_undo, can_redo=can_redo)
         return replace(self, answer=replace(self.answer, controls=controls))
 
     def under_revision(self, revision: int) -> LiveMoment:
-        """Return a moment of before as the present one.
-
-        Parameters
-        ----------
-        revision
-            Of its own.
-        """
+        """Return a moment of before as the present one."""
         design, shown = self.answer.design, self.shown
         if design is not None and shown is not None and not self.answer.stale:
             design = replace(design, revision=revision)
@@ -77,30 +65,13 @@ class LiveMoment:
 def first_moment(solver: QuickSolver, question: LiveQuestion, values: dict[str, float]) -> LiveMoment:
     """Return the moment with which a session begins.
 
-    Parameters
-    ----------
-    solver
-        Of the session.
-    question
-        Any.
-    values
-        Numbers in SI of a design to begin beside, by name; empty without one.
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
     """
     return _answered(solver, question, None, None, values)
 
 
 def next_moment(solver: QuickSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
-    """Return the moment of a changed question, answered from the design of the one before.
-
-    Parameters
-    ----------
-    solver
-        Of the session.
-    question
-        Changed.
-    before
-        The present moment.
-    """
+    """Return the moment of a changed question, answered from the design of the one before."""
     return _answered(solver, question, before, before.solved, before.values)
 
 
@@ -109,32 +80,13 @@ def opened_moment(
 ) -> LiveMoment:
     """Return the moment of a question that was opened, answered as if nothing had been before.
 
-    Parameters
-    ----------
-    solver
-        Of the session.
-    question
-        Any.
-    before
-        The present moment, whose revision it follows.
-    values
-        Numbers in SI of a design to begin beside, by name; empty without one.
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
     """
     return _answered(solver, question, before, None, values)
 
 
 def settled_moment(solver: QuickSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
-    """Return the moment with the whole design as its answer, beside which the next drag begins.
-
-    Parameters
-    ----------
-    solver
-        Of the session.
-    moment
-        With the quick answer.
-    full
-        The whole design of its question.
-    """
+    """Return the moment with the whole design as its answer, beside which the next drag begins."""
     question = moment.question
     quick = moment.solved if moment.answer.state == "solved" else None
     answer = full_answer(full, question, moment.answer, quick)
@@ -170,15 +122,7 @@ def _answered(
 
 
 def missed(question: LiveQuestion, shown: AngleView) -> str:
-    """Return how far a design misses its target, and which limits hold it.
-
-    Parameters
-    ----------
-    question
-        That was asked.
-    shown
-        The design.
-    """
+    """Return how far a design misses its target, and which limits hold it."""
     view = shown.view
     holders = holding(question, view.margins)
     held = f"held by {', '.join(holders)}" if holders else "no limit holds it"

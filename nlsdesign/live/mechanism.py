@@ -22,16 +22,7 @@ def mechanism_at(
 ) -> Mechanism:
     """Return the mechanism at one angle.
 
-    Parameters
-    ----------
-    contour
-        Of the cam; a finite anchor for a cable through the centre.
-    angle
-        In rad, of either sign for a cable through the centre, not negative otherwise.
-    extensions
-        Of the rubber in m: at angle zero, at this angle, and the largest.
-    rest_length
-        Of the rubber in m.
+    ``contour``: of the cam; a finite anchor for a cable through the centre.
     """
     both = bool(np.isfinite(contour.anchor_distance))
     angle = float(np.clip(angle, -contour.angles[-1] if both else 0.0, contour.angles[-1]))

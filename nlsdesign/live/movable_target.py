@@ -37,23 +37,11 @@ class MovableTarget:
         self.last_angle = last_angle
 
     def energy(self, angle: float) -> Expression:
-        """Return the energy below the whole curve.
-
-        Parameters
-        ----------
-        angle
-            The last one.
-        """
+        """Return the energy below the whole curve."""
         return self._energy
 
     def torque_law(self, angle: Expression) -> Expression:
-        """Return the torque; beyond the ends the outer pieces go on.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return the torque; beyond the ends the outer pieces go on."""
         passed = [angle >= self._breaks[k] for k in range(1, self._pieces)]
 
         def picked(row: Expression) -> Expression:
@@ -66,23 +54,11 @@ class MovableTarget:
         return result
 
     def weight_law(self, angle: Expression) -> Expression:
-        """Return one: the error counts alike everywhere.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return one: the error counts alike everywhere."""
         return 0.0 * angle + 1.0
 
     def numbers(self, target: TabulatedTorque) -> Array:
-        """Return the numbers of the symbols for a curve with as many pieces.
-
-        Parameters
-        ----------
-        target
-            The curve.
-        """
+        """Return the numbers of the symbols for a curve with as many pieces."""
         return _numbers_of(target)
 
 

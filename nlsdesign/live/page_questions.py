@@ -31,13 +31,7 @@ class PageQuestions:
         }  # fmt: skip
 
     def answer(self, asked: Asked) -> None:
-        """Answer a message; what cannot be done is refused in words.
-
-        Parameters
-        ----------
-        asked
-            As the page sent it, which may be anything.
-        """
+        """Answer a message; what cannot be done is refused in words."""
         try:
             self._do(asked)
         except NlsError as error:

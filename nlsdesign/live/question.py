@@ -213,10 +213,7 @@ class LiveQuestion:
     def keeps(self, limit: str) -> bool:
         """Tell whether a limit is kept, and not only shown: whether anything that is free can change it.
 
-        Parameters
-        ----------
-        limit
-            Name of its class; ranges of free numbers are always kept.
+        ``limit``: name of its class; ranges of free numbers are always kept.
         """
         kind = LIMIT_KINDS.get(limit)
         return kind is None or self.contour in self.free or not kind.of_shape
@@ -235,35 +232,13 @@ class LiveQuestion:
         return result
 
     def number(self, name: str) -> NumberState:
-        """Return one of them.
-
-        Parameters
-        ----------
-        name
-            Full name.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest that exists.
-        """
+        """Return one of them."""
         if name not in self.numbers:
             raise unknown_name("number", name, self.numbers)
         return self.numbers[name]
 
     def with_points(self, points: tuple[TargetPoint, ...]) -> LiveQuestion:
-        """Return the question with another target.
-
-        Parameters
-        ----------
-        points
-            In the order of their angles.
-
-        Raises
-        ------
-        ValueRangeError
-            If there are too many or not enough, out of order, or out of range.
-        """
+        """Return the question with another target."""
         if not FEWEST_POINTS <= len(points) <= MOST_POINTS:
             raise ValueRangeError(
                 f"target with {len(points)} points", f"has {FEWEST_POINTS} to {MOST_POINTS} of them",
@@ -295,21 +270,7 @@ class LiveQuestion:
 def finite_in(what: str, value: object, *, lowest: float, highest: float, unit: str = "1") -> float:
     """Return a number that a designer gave, checked.
 
-    Parameters
-    ----------
-    what
-        For messages.
-    value
-        Anything.
-    lowest, highest
-        Inclusive range.
-    unit
-        Unit in SI of value and range; people read them in the unit of the page.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is no finite number in the range.
+    ``unit``: unit in SI of value and range; people read them in the unit of the page.
     """
     try:
         sound = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)

@@ -21,27 +21,13 @@ _KEPT = 1e-6
 
 
 class SoftenedProgram:
-    """The program of one structure with limits that give.
-
-    Parameters
-    ----------
-    rows
-        Of the program.
-    """
+    """The program of one structure with limits that give."""
 
     def __init__(self, rows: QuickRows) -> None:
         self._rows = rows
 
     def conflict(self, question: LiveQuestion, begin: Array) -> QuickOutcome:
-        """Find out whether any cam keeps all limits, and which are in conflict where none does.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        begin
-            Unknowns.
-        """
+        """Find out whether any cam keeps all limits, and which are in conflict where none does."""
         rows = self._rows
         count = len(rows.bounds)
         if not count:

@@ -143,13 +143,7 @@ class QuickDesign:
         return DesignedNumbers(self.question, chosen, self.contour, shaped)
 
     def view(self, revision: int) -> DesignView:
-        """Return what is shown of it.
-
-        Parameters
-        ----------
-        revision
-            Of the question.
-        """
+        """Return what is shown of it."""
         rows = self._numbers
         pieces = list(self.program.rows.problem.design.strains)
         strains, stresses = (rows[key].reshape(len(pieces), -1) for key in ("strains", "stresses"))
@@ -200,13 +194,7 @@ class QuickSolver:
         self._contradicted: QuickProgram | None = None
 
     def program(self, question: LiveQuestion) -> QuickProgram:
-        """Return the program of a question, made where there is none yet.
-
-        Parameters
-        ----------
-        question
-            Any.
-        """
+        """Return the program of a question, made where there is none yet."""
         key = structure_of(question)
         if key not in self._programs or not self._programs[key].rows.fits(question):
             self._programs[key] = QuickProgram(question)
@@ -217,13 +205,7 @@ class QuickSolver:
         return self._programs[key]
 
     def keeps(self, design: QuickDesign) -> bool:
-        """Tell whether the program of a design is still kept.
-
-        Parameters
-        ----------
-        design
-            Of this session.
-        """
+        """Tell whether the program of a design is still kept."""
         return any(each is design.program for each in self._programs.values())
 
     def answer(
@@ -231,14 +213,7 @@ class QuickSolver:
     ) -> tuple[QuickDesign | None, QuickOutcome]:
         """Return the design for a question, and how it was come by.
 
-        Parameters
-        ----------
-        question
-            Any.
-        last
-            The last good design, to begin beside.
-        values
-            Its numbers in SI by name, where its program is not kept; empty where there is no design.
+        ``values``: its numbers in SI by name, where its program is not kept; empty where there is no design.
         """
         program = self.program(question)
         begin = _Beginning(program, question, values if last is None else last.numbers.values)
@@ -265,27 +240,11 @@ class QuickSolver:
         return QuickDesign(program, question, outcome.point, outcome.cost), outcome
 
     def beside_design(self, question: LiveQuestion, design: CamDesign) -> QuickDesign | None:
-        """Return the quick design at a finished one, for the next drag to begin from.
-
-        Parameters
-        ----------
-        question
-            That both answer.
-        design
-            Finished.
-        """
+        """Return the quick design at a finished one, for the next drag to begin from."""
         return self.beside_values(question, values_of_design(self.program(question), design))
 
     def beside_values(self, question: LiveQuestion, values: dict[str, float]) -> QuickDesign | None:
-        """Return the quick design at numbers of another; ``None`` where there is none.
-
-        Parameters
-        ----------
-        question
-            Any.
-        values
-            In SI by name.
-        """
+        """Return the quick design at numbers of another; ``None`` where there is none."""
         program = self.program(question)
         outcome = program.from_values(question, program.outputs.scaled_values(values))
         if outcome.state != "solved" or outcome.point is None:
@@ -307,17 +266,7 @@ class QuickSolver:
 
 @dataclass(frozen=True, eq=False)
 class _Beginning:
-    """Where a search begins; computed where it is asked for, which most drags do not.
-
-    Parameters
-    ----------
-    program
-        Of the question.
-    question
-        That is asked.
-    numbers
-        Of the last good design in SI by name; empty where there is none.
-    """
+    """Where a search begins; computed where it is asked for, which most drags do not."""
 
     program: QuickProgram
     question: LiveQuestion
@@ -347,15 +296,7 @@ def _unlimited(question: LiveQuestion) -> str:
 
 
 def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:
-    """Return the variables of a finished design in SI by name.
-
-    Parameters
-    ----------
-    program
-        Of the question.
-    design
-        Finished.
-    """
+    """Return the variables of a finished design in SI by name."""
     values = {name: given.number for name, given in design.changes if len(given.values) == 1}
     problem, contour = program.rows.problem, design.contour
     if problem.contour is None:

@@ -14,50 +14,24 @@ from .quick_rows import QuickRows
 
 
 class QuickOutputs:
-    """What follows from the unknowns of one program.
-
-    Parameters
-    ----------
-    rows
-        Of the program.
-    """
+    """What follows from the unknowns of one program."""
 
     def __init__(self, rows: QuickRows) -> None:
         self._rows = rows
 
     def columns(self, unknowns: Array, question: LiveQuestion) -> dict[str, Array]:
-        """Return curves, sums and values of the limits by name.
-
-        Parameters
-        ----------
-        unknowns
-            Scaled.
-        question
-            Of this structure.
-        """
+        """Return curves, sums and values of the limits by name."""
         names, function = self._columns
         columns = function(unknowns, self._rows.numbers_of(question))
         return {name: np.array(c, dtype=float).ravel() for name, c in zip(names, columns, strict=True)}
 
     def chosen_values(self, unknowns: Array) -> dict[str, float]:
-        """Return sizes and variables of the contour in SI by name.
-
-        Parameters
-        ----------
-        unknowns
-            Scaled.
-        """
+        """Return sizes and variables of the contour in SI by name."""
         values = np.array(self._in_si(unknowns)).ravel()
         return {v.name: float(value) for v, value in zip(self._rows.chosen, values, strict=True)}
 
     def scaled_values(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return values in SI as this program scales them, those that it knows.
-
-        Parameters
-        ----------
-        values
-            In SI by name.
-        """
+        """Return values in SI as this program scales them, those that it knows."""
         return {v.name: self._rows.scaled(v, values[v.name]) for v in self._rows.chosen if v.name in values}
 
     @cached_property

@@ -71,13 +71,7 @@ class QuickProgram:
         _ = self._cold, self._warm, self._again
 
     def from_starts(self, question: LiveQuestion) -> QuickOutcome:
-        """Return the best solution from the starts that are always taken.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        """
+        """Return the best solution from the starts that are always taken."""
         best: QuickOutcome | None = None
         problem = self.rows.problem
         for start in starts(_STARTS, 1, []):
@@ -96,41 +90,15 @@ class QuickProgram:
         return best
 
     def beside(self, question: LiveQuestion, last: QuickPoint) -> QuickOutcome:
-        """Return the solution beside the last one.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        last
-            Of this program.
-        """
+        """Return the solution beside the last one."""
         return self._solved(self._warm, question, last)
 
     def from_point(self, question: LiveQuestion, point: QuickPoint, room: Array | float) -> QuickOutcome:
-        """Return the solution from unknowns that keep all limits, as far as they do there.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        point
-            Of this program.
-        room
-            What each limit gave there, of the size that counts as kept.
-        """
+        """Return the solution from unknowns that keep all limits, as far as they do there."""
         return self._solved(self._cold, question, point, room)
 
     def from_values(self, question: LiveQuestion, values: Mapping[str, float]) -> QuickOutcome:
-        """Return the solution from scaled values of another program or design.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        values
-            By name.
-        """
+        """Return the solution from scaled values of another program or design."""
         point = QuickPoint(self.rows.completed(question, values))
         return self._solved(self._again, question, point)
 

@@ -92,25 +92,14 @@ class QuickRows:
         }
 
     def fits(self, question: LiveQuestion) -> bool:
-        """Tell whether the variables are scaled for a target as large as that of a question.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        """
+        """Tell whether the variables are scaled for a target as large as that of a question."""
         ratio = question.target_size * question.target.last_angle / self._size
         return 1.0 / _RESCALED < ratio < _RESCALED
 
     def limits_of(self, question: LiveQuestion, room: Array | float = 0.0) -> tuple[Array, Array]:
         """Return the bounds of the rows.
 
-        Parameters
-        ----------
-        question
-            Of this structure.
-        room
-            By which each kept limit is wider, relative to its scale; the same for all, or one for each.
+        ``room``: by which each kept limit is wider, relative to its scale; the same for all, or one for each.
         """
         low = [np.full(row.expression.shape[0], row.lower) for row in self.problem.structure]
         high = [np.full(row.expression.shape[0], row.upper) for row in self.problem.structure]
@@ -123,23 +112,11 @@ class QuickRows:
         return np.concatenate(low), np.concatenate(high)
 
     def values_of(self, question: LiveQuestion) -> list[float]:
-        """Return the number of each bound, the kept ones first, as a question has it.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        """
+        """Return the number of each bound, the kept ones first, as a question has it."""
         return [question.limit_values[bound.limit].value for bound in self.shown_bounds]
 
     def ranges_of(self, question: LiveQuestion) -> tuple[Array, Array]:
-        """Return the bounds of the variables: what is held has no room.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        """
+        """Return the bounds of the variables: what is held has no room."""
         low = np.array([v.lower for v in self.problem.variables])
         high = np.array([v.upper for v in self.problem.variables])
         numbers = question.numbers
@@ -156,15 +133,7 @@ class QuickRows:
         return low, high
 
     def scaled(self, variable: DesignVariable, value: float) -> float:
-        """Return the symbol's value at which a variable has a value in SI, within its range.
-
-        Parameters
-        ----------
-        variable
-            Of this structure.
-        value
-            In SI.
-        """
+        """Return the symbol's value at which a variable has a value in SI, within its range."""
         return scaled(variable, value, self._scales_of_variables[variable.name])
 
     @cached_property
@@ -172,25 +141,11 @@ class QuickRows:
         return {variable.name: scale_of(variable) for variable in self.chosen}
 
     def numbers_of(self, question: LiveQuestion) -> Array:
-        """Return the numbers of the target.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        """
+        """Return the numbers of the target."""
         return self.target.numbers(question.target)
 
     def completed(self, question: LiveQuestion, values: Mapping[str, float]) -> Array:
-        """Return the unknowns that follow from some of them, with held numbers as the question has them.
-
-        Parameters
-        ----------
-        question
-            Of this structure.
-        values
-            Scaled values by name.
-        """
+        """Return the unknowns that follow from some of them, with held numbers as the question has them."""
         low, high = self.ranges_of(question)
         parameters = self.numbers_of(question)
         wanted = [values.get(v.name, v.start) for v in self.problem.variables]
@@ -211,13 +166,7 @@ class QuickRows:
 
 
 def structure_of(question: LiveQuestion) -> tuple[Any, ...]:
-    """Return what two questions must share for one program: equal keys, one program.
-
-    Parameters
-    ----------
-    question
-        Any.
-    """
+    """Return what two questions must share for one program: equal keys, one program."""
     free, target = question.contour in question.free, question.target
     return (
         id(question.machine),

@@ -68,18 +68,6 @@ class QuickOutcome:
 
 
 def interior_point(name: str, program: dict[str, Any], *, iterations: int, **options: Any) -> ca.Function:
-    """Return the solver of a program.
-
-    Parameters
-    ----------
-    name
-        Of the function.
-    program
-        Unknowns ``x``, cost ``f``, rows ``g`` and parameters ``p``.
-    iterations
-        At most.
-    **options
-        Of Ipopt, besides those of all searches.
-    """
+    """Return the solver of a program."""
     settings = {f"ipopt.{key}": value for key, value in options.items()}
     return ca.nlpsol(name, "ipopt", program, {**_COMMON, **settings, "ipopt.max_iter": iterations})

@@ -51,12 +51,7 @@ class SavedDesign:
 def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
     """Return a question as text.
 
-    Parameters
-    ----------
-    question
-        As it stands.
-    values
-        Numbers of the last design in SI by name; empty before the first.
+    ``values``: numbers of the last design in SI by name; empty before the first.
     """
     lines = [_HEAD, f"free = {json.dumps(list(question.free))}", "", "[target]"]
     rows = (question.target.angles, question.target.torques)
@@ -86,17 +81,7 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
 def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
     """Return the question of a saved design, and the numbers at which its design stood.
 
-    Parameters
-    ----------
-    texts
-        As :func:`saved` made them; the third may be empty.
-
-    Raises
-    ------
-    ValueRangeError
-        If a text is too large, or asks for something that the live design does not have.
-    NlsError
-        If a text cannot be read.
+    ``texts``: as :func:`saved` made them; the third may be empty.
     """
     for name, text in ((_DECK, texts.deck), (_JOB, texts.job), (_BEGIN, texts.begin)):
         if len(text.encode()) > MOST_DECK_BYTES:

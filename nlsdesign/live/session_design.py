@@ -60,18 +60,7 @@ class SessionDesign:
             self._begin(LiveDesign(gallery_question(FIRST)), trouble)
 
     def run(self, inbox: Inbox) -> None:
-        """Answer until no message can come any more.
-
-        Parameters
-        ----------
-        inbox
-            What is asked.
-
-        Raises
-        ------
-        EOFError
-            When the server has closed it.
-        """
+        """Answer until no message can come any more."""
         if not inbox.waiting:
             choices()
         last_news = time.monotonic()

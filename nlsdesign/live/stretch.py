@@ -34,24 +34,12 @@ class StrainEnd(NamedTuple):
 
 
 def strain_ends(model: FlatModel) -> dict[str, StrainEnd]:
-    """Return how far each piece of rubber behind the cam may be stretched, by its path.
-
-    Parameters
-    ----------
-    model
-        Flat model of an actuator with a cam spring.
-    """
+    """Return how far each piece of rubber behind the cam may be stretched, by its path."""
     return {piece.name: _end_of(model, piece) for piece in series_cam(model).specimens}
 
 
 def smallest(ends: Mapping[str, StrainEnd]) -> float:
-    """Return the least strain of several pieces; infinite without any.
-
-    Parameters
-    ----------
-    ends
-        By path of the piece.
-    """
+    """Return the least strain of several pieces; infinite without any."""
     return min((each.strain for each in ends.values()), default=math.inf)
 
 
@@ -77,15 +65,7 @@ def _end_of(model: FlatModel, piece: SpecimenNames) -> StrainEnd:
 
 
 def stretched_beyond(ends: Mapping[str, StrainEnd], columns: Iterable[LiveColumn]) -> tuple[str, ...]:
-    """Return where rubber is stretched beyond what is stated of it, how far, and what to change.
-
-    Parameters
-    ----------
-    ends
-        By path of the piece.
-    columns
-        Of a design, the angle first.
-    """
+    """Return where rubber is stretched beyond what is stated of it, how far, and what to change."""
     angle, *others = columns
     rows = {each.name: each.values for each in others}
     sentences = []
@@ -102,15 +82,7 @@ def stretched_beyond(ends: Mapping[str, StrainEnd], columns: Iterable[LiveColumn
 
 
 def declared_strain(model: FlatModel, angles: Array) -> float | None:
-    """Return the largest strain of rubber of the machine as it is declared; ``None`` without rubber.
-
-    Parameters
-    ----------
-    model
-        Flat model of an actuator with a cam spring.
-    angles
-        In rad.
-    """
+    """Return the largest strain of rubber of the machine as it is declared; ``None`` without rubber."""
     law = elastic_law(model)
     if not law.specimens:
         return None

@@ -24,15 +24,7 @@ _MOST_CHECKED = 161
 
 
 def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> LiveControls:
-    """Return what a designer can move.
-
-    Parameters
-    ----------
-    question
-        As it stands.
-    can_undo, can_redo
-        Whether there is a step back or forth.
-    """
+    """Return what a designer can move."""
     limits = tuple(
         (name, each.kind.words, each.value, each.kind.unit, each.kind.shown_unit, each.kind.upper,
          each.by_default)
@@ -52,15 +44,7 @@ def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> Li
 
 
 def curve_columns(curves: DesignCurves, targets: Array) -> tuple[LiveColumn, ...]:
-    """Return what cam and rubber do over the angle as columns.
-
-    Parameters
-    ----------
-    curves
-        At the nodes of the contour.
-    targets
-        Torque that is wanted there.
-    """
+    """Return what cam and rubber do over the angle as columns."""
     rows = [
         LiveColumn("angle", "rad", "cam angle", curves.angles),
         LiveColumn("torque", "N*m", "torque of the spring", curves.torques),
@@ -79,13 +63,7 @@ def curve_columns(curves: DesignCurves, targets: Array) -> tuple[LiveColumn, ...
 
 
 def margins_of(states: Iterable[LimitState]) -> tuple[LimitMargin, ...]:
-    """Return how a design stands to its limits.
-
-    Parameters
-    ----------
-    states
-        Of a finished design.
-    """
+    """Return how a design stands to its limits."""
     return tuple(
         LimitMargin(
             each.limit, each.of, each.value, each.bound,
@@ -98,15 +76,7 @@ def margins_of(states: Iterable[LimitState]) -> tuple[LimitMargin, ...]:
 
 
 def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[ShownNumber, ...]:
-    """Return the numbers of a design.
-
-    Parameters
-    ----------
-    question
-        That it answers.
-    values
-        In SI by name, in place of those of the question.
-    """
+    """Return the numbers of a design."""
     return tuple(
         ShownNumber(n.name, values.get(n.name, n.value), n.unit, n.shown_unit, n.free)
         for n in question.numbers.values()
@@ -114,17 +84,7 @@ def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[
 
 
 def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignView:
-    """Return what is shown of a finished design: its torque is that of the assembly, flattened anew.
-
-    Parameters
-    ----------
-    question
-        That it answers.
-    revision
-        Of the question.
-    design
-        Of the whole search.
-    """
+    """Return what is shown of a finished design: its torque is that of the assembly, flattened anew."""
     check, largest = design.check, design.target.largest
     columns = list(curve_columns(design.curves, design.target.torque(design.curves.angles)))
     every = max(1, len(check.angles) // _MOST_CHECKED)
@@ -157,28 +117,12 @@ def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignV
 
 
 def unkept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> tuple[LimitMargin, ...]:
-    """Return how a design stands to limits that are shown and not kept: nothing that is free changes them.
-
-    Parameters
-    ----------
-    question
-        That it answers.
-    margins
-        To all of its limits.
-    """
+    """Return how a design stands to limits that are shown and not kept: nothing that is free changes them."""
     return tuple(each for each in margins if not question.keeps(each.limit))
 
 
 def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
-    """Return in words which limits are shown and not kept, and which of them the design breaks.
-
-    Parameters
-    ----------
-    question
-        As it stands.
-    margins
-        Of the design, to all limits.
-    """
+    """Return in words which limits are shown and not kept, and which of them the design breaks."""
     limits = [each for each in question.limit_values.values() if not question.keeps(each.kind.name)]
     titles = " and ".join(f"{each.kind.title} ({each.kind.shown(each.value)})" for each in limits)
     rule = "is shown and not kept" if len(limits) == 1 else "are shown and not kept"

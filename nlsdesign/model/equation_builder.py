@@ -145,13 +145,7 @@ class NamingScope(SwitchScope):
         return self._builder.inputs[full][1]
 
     def state(self, name: str, unit: str, description: str) -> Expression:
-        """Declare a state.
-
-        Raises
-        ------
-        ArrangementError
-            If two equations claim the state.
-        """
+        """Declare a state."""
         full = self._builder.own(self.path, name)
         if full in self._builder.states:
             raise ArrangementError(full, "two equations claim this state")

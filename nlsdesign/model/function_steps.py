@@ -43,13 +43,7 @@ class Instructions(NamedTuple):
 
 
 def read_instructions(function: ca.Function) -> Instructions:
-    """Return the instructions of an SX function.
-
-    Parameters
-    ----------
-    function
-        Made of SX.
-    """
+    """Return the instructions of an SX function."""
     steps: list[Instruction] = []
     results: dict[tuple[int, int], int] = {}
     held: dict[int, int] = {}

@@ -158,26 +158,7 @@ def read_equations(
     discrete: bool,
     longest: float = LONGEST,
 ) -> Equations:
-    """Return the equations of a function of named numbers.
-
-    Parameters
-    ----------
-    function
-        (t, x, u, p, w) -> (f, y, s, …), as in a flat model.
-    inputs
-        Names of the numbers in each argument.
-    results
-        Names of states, outputs and signals.
-    discrete
-        Whether the first result is the next state.
-    longest
-        Operations beyond which a definition is shown as a function of what it depends on.
-
-    Raises
-    ------
-    ExportError
-        If a law uses an operation that has no SymPy counterpart here.
-    """
+    """Return the equations of a function of named numbers."""
     reader = _Reader(function, inputs, longest)
     reader.run(results)
     derivatives = {n: reader.shown(reader.terms[reader.results[0, i]]) for i, n in enumerate(results[0])}

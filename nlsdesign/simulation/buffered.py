@@ -15,13 +15,7 @@ Translate: TypeAlias = Callable[[ca.Function], ca.Function]
 
 
 def as_it_is(function: ca.Function) -> ca.Function:
-    """Return a function unchanged; CasADi's own virtual machine runs it.
-
-    Parameters
-    ----------
-    function
-        Any.
-    """
+    """Return a function unchanged; CasADi's own virtual machine runs it."""
     return function
 
 

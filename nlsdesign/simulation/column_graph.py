@@ -174,13 +174,7 @@ class ColumnGraph:
         return frozenset(s.result for s in self.steps if isinstance(s, Operation) and s.code in _CONDITIONS)
 
     def new(self, number: int = 1) -> tuple[int, ...]:
-        """Return numbers of new values.
-
-        Parameters
-        ----------
-        number
-            How many.
-        """
+        """Return numbers of new values."""
         self.count += number
         return tuple(range(self.count - number, self.count))
 
@@ -188,22 +182,7 @@ class ColumnGraph:
 def column_graph(
     function: ca.Function, *, fixed: Sequence[int] = (), tables: Mapping[str, Table] | None = None
 ) -> ColumnGraph:
-    """Return a function as a graph of elementary operations.
-
-    Parameters
-    ----------
-    function
-        Of SX, or of MX that calls such functions and reads tables.
-    fixed
-        Numbers of the arguments that stay the same from call to call.
-    tables
-        Tables by the name of the function that reads them.
-
-    Raises
-    ------
-    NotByColumnsError
-        If it has an operation that is not known by columns.
-    """
+    """Return a function as a graph of elementary operations."""
     if function.class_name() == "SXFunction":
         places = [k for i in fixed for k in _places(function, i)]
         return _body(function, frozenset(places))

@@ -83,18 +83,7 @@ def simulate(
 
 
 def checked_times(times: Array) -> Array:
-    """Return sample times as an array.
-
-    Parameters
-    ----------
-    times
-        In s.
-
-    Raises
-    ------
-    ValueRangeError
-        If they do not ascend or are not finite, or there are fewer than two.
-    """
+    """Return sample times as an array."""
     grid = np.asarray(times, dtype=float)
     if grid.ndim != 1 or len(grid) < 2 or np.any(np.diff(grid) <= 0.0) or not np.all(np.isfinite(grid)):
         raise ValueRangeError("times", "must be at least two strictly ascending finite numbers in s")

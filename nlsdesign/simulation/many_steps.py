@@ -29,13 +29,7 @@ from .runge_kutta import (
 
 
 class _OneColumn:
-    """Takes one column after the other through its events.
-
-    Parameters
-    ----------
-    model, drives, tolerance, translate
-        As for :class:`ManySteps`.
-    """
+    """Takes one column after the other through its events."""
 
     def __init__(self, model: FlatModel, drives: Drives, tolerance: float, translate: Translate) -> None:
         self._given = model, drives, tolerance, translate
@@ -48,15 +42,7 @@ class _OneColumn:
         return Stepper(model, drives, tolerance, modes.now, translate), modes
 
     def at(self, column: int, numbers: Array, state: Array, modes: Array) -> tuple[Stepper, Modes]:
-        """Return what steps a column and changes its modes, set to where it stands.
-
-        Parameters
-        ----------
-        column
-            Its number.
-        numbers, state, modes
-            Of all columns, the last axis.
-        """
+        """Return what steps a column and changes its modes, set to where it stands."""
         model, drives, *_ = self._given
         stepper, own = self._made
         assert model.switching is not None
@@ -145,13 +131,7 @@ class ManySteps:
         return states
 
     def events(self, column: int) -> tuple[Event, ...]:
-        """Return the events of a column.
-
-        Parameters
-        ----------
-        column
-            Its number.
-        """
+        """Return the events of a column."""
         return tuple(self._alone.logs[column].events) if column in self._alone.logs else ()
 
     def _fail(self, column: int, reason: str) -> None:

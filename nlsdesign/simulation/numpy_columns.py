@@ -57,14 +57,8 @@ class NumpyColumns:
     def __call__(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
         """Return the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
 
-        Parameters
-        ----------
-        state
-            Shape (states, columns).
-        given
-            Shape (T, given, columns).
-        parameter
-            Shape (parameters, columns).
+        ``state``: shape (states, columns). ``given``: shape (T, given, columns). ``parameter``: shape
+        (parameters, columns).
         """
         with self._lock:
             return self._run(state, given, parameter)

@@ -56,13 +56,7 @@ class BatchTrace:
     finite: Mask
 
     def __getitem__(self, name: str) -> Array:
-        """Return one signal, shape (runs, T).
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return one signal, shape (runs, T)."""
         if name not in self.signals:
             raise unknown_name("signal of the batch", name, self.signals)
         return self.signals[name]

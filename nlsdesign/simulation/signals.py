@@ -32,13 +32,7 @@ class Sine:
     phase: float = 0.0
 
     def __call__(self, time: float) -> float:
-        """Return the value at a time.
-
-        Parameters
-        ----------
-        time
-            In s.
-        """
+        """Return the value at a time."""
         return self.offset + self.amplitude * math.sin(2.0 * math.pi * self.frequency * time + self.phase)
 
     def at(self, times: Array) -> Array:

@@ -54,18 +54,7 @@ class SimulatedBatch:
         return np.array([i not in self.failures for i in range(len(self.events))])
 
     def __getitem__(self, name: str) -> Array:
-        """Return one signal, shape (columns, T).
-
-        Parameters
-        ----------
-        name
-            Full name.
-
-        Raises
-        ------
-        UnknownNameError
-            If it was not kept.
-        """
+        """Return one signal, shape (columns, T)."""
         if name not in self.signals:
             raise unknown_name("signal of the batch", name, self.signals)
         return self.signals[name]

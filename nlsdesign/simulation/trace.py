@@ -138,13 +138,7 @@ class Trace:
                 )
 
     def __getitem__(self, name: str) -> Array:
-        """Return one signal.
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return one signal."""
         if name not in self.signals:
             raise unknown_name("signal", name, self.signals)
         return self.signals[name]

@@ -39,12 +39,7 @@ def answer_quantiles(values: ArrayLike, shares: Sequence[float] = SHARES) -> lis
     The bounds hold for independent draws of any continuous distribution: the number of draws below a quantile
     has a binomial distribution. Infinite values count as the largest or smallest.
 
-    Parameters
-    ----------
-    values
-        Of one answer; those that are not a number are left out.
-    shares
-        Between 0 and 1, both excluded.
+    ``values``: of one answer; those that are not a number are left out.
     """
     column = np.asarray(values, dtype=float).ravel()
     ordered = np.sort(column[~np.isnan(column)])

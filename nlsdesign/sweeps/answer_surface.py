@@ -64,12 +64,8 @@ def answer_surface(across: Array, up: Array, answer: Array, *, others_vary: bool
     beside one another differ for other reasons, and a polynomial of the two axes is fitted, of the degree up
     to four that predicts left-out points best.
 
-    Parameters
-    ----------
-    across, up, answer
-        Numbers of the points, shape (n,), in SI; points with an answer that is not finite are left out.
-    others_vary
-        Whether further axes differ between the points.
+    ``across``, ``up``, ``answer``: numbers of the points, shape (n,), in SI; points with an answer that is
+    not finite are left out.
     """
     good = np.isfinite(across) & np.isfinite(up) & np.isfinite(answer)
     places = np.column_stack([across, up])[good].astype(float)

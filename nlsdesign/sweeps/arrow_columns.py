@@ -17,13 +17,7 @@ from ..foundation.errors import missing_library
 
 
 def libraries() -> tuple[Any, Any]:
-    """Return the modules ``pyarrow`` and ``pyarrow.parquet``.
-
-    Raises
-    ------
-    MissingLibraryError
-        If pyarrow is not installed.
-    """
+    """Return the modules ``pyarrow`` and ``pyarrow.parquet``."""
     try:
         import pyarrow
         from pyarrow import parquet
@@ -33,15 +27,7 @@ def libraries() -> tuple[Any, Any]:
 
 
 def arrow_column(values: Sequence[Any] | NDArray[Any], kind: Any) -> Any:
-    """Return a column as Arrow holds it.
-
-    Parameters
-    ----------
-    values
-        Numbers or words, none of them missing.
-    kind
-        ``int64``, ``float64`` or ``string`` of Arrow.
-    """
+    """Return a column as Arrow holds it."""
     pyarrow, _ = libraries()
     if kind != pyarrow.string():
         numbers = np.ascontiguousarray(values, dtype=np.int64 if kind == pyarrow.int64() else np.float64)
@@ -56,10 +42,7 @@ def arrow_column(values: Sequence[Any] | NDArray[Any], kind: Any) -> Any:
 def numpy_column(column: Any) -> NDArray[Any]:
     """Return a column of Arrow as numbers, or as words of which equal ones are one object.
 
-    Parameters
-    ----------
-    column
-        Of a table; missing numbers become not a number, missing words empty.
+    ``column``: of a table; missing numbers become not a number, missing words empty.
     """
     pyarrow, _ = libraries()
     if pyarrow.types.is_integer(column.type) and not column.null_count:
@@ -94,12 +77,7 @@ def _values(array: Any, held: type) -> NDArray[Any]:
 def read_columns(path: Path, names: Sequence[str] | None = None) -> Any:
     """Return a Parquet file as a table, in this thread and without reading ahead.
 
-    Parameters
-    ----------
-    path
-        Of the file.
-    names
-        Of the columns; all by default.
+    ``names``: of the columns; all by default.
     """
     _, parquet = libraries()
     with parquet.ParquetFile(path, memory_map=True) as file:

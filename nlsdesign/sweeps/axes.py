@@ -29,17 +29,7 @@ MOST_HELD: Final = 10_000_000
 
 @dataclass(frozen=True, eq=False)
 class BoundAxes:
-    """A set of axes with its values.
-
-    Parameters
-    ----------
-    columns
-        Of the axes.
-    count
-        Number of rows.
-    row
-        The values of one row, by its number.
-    """
+    """A set of axes with its values."""
 
     columns: tuple[SweepColumn, ...]
     count: int
@@ -75,20 +65,7 @@ def _count(name: str, count: int, least: int = 1, most: int = MOST_HELD) -> None
 
 
 def require_seed(name: str, seed: int) -> None:
-    """Refuse what is no seed.
-
-    Parameters
-    ----------
-    name
-        Of the set of axes.
-    seed
-        A whole number, 0 or larger.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is not one.
-    """
+    """Refuse what is no seed."""
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise ValueRangeError(f"{name}: seed = {brief(seed)}", "must be a whole number from 0 on",
                               next_step="take for instance 1")  # fmt: skip
@@ -368,20 +345,7 @@ def _box(
 
 
 def require_fractions(subject: Subject, name: str) -> None:
-    """Refuse a sample over whole numbers: its points lie between them.
-
-    Parameters
-    ----------
-    subject
-        What the axis changes.
-    name
-        Of the axis.
-
-    Raises
-    ------
-    ValueRangeError
-        If the axis takes whole numbers only.
-    """
+    """Refuse a sample over whole numbers: its points lie between them."""
     if subject.is_whole(name):
         raise ValueRangeError(f"range of {name}", "takes whole numbers only, a sample has others",
                               next_step="list them (Listed), or take a GridAxis in steps of one")  # fmt: skip

@@ -17,13 +17,7 @@ _DEVIATIONS: Final = 4.0
 
 
 def codes(values: NDArray[Any]) -> Array:
-    """Return numbers as they are, and words as the numbers of their place in the alphabet.
-
-    Parameters
-    ----------
-    values
-        Of one axis.
-    """
+    """Return numbers as they are, and words as the numbers of their place in the alphabet."""
     column = np.asarray(values)
     if column.dtype.kind in "fiub":
         return column.astype(float)
@@ -36,10 +30,7 @@ def dependent_axes(axes: Mapping[str, NDArray[Any]]) -> str:
     The ranks of the values are compared, and their distances from the middle rank, which shows two axes that
     lie on a circle or a wedge. What does not show in either is not seen.
 
-    Parameters
-    ----------
-    axes
-        Values of each axis, shape (n,); words too.
+    ``axes``: values of each axis, shape (n,); words too.
     """
     ranks = {name: rankdata(codes(values)) for name, values in axes.items()}
     worst, words = 0.0, ""

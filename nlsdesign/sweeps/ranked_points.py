@@ -62,23 +62,8 @@ def rank_points(
 ) -> RankedPoints:
     """Return which points no other betters; failures, misses and what is no finite number are set aside.
 
-    Parameters
-    ----------
-    answers
-        Values by name, shape (n,) each, in SI.
-    done
-        Which points have answers, shape (n,).
-    preferences
-        What is better; a point is on the front where no other is at least as good in all and better in one.
-    requirements
-        What a point must keep to be compared at all.
-
-    Raises
-    ------
-    UnknownNameError
-        If an answer of that name does not exist.
-    ValueRangeError
-        If one answer has two preferences.
+    ``preferences``: what is better; a point is on the front where no other is at least as good in all and
+    better in one.
     """
     named = [each.answer for each in preferences]
     for name in (*named, *(each.answer for each in requirements)):
@@ -108,10 +93,7 @@ def nondominated(costs: Array) -> Indices:
 
     Equal rows are kept together.
 
-    Parameters
-    ----------
-    costs
-        Finite numbers, shape (n, k); the smaller, the better.
+    ``costs``: finite numbers, shape (n, k); the smaller, the better.
     """
     unique, places = np.unique(np.asarray(costs, dtype=float), axis=0, return_inverse=True)
     # In the order of the columns a later row never betters an earlier one.

@@ -88,22 +88,7 @@ def _answers(columns: Sequence[SweepColumn]) -> tuple[str, ...]:
 def sweep_task(
     actuator: Assembly | Mapping[str, Assembly], *, axes: Sequence[AxisSet], ask: SweepQuestion
 ) -> SweepTask:
-    """Check a sweep before anything is computed.
-
-    Parameters
-    ----------
-    actuator, axes, ask
-        As for :func:`sweep`.
-
-    Raises
-    ------
-    ArrangementError
-        If there is no deck, or several and no axis ``deck``.
-    ValueRangeError
-        If axes collide, or an answer has the name of an axis.
-    NlsError
-        If a name does not exist, or a value does not fit it.
-    """
+    """Check a sweep before anything is computed."""
     assemblies = {actuator.name: actuator} if isinstance(actuator, Assembly) else dict(actuator)
     if not assemblies:
         raise ArrangementError("sweep", "has no deck", next_step="give an assembly")
@@ -131,18 +116,7 @@ def sweep_task(
 
 
 def require_askable(task: SweepTask) -> None:
-    """Refuse a question that fits no deck of a sweep, nor its first point, whose structure may differ.
-
-    Parameters
-    ----------
-    task
-        That was checked otherwise.
-
-    Raises
-    ------
-    NlsError
-        If the question names what is not there.
-    """
+    """Refuse a question that fits no deck of a sweep, nor its first point, whose structure may differ."""
     first: NlsError | None = None
     for assembly in task.assemblies.values():
         try:
@@ -219,24 +193,7 @@ def sweep(
 def run_task(
     task: SweepTask, folder: Path, *, executor: Executor, settings: SweepSettings, progress: Progress
 ) -> SweepTable:
-    """Run a checked sweep; see :func:`sweep`.
-
-    Parameters
-    ----------
-    task
-        The sweep.
-    folder
-        Of the results.
-    executor, settings, progress
-        As for :func:`sweep`.
-
-    Raises
-    ------
-    ExportError
-        If the folder cannot be written, is full, or holds another sweep.
-    WorkSharingError
-        If workers run other code, or their scheduler is not there.
-    """
+    """Run a checked sweep; see :func:`sweep`."""
     with only_run(folder):
         parts = opened(folder, task.about, task.columns, task.plan, again=settings.again)
         written_about(folder, task.about, task.columns, task.assemblies)
@@ -311,11 +268,6 @@ class _Watch:
 
 def duration(seconds: float) -> str:
     """Return a time in words of two units at most.
-
-    Parameters
-    ----------
-    seconds
-        Not negative.
 
     Examples
     --------

@@ -31,10 +31,7 @@ class SaltelliForm(NamedTuple):
 def saltelli_plan(points: Array) -> SaltelliForm | None:
     """Return the form of the plan, none where the points are not one; a last block that is cut is left out.
 
-    Parameters
-    ----------
-    points
-        Shape (n, d), in their order.
+    ``points``: shape (n, d), in their order.
     """
     count, axes = points.shape
     for second_order in (False, True):

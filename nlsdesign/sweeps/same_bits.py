@@ -21,13 +21,7 @@ class SameBits:
     """Compiled code where that is to be had, and CasADi where it is not: a worker may lack a compiler."""
 
     def __call__(self, function: ca.Function) -> ca.Function:
-        """Return a function as compiled code, or as it is.
-
-        Parameters
-        ----------
-        function
-            Any.
-        """
+        """Return a function as compiled code, or as it is."""
         if quickest() is not natively:
             return function
         try:
@@ -36,18 +30,7 @@ class SameBits:
             return function
 
     def columns(self, graph: ColumnGraph) -> ColumnRun:
-        """Return compiled code that runs samples of many columns.
-
-        Parameters
-        ----------
-        graph
-            Of one sample.
-
-        Raises
-        ------
-        NotByColumnsError
-            If there is none; the columns are then computed one after the other.
-        """
+        """Return compiled code that runs samples of many columns."""
         if quickest() is not natively:
             raise NotByColumnsError
         try:

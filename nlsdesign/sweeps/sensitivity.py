@@ -89,24 +89,7 @@ def sensitivity(
     *,
     kinds: Mapping[str, str] | None = None,
 ) -> list[AnswerSensitivity]:
-    """Return how each answer depends on each axis.
-
-    Parameters
-    ----------
-    axes
-        Numbers or words of each axis, shape (n,), in the order of the points.
-    answers
-        Numbers of each answer, shape (n,).
-    done
-        Which points have answers.
-    kinds
-        How each axis was made, where that is known, as the column of a sweep states it.
-
-    Raises
-    ------
-    MissingLibraryError
-        If SALib is not installed.
-    """
+    """Return how each answer depends on each axis."""
     varying = {name: values for name, values in axes.items() if len(np.unique(codes(values))) > 1}
     plan = saltelli_plan(np.column_stack([codes(v) for v in varying.values()])) if varying else None
     if plan is None and any((kinds or {}).get(name) == SALTELLI for name in varying):

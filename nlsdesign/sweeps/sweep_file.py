@@ -54,20 +54,6 @@ def read_sweep_file(path: Path | str) -> SweepTask:
     axes, ``[ask.QUESTION]`` holds the question, both with the names and fields of the Python objects. Numbers
     carry their unit; bare ones are in SI. A design is asked with the tables of a design file.
 
-    Parameters
-    ----------
-    path
-        The file.
-
-    Raises
-    ------
-    DeckError
-        If the file cannot be read, or a table is of the wrong kind; file, line and column are named.
-    UnknownNameError
-        If there is no such table, axis, question, field or deck, with the nearest that exists.
-    NlsError
-        If axes collide, or a number is refused by what it is for.
-
     Examples
     --------
     A file::

@@ -18,18 +18,7 @@ AMPLITUDES = {"low": LOW, "high": HIGH}
 
 @dataclass(frozen=True)
 class Setting:
-    """Gains that are tried on all springs at both amplitudes; the paper prints none.
-
-    Parameters
-    ----------
-    name
-        In words.
-    gains
-        Of the PID.
-    late
-        Samples of 1 ms by which the controller gets the torque late. The response is then that of the late
-        torque, which such a machine would record.
-    """
+    """Gains that are tried on all springs at both amplitudes; the paper prints none."""
 
     name: str
     gains: TorqueGains

@@ -198,13 +198,7 @@ def loops_of(actuator: nls.Assembly) -> Callable[[Law], ClosedLoop]:
 
 
 def angles_of(actuator: nls.Assembly) -> Array:
-    """Return the angles in rad at which the spring holds the torques of :data:`HELD`, shape (3,).
-
-    Raises
-    ------
-    ValueRangeError
-        If it does not reach the largest.
-    """
+    """Return the angles in rad at which the spring holds the torques of :data:`HELD`, shape (3,)."""
     model = nls.flatten(actuator, outputs=["motor.angle", "spring.torque"])
     ends = [model.values[cam.last_angle] for s in model.springs for cam in s.cams if cam.last_angle]
     swept = np.linspace(0.0, min(ends, default=nls.degrees(120.0)), _SWEPT)

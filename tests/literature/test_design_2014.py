@@ -15,7 +15,8 @@ import pytest
 from nlsdesign.components import Domain
 from nlsdesign.components.core.element import MATERIAL, Scope
 from nlsdesign.components.core.springs import Elastic
-from nlsdesign.design import design_cam, energy_profile
+from nlsdesign.design import design_cam
+from nlsdesign.design.statics.energy import energy_profile
 from nlsdesign.foundation.symbolic import Expression
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, NeoHooke, actuator
 

@@ -8,19 +8,23 @@ import pytest
 from scipy.stats import truncnorm
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.export import CompiledStep, export_c
+from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import GuardedModel
+from nlsdesign.export.compilation.running_c import CompiledStep
 from nlsdesign.feedback.analysis.rest import rest_states
 from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
-    Duty,
-    SensedTorque,
     design_adaptive_observer,
     estimator_bound,
 )
 from nlsdesign.feedback.observer.adaptive.adaptive_step import _matrices, _Side
-from nlsdesign.feedback.observer.adaptive.duty_and_directions import UncertainDirections, uncertain_directions
+from nlsdesign.feedback.observer.adaptive.duty_and_directions import (
+    Duty,
+    UncertainDirections,
+    uncertain_directions,
+)
+from nlsdesign.feedback.observer.adaptive.estimator_bound import SensedTorque
 from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, truncated_update
 from nlsdesign.feedback.observer.scheduling.angle_form import minimal_form
 from nlsdesign.foundation.deck import load_deck

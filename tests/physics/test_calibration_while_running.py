@@ -12,21 +12,21 @@ import pytest
 from click.testing import CliRunner
 
 from nlsdesign.bench.calibration import (
-    BoughtBy,
     CalibrationPlan,
     FreeRunTest,
     HungWeightTest,
     what_calibration_buys,
 )
+from nlsdesign.bench.calibration.plan import BoughtBy
 from nlsdesign.cli.calibrate import calibrate
 from nlsdesign.feedback.observer import (
     CascadeGain,
-    Duty,
     design_observer,
     least_torque_error,
     observer_bench,
     observer_errors,
 )
+from nlsdesign.feedback.observer.adaptive.duty_and_directions import Duty
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Prior, declared_prior
 from tests.calibrated import LINEAR, deck

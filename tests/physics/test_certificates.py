@@ -25,9 +25,9 @@ from nlsdesign.feedback.observer import (
     clamped_estimate_bound,
     design_observer_with_details,
     observe,
-    torque_bound,
     verify,
 )
+from nlsdesign.feedback.observer.certificates.torque_bound import torque_bound
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ValueRangeError

@@ -30,7 +30,7 @@ from nlsdesign.feedback.observer import (
     verify,
     write_certificate,
 )
-from nlsdesign.feedback.observer.certificates import held_estimate_bound
+from nlsdesign.feedback.observer.certificates.held_estimate import held_estimate_bound
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.model import FlatModel, flatten

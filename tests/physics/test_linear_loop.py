@@ -20,7 +20,6 @@ from nlsdesign.feedback.control import (
     coupled_stability,
     encoder_loop,
     largest_torque,
-    linear_loop,
     loop_margins,
     output_impedance,
     saturation_line,
@@ -30,6 +29,7 @@ from nlsdesign.feedback.control import (
     with_fine_counts,
     zero_torque,
 )
+from nlsdesign.feedback.control.evaluation.linear_loop import linear_loop
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten

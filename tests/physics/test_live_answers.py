@@ -16,7 +16,9 @@ from nlsdesign.design.optimisation.result import Miss
 from nlsdesign.feedback.analysis import Observability, over_angle
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import NlsError, ValueRangeError
-from nlsdesign.live import (
+from nlsdesign.live.answers import LiveAnswer
+from nlsdesign.live.background import BackgroundWork
+from nlsdesign.live.edits import (
     AddPoint,
     ChangeLimit,
     ChooseDeck,
@@ -24,19 +26,16 @@ from nlsdesign.live import (
     DropLimit,
     FreeNumber,
     HoldNumber,
-    LiveAnswer,
-    LiveDesign,
-    LiveQuestion,
     MovePoint,
     SetNumber,
-    SettleDesign,
-    gallery_question,
-    question_of,
-    reopened,
 )
-from nlsdesign.live.background import BackgroundWork
 from nlsdesign.live.full_design import full_answer, whole_design
+from nlsdesign.live.gallery import gallery_question, question_of
+from nlsdesign.live.live_design import LiveDesign
 from nlsdesign.live.live_snapshots import MOST_SNAPSHOTS
+from nlsdesign.live.question import LiveQuestion
+from nlsdesign.live.saved import reopened
+from nlsdesign.live.work import SettleDesign
 from tests.renamed import in_words, renamed
 
 SAME = 2e-4

@@ -13,10 +13,10 @@ from nlsdesign.feedback.control import (
     ClosedLoop,
     TorqueGains,
     encoder_loop,
-    linear_onset,
     onset_of_limit_cycling,
     torque_controller,
 )
+from nlsdesign.feedback.control.evaluation.onset import linear_onset
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError

@@ -22,11 +22,11 @@ from nlsdesign.feedback.control import (
     best_choices,
     encoder_loop,
     largest_gain,
-    linear_loop,
     loop_margins,
     sine_response,
     torque_controller,
 )
+from nlsdesign.feedback.control.evaluation.linear_loop import linear_loop
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ConvergenceError, InfeasibleError, UnknownNameError

@@ -19,11 +19,10 @@ from nlsdesign.feedback.observer import (
     PaperForm,
     PolePlacement,
     SteadyStateKalman,
-    check_stability,
     design_observer_with_details,
     observe,
 )
-from nlsdesign.feedback.observer.scheduling.scheduled import error_matrices
+from nlsdesign.feedback.observer.scheduling.scheduled import check_stability, error_matrices
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.paper_form import PaperFormNames

@@ -26,7 +26,6 @@ from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.feedback.analysis import (
     Stability,
     empirical_gramian,
-    least_damped,
     over_angle,
     rest_points,
     sampled_poles,
@@ -34,6 +33,7 @@ from nlsdesign.feedback.analysis import (
 from nlsdesign.feedback.analysis import (
     observability as rank_drops,
 )
+from nlsdesign.feedback.analysis.stability import least_damped
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
 from nlsdesign.feedback.observer.scheduling.scheduled import error_matrices
 from nlsdesign.foundation.deck import load_deck

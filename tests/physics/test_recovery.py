@@ -18,7 +18,6 @@ import pytest
 import nlsdesign as nls
 from nlsdesign.components import Encoder, ReadingLimits
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.export import CompiledStep
 from nlsdesign.export.c.c_text import member_paths
 from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
@@ -33,6 +32,7 @@ from nlsdesign.export.c.guarded_step import (
     index_bit,
 )
 from nlsdesign.export.compilation.cross_compiler import compile_program
+from nlsdesign.export.compilation.running_c import CompiledStep
 from nlsdesign.feedback.control import TorqueGains, joined
 from nlsdesign.feedback.observer import design_adaptive_observer, design_observer_with_details
 from nlsdesign.foundation.errors import NlsError

@@ -16,9 +16,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import evidence
 from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.arrays import Array

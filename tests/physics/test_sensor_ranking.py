@@ -19,7 +19,8 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.feedback.analysis import RankingAssumptions, SensorCandidate, rank_sensors
+from nlsdesign.feedback.analysis import SensorCandidate, rank_sensors
+from nlsdesign.feedback.analysis.sensor_ranking import RankingAssumptions
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.foundation.quantity import quantity

@@ -16,7 +16,8 @@ from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.design import design_cam
 from nlsdesign.feedback.control import ClosedLoop, torque_controller, tracking
-from nlsdesign.feedback.observer import CascadeGain, FixedGrid, check_stability, design_observer
+from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
+from nlsdesign.feedback.observer.scheduling.scheduled import check_stability
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.presentation.report import verdict_sections, write_report

@@ -5,34 +5,20 @@ It never adds an effect to a machine: what does not fit is refused, or widens wh
 """
 
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, Instruments, LoadCellTest
-from .calibrated_deck import (
-    CalibratedMachine,
-    CalibratedNumber,
-    calibrated,
-    known_together,
-    read_joint_numbers,
-    shown_numbers,
-    write_calibration,
-)
-from .estimate import CalibrationRecords, ChannelMisfit, Estimate, estimate, load_calibration
-from .plan import BoughtBy, CalibrationPlan, what_calibration_buys
+from .calibrated_deck import calibrated, read_joint_numbers, shown_numbers, write_calibration
+from .estimate import CalibrationRecords, estimate, load_calibration
+from .plan import CalibrationPlan, what_calibration_buys
 
 __all__ = [
-    "BoughtBy",
-    "CalibratedMachine",
-    "CalibratedNumber",
     "CalibrationPlan",
     "CalibrationRecords",
     "CalibrationTest",
-    "ChannelMisfit",
-    "Estimate",
     "FreeRunTest",
     "HungWeightTest",
     "Instruments",
     "LoadCellTest",
     "calibrated",
     "estimate",
-    "known_together",
     "load_calibration",
     "read_joint_numbers",
     "shown_numbers",

@@ -104,15 +104,7 @@ class BenchResponse:
         return len(self.factors) + 3
 
     def along(self, course: BenchCourse, x: Array) -> Shown:
-        """Return what the machine shows along a course.
-
-        Parameters
-        ----------
-        course
-            Begins at rest, with the rubber relaxed.
-        x
-            Factors, shape (columns,).
-        """
+        """Return what the machine shows along a course."""
         n, size, columns = len(course.motion), len(self.inner), self.columns
         data = np.vstack([course.motion, course.rate, course.command, course.weight])
         if n not in self._mapped:
@@ -139,15 +131,7 @@ class BenchResponse:
         return Shown(value, slope, by_motion)
 
     def resting(self, motion: float, x: Array) -> Shown:
-        """Return what the machine shows where it has rested, as :meth:`along` does; shapes (2 + channels, 1).
-
-        Parameters
-        ----------
-        motion
-            Of the driven body.
-        x
-            Factors, shape (columns,).
-        """
+        """Return what the machine shows at rest, as :meth:`along` does; shapes (2 + channels, 1)."""
         still = np.zeros(1)
         return self.along(BenchCourse(1.0, still + motion, still, still, still), x)
 
@@ -171,24 +155,7 @@ class BenchResponse:
 def bench_response(
     model: FlatModel, prior: Prior, channels: Sequence[str], *, balanced: bool = True
 ) -> BenchResponse:
-    """Return the functions of a machine on the bench.
-
-    Parameters
-    ----------
-    model
-        Of the bench: one body moves.
-    prior
-        Of its numbers.
-    channels
-        Measured signals that are compared with the model.
-    balanced
-        Whether the command is measured, so that the drive can be held to its balance.
-
-    Raises
-    ------
-    ArrangementError
-        If more than the drive moves, or nothing drives it.
-    """
+    """Return the functions of a machine on the bench."""
     body = driven_body(model)
     if body.prescribed or body.inertia is None or len(body.drives) > 1:
         raise ArrangementError(
@@ -227,13 +194,7 @@ class _Expressions(NamedTuple):
 
 
 def shared_factors(prior: Prior) -> dict[str, tuple[str, ...]]:
-    """Return the numbers that share one factor, by the first of them.
-
-    Parameters
-    ----------
-    prior
-        Numbers that are known to deviate together, and by as much, share one.
-    """
+    """Return the numbers that share one factor, by the first of them."""
     size = prior.deviations
     result: dict[str, list[str]] = {}
     for k, name in enumerate(prior.names):

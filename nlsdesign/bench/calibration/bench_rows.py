@@ -103,14 +103,7 @@ class BenchRows(NamedTuple):
 def windows(count: int, step: float, seconds: float) -> SmoothWindows:
     """Return windows over a record.
 
-    Parameters
-    ----------
-    count
-        Samples.
-    step
-        Between them in s.
-    seconds
-        Length of a window; at least 13 samples are taken.
+    ``seconds``: length of a window; at least 13 samples are taken.
     """
     half = max(_LEAST_SAMPLES // 2, round(0.5 * seconds / step))
     s = np.arange(-half, half + 1) / (half + 1.0)
@@ -135,17 +128,7 @@ def windows(count: int, step: float, seconds: float) -> SmoothWindows:
 
 
 def rate_of(motion: Array, step: float, seconds: float) -> tuple[Array, float]:
-    """Return the rate of a sampled motion, and the factor from noise of the motion to that of the rate.
-
-    Parameters
-    ----------
-    motion
-        Shape (n,).
-    step
-        Between samples in s.
-    seconds
-        Length of the window of each.
-    """
+    """Return the rate of a sampled motion, and the factor from noise of the motion to that of the rate."""
     half = max(_LEAST_SAMPLES // 4, round(0.5 * seconds / step))
     s = np.arange(-half, half + 1) / (half + 1.0)
     slope = s * (1.0 - s**2) ** 3
@@ -158,15 +141,7 @@ def rate_of(motion: Array, step: float, seconds: float) -> tuple[Array, float]:
 
 
 def window_length(motion: Array, step: float) -> float:
-    """Return the length of a window in s that suits a motion: a fifth of a radian of its phase.
-
-    Parameters
-    ----------
-    motion
-        Shape (n,).
-    step
-        Between samples in s.
-    """
+    """Return the length of a window in s that suits a motion: a fifth of a radian of its phase."""
     rate = rate_of(motion, step, 0.03)[0]
     line = np.polynomial.polynomial.polyfit(np.arange(len(motion)), motion, 1)
     swing = motion - np.polynomial.polynomial.polyval(np.arange(len(motion)), line)
@@ -200,15 +175,6 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRo
 
     The balance is solved for the command: its noise is what the balance is uncertain by, and so no number
     can make the error smaller by making all efforts small.
-
-    Parameters
-    ----------
-    response
-        Of the machine on the bench.
-    run
-        The record.
-    x
-        Factors.
     """
     course, noise = run.course, run.noise
     view = windows(len(course.motion), course.step, noise.window)

@@ -150,13 +150,7 @@ class FreeRunTest(CalibrationTest):
 
 
 def moved_end(model: FlatModel) -> str:
-    """Return the body at the drive's end of the series spring; the driven body where there is no spring.
-
-    Parameters
-    ----------
-    model
-        Of the clamped machine.
-    """
+    """Return the body at the drive's end of the series spring; the driven body where there is no spring."""
     if not model.springs:
         return driven_body(model).name
     spring: SpringNames = series_spring(model)

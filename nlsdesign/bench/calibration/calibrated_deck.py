@@ -222,12 +222,7 @@ def _calibrated_row(
 def known_together(known: Prior, names: Sequence[str]) -> tuple[str, ...]:
     """Return in words which products and quotients are known far better than either of their numbers.
 
-    Parameters
-    ----------
-    known
-        After a calibration.
-    names
-        Of the numbers to look at; of those that share one factor the first stands for all.
+    ``names``: of the numbers to look at; of those that share one factor the first stands for all.
     """
     shown = [first for first in shared_factors(known) if first in names]
     products = []

@@ -17,9 +17,10 @@ from ...foundation.errors import ConvergenceError, MeasurementError, ValueRangeE
 from ...foundation.quantity import three_digits, with_unit
 from ...model import flatten
 from ...simulation import Prior, declared_prior
-from ..identification import Finding, RecordSet, load_record
+from ..identification import RecordSet, load_record
 from ..identification.estimation.covariance import Piece, inverse_information, robust_covariance
 from ..identification.estimation.levenberg_marquardt import Minimum, minimise
+from ..identification.records.quality import Finding
 from ..identification.records.table_files import table_files
 from ..identification.statistics.losses import huber_rows
 from .bench_rows import BenchRows
@@ -191,22 +192,7 @@ def _hangs(finding: Finding, records: RecordSet) -> bool:
 
 
 def prior_of(actuator: Assembly, given: Prior | None) -> Prior:
-    """Return what is known of a machine: as given, or the declared spreads.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    given
-        Of this machine.
-
-    Raises
-    ------
-    UnknownNameError
-        If the machine has no such number.
-    ValueRangeError
-        If a number stands for another value in the deck.
-    """
+    """Return what is known of a machine: as given, or the declared spreads."""
     model = flatten(actuator)
     if given is None:
         return declared_prior(model)

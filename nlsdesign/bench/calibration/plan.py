@@ -61,13 +61,7 @@ class BoughtBy(NamedTuple):
         return float(np.sqrt(np.mean(self.torque**2))) if len(self.torque) else math.nan
 
     def narrowed(self, before: Prior) -> dict[str, tuple[float, float]]:
-        """Return the spreads before and after of the numbers that become better known, the most so first.
-
-        Parameters
-        ----------
-        before
-            What is known now.
-        """
+        """Return the spreads before and after of the numbers that become better known, the most so first."""
         earlier, later = before.spreads(), self.known.spreads()
         narrowed = {n: (earlier[n], s) for n, s in later.items() if s < _NARROWED * earlier[n]}
         return dict(sorted(narrowed.items(), key=lambda pair: pair[1][1] / pair[1][0]))

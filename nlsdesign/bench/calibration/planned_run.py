@@ -54,22 +54,7 @@ class _Sweep(NamedTuple):
 
 
 def planned_bench(model: FlatModel, kind: CalibrationTest, known: Prior) -> BenchEvidence:
-    """Return a bench with the runs that are planned for a kind of calibration.
-
-    Parameters
-    ----------
-    model
-        Of the bench.
-    kind
-        What is to be done.
-    known
-        Of the numbers of the machine.
-
-    Raises
-    ------
-    InfeasibleError
-        If the motor cannot move the machine within its limit of current.
-    """
+    """Return a bench with the runs that are planned for a kind of calibration."""
     channels = _cells(model)
     response = bench_response(model, bench_prior(model, known), channels)
     share = 1.0
@@ -100,13 +85,7 @@ def _cells(model: FlatModel) -> list[str]:
 
 
 def sweep_end(model: FlatModel) -> float:
-    """Return how far a calibration turns the drive, in rad of the series spring.
-
-    Parameters
-    ----------
-    model
-        Of the machine.
-    """
+    """Return how far a calibration turns the drive, in rad of the series spring."""
     if not model.springs:
         return _NO_CONTOUR
     ends = [cam.last_angle for cam in series_spring(model).cams if cam.last_angle]
@@ -150,13 +129,7 @@ def _step(window: float) -> float:
 
 
 def drive_ratio(model: FlatModel) -> float:
-    """Return the turns of the driven body for one of the spring.
-
-    Parameters
-    ----------
-    model
-        Of the machine.
-    """
+    """Return the turns of the driven body for one of the spring."""
     if not model.springs:
         return 1.0
     body, spring = driven_body(model), series_spring(model)

@@ -66,10 +66,7 @@ class BenchEvidence:
     def rows(self, x: Array) -> list[tuple[str, float, list[BenchRows]]]:
         """Return name, time between samples, and rows of all records.
 
-        Parameters
-        ----------
-        x
-            Factors, then instruments; shape (unknowns,).
+        ``x``: factors, then instruments; shape (unknowns,).
         """
         own, cells = x[: self.response.columns], x[self.response.columns :]
         result = []
@@ -99,25 +96,7 @@ def bench_evidence(
     source: str = "",
     balanced: bool = True,
 ) -> BenchEvidence:
-    """Return a machine on the bench with what was recorded, or is expected.
-
-    Parameters
-    ----------
-    model
-        Of the bench.
-    kind
-        What is done.
-    channels
-        Measured efforts.
-    runs
-        Names and runs.
-    known
-        Of the numbers of the machine.
-    source
-        Where the records come from.
-    balanced
-        Whether the command is measured.
-    """
+    """Return a machine on the bench with what was recorded, or is expected."""
     own = bench_prior(model, known)
     instruments = kind.instruments
     largest = max(float(np.max(np.abs(run.course.command))) for _, run in runs)
@@ -146,26 +125,7 @@ def _gain_is_free(model: FlatModel, channel: str) -> bool:
 def recorded_bench(
     model: FlatModel, kind: CalibrationTest, records: Sequence[Record], *, known: Prior, source: str
 ) -> BenchEvidence:
-    """Return a machine on the bench with its records.
-
-    Parameters
-    ----------
-    model
-        Of the bench.
-    kind
-        What was done.
-    records
-        With the same signals.
-    known
-        Of the numbers of the machine.
-    source
-        Where the records come from.
-
-    Raises
-    ------
-    MeasurementError
-        If the records do not hold what this kind needs.
-    """
+    """Return a machine on the bench with its records."""
     body = driven_body(model)
     where = source or "records"
     shows = {s: reading_of(model.readings, s).measured for s in records[0].trace.signals}
@@ -193,15 +153,7 @@ def recorded_bench(
 
 
 def bench_prior(model: FlatModel, known: Prior) -> Prior:
-    """Return what is known of the numbers of a bench: of the machine's own what was known, and of others.
-
-    Parameters
-    ----------
-    model
-        Of the bench.
-    known
-        Of the machine's numbers.
-    """
+    """Return what is known of the numbers of a bench: of the machine's own what was known, and of others."""
     own = declared_prior(model)
     covariance, values = own.covariance.copy(), own.values.copy()
     shared = [(i, known.place(n)) for i, n in enumerate(own.names) if n in known.names]
@@ -279,18 +231,7 @@ class Unknowns:
         self.count = int(self._places[-1])
 
     def pieces(self, y: Array) -> list[tuple[BenchEvidence, Piece, BenchRows]]:
-        """Return the rows of all records in units of their noise.
-
-        Parameters
-        ----------
-        y
-            Unknowns, shape (count,).
-
-        Raises
-        ------
-        MeasurementError
-            If the machine moves nowhere long enough.
-        """
+        """Return the rows of all records in units of their noise."""
         result = []
         for bench, place in zip(self.benches, self._places, strict=False):
             matrix = self._factors(bench, int(place))
@@ -325,12 +266,7 @@ class Unknowns:
     def learned(self, y: Array, covariance: Array) -> Prior:
         """Return what is known of all numbers.
 
-        Parameters
-        ----------
-        y
-            Unknowns, shape (count,).
-        covariance
-            Of the unknowns, shape (count, count).
+        ``covariance``: of the unknowns, shape (count, count).
         """
         size = len(self.shapes)
         # Nothing that was known is unlearned.

@@ -4,31 +4,22 @@ from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
 from .planning.candidate_commands import MachineLimits
-from .planning.experiment import Experiment, Separation, next_experiment, write_command
-from .prediction import BandError, band_errors, predict, ranges_left
+from .planning.experiment import Experiment, next_experiment, write_command
+from .prediction import band_errors, predict, ranges_left
 from .reporting.circumstances import DiagnosisRun, records_of_run
 from .reporting.fitted_numbers import with_records_named
-from .reporting.named_effect import EffectEvidence
-from .reporting.refit import BlockError, FittedNumber, Refit, refit
-from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
+from .reporting.refit import Refit, refit
+from .reporting.verdict import Verdict
 from .reporting.written import verdict_frames
 
 __all__ = [
     "ALL",
-    "BandError",
-    "BlockError",
     "Candidate",
-    "Course",
     "DiagnosisRun",
     "Effect",
-    "EffectEvidence",
     "Experiment",
-    "FittedNumber",
     "MachineLimits",
-    "NamedEffect",
-    "RecordGap",
     "Refit",
-    "Separation",
     "Unknown",
     "Verdict",
     "band_errors",

@@ -26,8 +26,9 @@ from ...model.derived_deck import derived
 from ..identification.equation_error.evidence import Bench
 from ..identification.estimation.least_squares import Fit
 from ..identification.records.measurement import RecordSet
-from .effects import Candidate, EffectFunction
+from .effects import Candidate
 from .effects import catalogue as known_effects
+from .effects.effect import EffectFunction
 from .fitting import Key
 from .planning.experiment import Experiment, next_experiment
 from .reporting.advice import advice, more_excitation, where_they_differ

@@ -76,13 +76,7 @@ class Tally(NamedTuple):
 
 
 def quickest(evidence: Sequence[Evidence]) -> frozenset[str]:
-    """Return the quickest quarter of the records, rounded down, by the acceleration of what moves.
-
-    Parameters
-    ----------
-    evidence
-        Of several blocks on several records.
-    """
+    """Return the quickest quarter of the records, rounded down, by the acceleration of what moves."""
     size: dict[str, float] = {}
     for each in evidence:
         for drive in each.driven.block.drives.values():
@@ -96,15 +90,7 @@ def quickest(evidence: Sequence[Evidence]) -> frozenset[str]:
 def unpredictable(
     before: Mapping[Key, Tally], after: Mapping[Key, Tally], quick: Collection[str]
 ) -> frozenset[Key]:
-    """Return where a quick record is predicted worse than before, or far worse than every other one.
-
-    Parameters
-    ----------
-    before, after
-        By block and record.
-    quick
-        Names of the quickest records.
-    """
+    """Return where a quick record is predicted worse than before, or far worse than every other one."""
 
     def mean_square(key: Key) -> float:
         return after[key].squares / after[key].rows
@@ -125,13 +111,6 @@ def diverges(evidence: Evidence, best: Fit) -> bool:
     Only that proves a record unpredictable: a wrong law that fails on it fails in its neighbourhood too. The
     members of the ensemble differ by a standard error of each number, a hundredth at most, in directions
     drawn once for all.
-
-    Parameters
-    ----------
-    evidence
-        Of the record.
-    best
-        The fitted numbers.
     """
     random = np.random.default_rng(0)
     error = np.minimum(np.sqrt(np.diag(best.covariance)), _NEIGHBOURHOOD)
@@ -152,12 +131,7 @@ def diverges(evidence: Evidence, best: Fit) -> bool:
 def like_the_others(tallies: Mapping[Key, Tally], unpredictable: Collection[Key]) -> dict[Key, Tally]:
     """Return tallies in which an unpredictable record is as well predicted as the others of its block.
 
-    Parameters
-    ----------
-    tallies
-        By block and record.
-    unpredictable
-        Blocks and records; none of them counts for more than it did.
+    ``unpredictable``: blocks and records; none of them counts for more than it did.
     """
     result = dict(tallies)
     for block, record in unpredictable:
@@ -334,15 +308,7 @@ class Strategy(ABC):
 
     @abstractmethod
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
-        """Return better starts than those of the unknowns; nothing where there are none.
-
-        Parameters
-        ----------
-        problem
-            What is to be fitted.
-        slow
-            Evidence of the slower records.
-        """
+        """Return better starts than those of the unknowns; nothing where there are none."""
 
 
 @dataclass(frozen=True)
@@ -385,13 +351,7 @@ class Continuation(Strategy):
     takes_long: bool = True
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
-        """Return the starts that the simpler form leaves; nothing where it has no response.
-
-        Raises
-        ------
-        ConvergenceError
-            If the simpler form explains so little of every block that the whole effect cannot be named.
-        """
+        """Return the starts that the simpler form leaves; nothing where it has no response."""
         bench, first = problem.bench, problem.starts[0]
         every = blocks_of(flatten(self.through), bench.records.signals)
         blocks = [b for b in every if b.name in problem.blocks]
@@ -432,34 +392,11 @@ class Method(ABC):
 
     @abstractmethod
     def fit(self, problem: FitProblem, strategy: Strategy) -> Fit:
-        """Fit the numbers.
-
-        Parameters
-        ----------
-        problem
-            To be fitted.
-        strategy
-            Of the newest effect.
-
-        Raises
-        ------
-        ConvergenceError
-            If there is no response at any of the starts.
-        """
+        """Fit the numbers."""
 
     @abstractmethod
     def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
-        """Return which blocks and records are to be judged by the others.
-
-        Parameters
-        ----------
-        problem
-            That was fitted.
-        best
-            The fitted numbers.
-        after
-            What the fit left over.
-        """
+        """Return which blocks and records are to be judged by the others."""
 
 
 class Smooth(Method):
@@ -526,13 +463,7 @@ class RobustOverFreeFlight(Smooth):
 
 
 def refusal(problem: FitProblem) -> str:
-    """Return why a further effect is not fitted at all; empty if it is.
-
-    Parameters
-    ----------
-    problem
-        To be fitted.
-    """
+    """Return why a further effect is not fitted at all; empty if it is."""
     starts = len(problem.starts)
     many = problem.beside_free_flight and starts > BUDGET.most_starts
     if problem.effects < 2 or not (many or problem.instructions > BUDGET.expensive_step):
@@ -541,13 +472,7 @@ def refusal(problem: FitProblem) -> str:
 
 
 def method_for(problem: FitProblem) -> Method:
-    """Return how a group of blocks is fitted.
-
-    Parameters
-    ----------
-    problem
-        To be fitted.
-    """
+    """Return how a group of blocks is fitted."""
     return RobustOverFreeFlight() if problem.has_free_flight else Smooth()
 
 
@@ -558,24 +483,7 @@ def best_fit(
     *,
     known: Mapping[Key, float] | None = None,
 ) -> Fit:
-    """Return the best of fits from several starts, the most promising first.
-
-    Parameters
-    ----------
-    evidence
-        What the records say.
-    starts
-        At least one.
-    limits
-        Of each fit.
-    known
-        As for :func:`~nlsdesign.bench.identification.estimation.least_squares.fit`.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is no response at any of the starts.
-    """
+    """Return the best of fits from several starts, the most promising first."""
     several = len(starts) > 1
     choices = [(_promise(evidence, start) if several else 0.0, start) for start in starts]
     best: Fit | None = None
@@ -611,15 +519,7 @@ def _promise(evidence: Sequence[Evidence], start: Sequence[Parameter]) -> float:
 
 
 def explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:
-    """Tell whether a fit takes enough off the excess over the noise of any block.
-
-    Parameters
-    ----------
-    problem
-        With what was left over before.
-    misfit
-        Half the sum of squares by block and record.
-    """
+    """Tell whether a fit takes enough off the excess over the noise of any block."""
     for block in problem.blocks:
         keys = [key for key in misfit if key[0] == block]
         now = 0.5 * sum(problem.before[key].squares for key in keys)

@@ -26,25 +26,6 @@ def shown_values(model: FlatModel, record: Record, signal: str) -> Array:
 
     The inverse of each sensor of the chain, the last one first, earlier by the sum of their delays. States of
     sensors, such as a drift so far, are taken as they start.
-
-    Parameters
-    ----------
-    model
-        Of the bench.
-    record
-        Measured.
-    signal
-        Full name of a measured signal.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (samples,), in SI.
-
-    Raises
-    ------
-    ArrangementError
-        If a sensor of the chain does not show the value, as a tachometer.
     """
     reading, values = reading_of(model.readings, signal), np.asarray(record.trace[signal])
     if not reading.sensors:

@@ -66,15 +66,7 @@ class Measured:
 
 
 def measured_signals(model: FlatModel, signals: Sequence[str]) -> list[Measured]:
-    """Return what each measured signal stands for.
-
-    Parameters
-    ----------
-    model
-        Of what is measured.
-    signals
-        Full names.
-    """
+    """Return what each measured signal stands for."""
     return [_measured(model, signal) for signal in signals]
 
 
@@ -106,17 +98,7 @@ def _variable_behind(model: FlatModel, name: str) -> str:
 
 
 def behind_ratio(measured: Measured, value: Expression, known: Mapping[str, Expression]) -> Expression:
-    """Return the variable that a measured value stands for, where a fixed ratio lies between.
-
-    Parameters
-    ----------
-    measured
-        Signal.
-    value
-        What its sensors must have seen.
-    known
-        Expressions of everything in the model by name.
-    """
+    """Return the variable that a measured value stands for, where a fixed ratio lies between."""
     name = measured.reading.measured
     if measured.shown == name:
         return value
@@ -161,16 +143,7 @@ def scaled_balance(
 ) -> tuple[Expression, float]:
     """Return a balance in the scale of what was measured, and the declared effort per unit of that.
 
-    Parameters
-    ----------
-    terms
-        The balance.
-    drives
-        Readings of what may drive the body; the first one that does is taken.
-    efforts
-        Readings of all efforts, drives and other inputs.
-    inertia
-        Of the body.
+    ``drives``: readings of what may drive the body; the first one that does is taken.
     """
     for reading in drives:
         given = _effort_at_standstill(terms, reading)
@@ -249,18 +222,7 @@ def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
     it, with measured efforts in place of those that the model would predict. A block that would need a
     command that is not measured is left out.
 
-    Parameters
-    ----------
-    model
-        Of what is measured.
-    signals
-        Full names of measured signals; readings of sensors stand for what these read.
-
-    Raises
-    ------
-    MeasurementError
-        If nothing can be compared: no motion is measured, no effort and no drive, or a drive whose command
-        is unknown stands between.
+    ``signals``: full names of measured signals; readings of sensors stand for what these read.
     """
     used = _sorted(model, measured_signals(model, signals))
     drives, efforts = used.drives, used.efforts
@@ -499,15 +461,7 @@ class _Tearing:
                 yield each.body.rate, self.inferred(each, 1)
 
     def block(self, result: _Result, body: MovingBody | None = None) -> Block:
-        """Return the block of a result.
-
-        Parameters
-        ----------
-        result
-            In the symbols of the model.
-        body
-            Whose balance it is.
-        """
+        """Return the block of a result."""
         model, s = self._model, self._s
         kept = [i for i, v in enumerate(model.states) if v.name not in self._replaced]
         # Where the model is cut, a signal and an input have one name: what is not fed by a reading is unused.

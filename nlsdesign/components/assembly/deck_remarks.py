@@ -22,11 +22,6 @@ _FITTED = ".fitted_strain"
 def deck_remarks(machine: Assembly) -> list[str]:
     """Return what is lawful in a deck and likely to be a slip, each with the next step.
 
-    Parameters
-    ----------
-    machine
-        As declared.
-
     Examples
     --------
     >>> from nlsdesign.foundation.deck import load_deck

@@ -58,11 +58,6 @@ def sharpened(assembly: Assembly) -> Assembly:
 
     Dry friction sticks, corners are corners; simulation locates where they change.
 
-    Parameters
-    ----------
-    assembly
-        Parts.
-
     Examples
     --------
     >>> from nlsdesign.components import CoulombFriction, Inertia, Regularised, assembly, tie

@@ -150,13 +150,7 @@ class Element(Part):
 
 
 def observed_effort(element: Element, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-    """Return the effort of an element and give names to its motion and effort.
-
-    Parameters
-    ----------
-    element, scope, motion, rate
-        As for :meth:`Element.effort`.
-    """
+    """Return the effort of an element and give names to its motion and effort."""
     effort = element.effort(scope, motion, rate)
     domain = element.domain
     if element.dissipates:

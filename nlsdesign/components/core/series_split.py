@@ -20,15 +20,6 @@ def split(efforts: Sequence[Expression], shares: Sequence[Expression], whole: Ex
     number of members and not with its power. A step that goes beyond the minimum of the energy along itself
     is cut back, to half at least. The last step starts from the best point found and is never cut, so the
     derivative is that of the implicit function.
-
-    Parameters
-    ----------
-    efforts
-        Each in its own share, which it rises with.
-    shares
-        Symbols.
-    whole
-        Sum of the shares.
     """
     unknowns = ca.vertcat(*shares)
     stacked = ca.vertcat(*efforts)

@@ -56,20 +56,6 @@ def fit_curve(strains: Sequence[float], stresses: Sequence[float], *, like: Quan
     chosen, so the least of all choices is found, without a start. A law whose stress falls within the range
     is not taken. The law is stated to hold up to the last strain. Sources: Yeoh 1993; Ogden 1972; Austin et
     al. 2015, eq. (1); Lawson and Hanson 1974 (least squares with constants that are not negative).
-
-    Parameters
-    ----------
-    strains
-        Nominal, ascending from above zero, shape (n,), n ≥ 2.
-    stresses
-        Nominal, in Pa, positive, shape (n,).
-    like
-        Gives the constants their source and their spread.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are fewer than two points, or they do not ascend from zero.
     """
     strain, stress = np.asarray(strains, dtype=float), np.asarray(stresses, dtype=float)
     if len(strain) < 2 or len(strain) != len(stress) or np.any(np.diff(strain, prepend=0.0) <= 0.0):
@@ -143,14 +129,7 @@ def _positive(value: Array, width: float) -> Array:
 def _fewest(columns: Array, stress: Array, *, first: tuple[int, ...]) -> tuple[list[int], Array]:
     """Return the columns that follow a curve best with sizes that are not negative, and the sizes.
 
-    Parameters
-    ----------
-    columns
-        Shape (n, m).
-    stress
-        Shape (n,).
-    first
-        Columns that are always there.
+    ``columns``: shape (n, m).
     """
     count = max(1, min(_MOST, len(stress) // 2))
     relative, ones = columns / stress[:, None], np.ones(len(stress))

@@ -49,13 +49,7 @@ class Property:
     conditions: Mapping[str, Quantity]
 
     def at(self, condition: str) -> str:
-        """Return a condition as text; a dash where the source does not state it.
-
-        Parameters
-        ----------
-        condition
-            For instance ``"frequency"``.
-        """
+        """Return a condition as text; a dash where the source does not state it."""
         return self._text(self.conditions[condition]) if condition in self.conditions else "–"
 
     @property
@@ -95,18 +89,7 @@ class Material:
     properties: tuple[Property, ...]
 
     def __getitem__(self, name: str) -> Property:
-        """Return one property.
-
-        Parameters
-        ----------
-        name
-            For instance ``"loss_tangent"``.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest that exists.
-        """
+        """Return one property."""
         for each in self.properties:
             if each.name == name:
                 return each

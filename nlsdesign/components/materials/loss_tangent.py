@@ -298,17 +298,7 @@ def relaxation_of(loss: KnownLoss, loss_tangent: float | None = None) -> Relaxat
     solid with its peak there; a range, or a number without a frequency, gives a flat loss tangent from 0.1 to
     10 Hz.
 
-    Parameters
-    ----------
-    loss
-        As returned by :func:`loss_of`.
-    loss_tangent
-        Of a range, which value; the middle if it is left out. A curve is scaled to this mean.
-
-    Raises
-    ------
-    ValueRangeError
-        If the loss tangent lies outside of its range.
+    ``loss_tangent``: of a range, which value; the middle if it is left out. A curve is scaled to this mean.
     """
     values = loss.known.quantity.values
     frequency = loss.known.conditions.get("frequency")

@@ -93,15 +93,7 @@ class QuasilinearRelaxation(Combination):
 
 
 def relaxation_factor(shares: Array, times: Array, frequency: Array | float) -> NDArray[np.complex128]:
-    """Return 1 + Σ gᵢ·iωτᵢ/(1 + iωτᵢ), the shape of the frequency.
-
-    Parameters
-    ----------
-    shares, times
-        gᵢ and τᵢ in s, shape (n,).
-    frequency
-        In Hz.
-    """
+    """Return 1 + Σ gᵢ·iωτᵢ/(1 + iωτᵢ), the shape of the frequency."""
     turn = 2j * np.pi * np.asarray(frequency)[..., None] * times
     factor: NDArray[np.complex128] = 1.0 + np.sum(shares * turn / (1.0 + turn), axis=-1)
     return factor

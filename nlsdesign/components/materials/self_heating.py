@@ -194,13 +194,7 @@ class LossHeat(Heat):
 
 
 def is_equilibrium(member: Element) -> bool:
-    """Tell whether a law has no memory and no loss: everything in it is elastic.
-
-    Parameters
-    ----------
-    member
-        One of several laws in parallel.
-    """
+    """Tell whether a law has no memory and no loss: everything in it is elastic."""
     leaves = [part for _, part in walk(member) if not part.children()]
     return all(isinstance(leaf, Elastic) for leaf in leaves)
 

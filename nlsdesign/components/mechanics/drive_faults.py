@@ -20,13 +20,7 @@ COMMANDS = (CURRENT, VOLTAGE, ROTATION, TRANSLATION)
 
 
 def command_domain(unit: str) -> Domain | None:
-    """Return the kind of a command, ``None`` for one of another unit.
-
-    Parameters
-    ----------
-    unit
-        Of the command.
-    """
+    """Return the kind of a command, ``None`` for one of another unit."""
     return next((each for each in COMMANDS if same_dimension(each.effort_unit, unit)), None)
 
 

@@ -23,17 +23,7 @@ LEAST = 4
 def held_table(
     row: Sequence[Expression], lowest: Expression, highest: Expression, at: Expression
 ) -> Expression:
-    """Return a uniform cubic B-spline on [lowest, highest], which keeps its end values outside of it.
-
-    Parameters
-    ----------
-    row
-        n control values, of the n − 3 spans.
-    lowest, highest
-        Range.
-    at
-        Argument.
-    """
+    """Return a uniform cubic B-spline on [lowest, highest], which keeps its end values outside of it."""
     inside = ca.fmin(ca.fmax(at, lowest), highest)
     return uniform_spline(row, 0.0, (highest - lowest) / (len(row) - 3), inside - lowest)
 

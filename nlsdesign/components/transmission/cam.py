@@ -85,15 +85,7 @@ class Pulley(Cam):
 
 
 def side_of(angle: Expression, width: Expression) -> tuple[Expression, Expression]:
-    """Return the angle on the side of a two-sided cam, q = √(θ² + w²) − w, and its derivative; both C∞.
-
-    Parameters
-    ----------
-    angle
-        θ.
-    width
-        w, over which one side takes over from the other.
-    """
+    """Return the angle on the side of a two-sided cam, q = √(θ² + w²) − w, and its derivative; both C∞."""
     root = ca.sqrt(angle * angle + width * width)
     # Without cancellation near zero.
     return angle * angle / (root + width), angle / root

@@ -45,13 +45,7 @@ class ComplianceSpline:
         return self.pieces + 2
 
     def matrices(self, torque: Array) -> tuple[Array, Array, Array]:
-        """Return what maps coefficients to deflection and its first two derivatives, shape (n, size) each.
-
-        Parameters
-        ----------
-        torque
-            In N·m, shape (n,), in the range.
-        """
+        """Return what maps coefficients to deflection and its first two derivatives, shape (n, size) each."""
         spline = BSpline(self.knots, np.eye(self.size), 2)
         integral = spline.antiderivative()
         at = np.clip(torque, self.low, self.high)

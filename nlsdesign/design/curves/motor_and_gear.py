@@ -252,15 +252,7 @@ def motor_cycle(
 
 
 def motion_through(cycle: TaskCycle, slope: Array, bend: Array) -> tuple[Array, Array]:
-    """Return speed and acceleration of the gear's output before a spring, in rad/s and rad/s².
-
-    Parameters
-    ----------
-    cycle
-        The task.
-    slope, bend
-        First and second derivative of the deflection by the torque at its torques, shape (n,).
-    """
+    """Return speed and acceleration of the gear's output before a spring, in rad/s and rad/s²."""
     acceleration = cycle.acceleration + slope * cycle.torque_acceleration + bend * cycle.torque_rate**2
     return cycle.speed + slope * cycle.torque_rate, acceleration
 
@@ -268,19 +260,7 @@ def motion_through(cycle: TaskCycle, slope: Array, bend: Array) -> tuple[Array, 
 def driven_cycle(
     cycle: TaskCycle, drive: MotorAndGear, deflection: Array, motion: tuple[Array, Array]
 ) -> MotorCycle:
-    """Return what the motor does where the output of the gear moves in a known way.
-
-    Parameters
-    ----------
-    cycle
-        The task.
-    drive
-        Motor and gear.
-    deflection
-        In rad.
-    motion
-        Speed and acceleration of the output in rad/s and rad/s².
-    """
+    """Return what the motor does where the output of the gear moves in a known way."""
     speed, acceleration = motion
     ratio, inertia = plain(drive.gear_ratio), drive.reflected_inertia
     torque = (cycle.torque + inertia * acceleration) / ratio + plain(drive.damping) * ratio * speed

@@ -308,22 +308,7 @@ class TabulatedTorque(Target):
 
 
 def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tuple[float, ...]) -> Array:
-    """Return the points of a curve over the angle, shape (2, n), after a check of their order.
-
-    Parameters
-    ----------
-    table, what
-        Name of the table and of its values, for messages.
-    angles
-        Ascending from zero, in rad.
-    values
-        One finite number for each angle.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are too few points, or the angles do not ascend from zero.
-    """
+    """Return the points of a curve over the angle, shape (2, n), after a check of their order."""
     points = np.array([angles, values]) if len(angles) == len(values) else np.zeros(0)
     if points.size < 6 or not np.all(np.isfinite(points)):
         raise ValueRangeError(
@@ -341,26 +326,12 @@ def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tup
 
 
 def straight(at: tuple[float, ...], values: tuple[float, ...]) -> PPoly:
-    """Return the straight lines between points.
-
-    Parameters
-    ----------
-    at, values
-        Shape (n,) each, ``at`` ascending.
-    """
+    """Return the straight lines between points."""
     return PPoly(np.array([np.diff(values) / np.diff(at), values[:-1]]), np.array(at))
 
 
 def piecewise(polynomial: PPoly, at: Expression) -> Expression:
-    """Return a piecewise polynomial as an expression; beyond its ends the outer pieces go on.
-
-    Parameters
-    ----------
-    polynomial
-        With its breaks.
-    at
-        Argument, a scalar.
-    """
+    """Return a piecewise polynomial as an expression; beyond its ends the outer pieces go on."""
     inner = [float(item) for item in polynomial.x[1:-1]]
     local = at - ca.pw_const(at, inner, [float(item) for item in polynomial.x[:-1]])
     result = ca.SX(0)

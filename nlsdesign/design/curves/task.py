@@ -46,13 +46,7 @@ class TaskCycle:
     period: float
 
     def over_period(self, values: Array) -> float:
-        """Return the integral over the period; exact to rounding for smooth periodic values.
-
-        Parameters
-        ----------
-        values
-            Shape (n,).
-        """
+        """Return the integral over the period; exact to rounding for smooth periodic values."""
         return float(np.mean(values)) * self.period
 
 

@@ -79,23 +79,11 @@ class TaskProgram:
         return replace(self, freedom=self.freedom @ np.ones((self.freedom.shape[1], 1)))
 
     def coefficients(self, unknowns: Array) -> Array:
-        """Return the coefficients of the spline.
-
-        Parameters
-        ----------
-        unknowns
-            y, shape (m,).
-        """
+        """Return the coefficients of the spline."""
         return self.offset + self.freedom @ unknowns
 
     def motor(self, unknowns: Array) -> MotorCycle:
-        """Return what the motor does with this spring.
-
-        Parameters
-        ----------
-        unknowns
-            y, shape (m,).
-        """
+        """Return what the motor does with this spring."""
         deflection, slope, bend = (
             each @ self.coefficients(unknowns) for each in self.spline.matrices(self.cycle.torque)
         )
@@ -169,18 +157,7 @@ class TaskOptimum:
 
 
 def least_energy(program: TaskProgram) -> TaskOptimum:
-    """Return the spring with the least motor energy per period, and the bound that proves it.
-
-    Parameters
-    ----------
-    program
-        Convex quadratic in its unknowns.
-
-    Raises
-    ------
-    InfeasibleError
-        If the limits contradict each other, named with the amounts; or if the spring has no influence.
-    """
+    """Return the spring with the least motor energy per period, and the bound that proves it."""
     hessian, gradient, constant = program.quadratic()
     if not np.any(hessian):
         raise InfeasibleError(
@@ -258,13 +235,7 @@ def _lowest(hessian: Array, slope: Array, floor: float) -> float:
 
 
 def conflict(program: TaskProgram) -> InfeasibleError:
-    """Return the error for limits that no spring keeps, with the amount by which each alone is missed.
-
-    Parameters
-    ----------
-    program
-        Its limits contradict each other.
-    """
+    """Return the error for limits that no spring keeps, with the amount by which each alone is missed."""
     rows, floor = program.limits(), program.floor
     missed = []
     for each in rows:
@@ -294,16 +265,6 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     Without the inertia of the motor it is convex (linear). From that spring, from the one of least energy and
     from the linear one of least peak power a sequence of linear programs goes down, each within a region in
     which the tangents of the power proved to hold; the best end is taken.
-
-    Parameters
-    ----------
-    program
-        Its unknowns.
-
-    Raises
-    ------
-    InfeasibleError
-        If the limits contradict each other.
     """
     energetic = least_energy(program).unknowns
     starts = [energetic, _without_inertia(program, energetic)]

@@ -69,15 +69,7 @@ class ArcPath:
     def polygon(self, chord_error: float = 1e-6) -> Array:
         """Return points on the path, among them its own, that chords of a given error join.
 
-        Parameters
-        ----------
-        chord_error
-            Largest distance between a chord and its arc in m.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (k, 2); of a closed path the last point is the first.
+        Result: shape (k, 2); of a closed path the last point is the first.
         """
         start, end, bulges = self.ends
         rows = [self.points[:1]]
@@ -106,13 +98,7 @@ class ArcPath:
         return np.vstack(rows)
 
     def turned(self, angle: float) -> ArcPath:
-        """Return the path turned anticlockwise about the centre.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return the path turned anticlockwise about the centre."""
         cosine, sine = math.cos(angle), math.sin(angle)
         return ArcPath(
             self.points @ np.array([[cosine, sine], [-sine, cosine]]), self.bulges, closed=self.closed
@@ -127,28 +113,12 @@ class ArcPath:
 
 
 def line(*points: tuple[float, float] | Array) -> ArcPath:
-    """Return straight lines through points.
-
-    Parameters
-    ----------
-    *points
-        In m.
-    """
+    """Return straight lines through points."""
     return ArcPath(np.array(points, dtype=float), np.zeros(len(points)))
 
 
 def clockwise_arc(centre: Array, radius: float, *, first: float, last: float) -> ArcPath:
-    """Return an arc between two directions of its outward normal (sin φ, cos φ).
-
-    Parameters
-    ----------
-    centre
-        Shape (2,), in m.
-    radius
-        In m.
-    first, last
-        φ in rad, ascending.
-    """
+    """Return an arc between two directions of its outward normal (sin φ, cos φ)."""
     count = max(1, math.ceil((last - first) / 2.0))
     steps = np.linspace(first, last, count + 1)
     points = centre + radius * np.column_stack([np.sin(steps), np.cos(steps)])
@@ -159,12 +129,7 @@ def clockwise_arc(centre: Array, radius: float, *, first: float, last: float) ->
 def joined(*paths: ArcPath, closed: bool = False) -> ArcPath:
     """Return open paths one after the other, with a straight line over any gap.
 
-    Parameters
-    ----------
-    *paths
-        In their order; pieces without length are dropped.
-    closed
-        Whether the last point is led back to the first.
+    ``paths``: in their order; pieces without length are dropped.
     """
     points: list[Array] = []
     bulges: list[float] = []
@@ -182,15 +147,7 @@ def joined(*paths: ArcPath, closed: bool = False) -> ArcPath:
 
 
 def arc_along(start: Array, end: Array, *, tangent: Array) -> float:
-    """Return the bulge of the arc that leaves a point along a tangent and ends in another.
-
-    Parameters
-    ----------
-    start, end
-        Shape (2,), in m.
-    tangent
-        Shape (2,), of any length.
-    """
+    """Return the bulge of the arc that leaves a point along a tangent and ends in another."""
     chord = end - start
     across = float(tangent[0] * chord[1] - tangent[1] * chord[0])
     return math.tan(math.atan2(across, float(tangent @ chord)) / 2.0)
@@ -198,13 +155,6 @@ def arc_along(start: Array, end: Array, *, tangent: Array) -> float:
 
 def biarc(start: Array, end: Array, *, first: Array, last: Array) -> ArcPath:
     """Return the two arcs that join two points with given tangents, without a corner between them.
-
-    Parameters
-    ----------
-    start, end
-        Shape (2,), in m.
-    first, last
-        Unit tangents there, shape (2,).
 
     Notes
     -----
@@ -226,12 +176,7 @@ def biarc(start: Array, end: Array, *, first: Array, last: Array) -> ArcPath:
 def distance_to(points: Array, polygon: Array) -> Array:
     """Return the distance of points to a line of chords, shape (n,), in m.
 
-    Parameters
-    ----------
-    points
-        Shape (n, 2), in m.
-    polygon
-        Shape (k, 2), in m.
+    ``points``: shape (n, 2), in m. ``polygon``: shape (k, 2), in m.
     """
     start, step = polygon[:-1], np.diff(polygon, axis=0)
     away = points[:, None, :] - start
@@ -244,12 +189,7 @@ def distance_to(points: Array, polygon: Array) -> Array:
 def inside_of(point: Array, polygon: Array) -> bool:
     """Tell whether a point lies inside a closed polygon.
 
-    Parameters
-    ----------
-    point
-        Shape (2,), in m.
-    polygon
-        Shape (k, 2), the last point is the first.
+    ``polygon``: shape (k, 2), the last point is the first.
     """
     (x0, y0), (x1, y1) = polygon[:-1].T, polygon[1:].T
     crosses = (y0 > point[1]) != (y1 > point[1])
@@ -261,10 +201,7 @@ def inside_of(point: Array, polygon: Array) -> bool:
 def crossing(polygon: Array) -> Array | None:
     """Return a point in which a closed polygon crosses itself, or ``None``.
 
-    Parameters
-    ----------
-    polygon
-        Shape (k, 2), the last point is the first.
+    ``polygon``: shape (k, 2), the last point is the first.
     """
     start, end = polygon[:-1], polygon[1:]
     count = len(start)

@@ -139,15 +139,7 @@ def _part_texts(
 
 
 def edge_csv(part: CamPart, *, note: str = "") -> str:
-    """Return the lines and arcs of the edges, then the holes, one a row, in mm.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    note
-        One line.
-    """
+    """Return the lines and arcs of the edges, then the holes, one a row, in mm."""
     rows = []
     for index, outline in enumerate(part.outlines, start=1):
         for start, end, radius, centre in zip(*outline.ends[:2], outline.radii, outline.centres, strict=True):
@@ -171,13 +163,7 @@ def edge_csv(part: CamPart, *, note: str = "") -> str:
 
 
 def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
-    """Return the table of the lower right lip; the other three are its mirror images.
-
-    Parameters
-    ----------
-    contour, note, cable_radius
-        As for :func:`write_drawings`.
-    """
+    """Return the table of the lower right lip; the other three are its mirror images."""
     points = contour.surface(cable_radius) * _MM
     table = np.column_stack(
         [
@@ -200,13 +186,7 @@ def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
 
 
 def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
-    """Return a picture at scale 1:1 with both halves, the centre and the cable at rest and at the last angle.
-
-    Parameters
-    ----------
-    contour, note, cable_radius
-        As for :func:`write_drawings`.
-    """
+    """Return a picture at scale 1:1: both halves, the centre, the cable at rest and at the last angle."""
     reach = 1.15 * float(contour.radii.max()) * _MM + 4.0
     last = float(contour.angles[-1])
     halves = [_polygon(half) for half in contour.outlines(cable_radius=cable_radius)]
@@ -229,13 +209,7 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
 
 
 def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
-    """Return both halves as closed polylines on the layer ``CONTOUR``, in millimetres.
-
-    Parameters
-    ----------
-    contour, note, cable_radius
-        As for :func:`write_drawings`.
-    """
+    """Return both halves as closed polylines on the layer ``CONTOUR``, in millimetres."""
     taken = f"cable radius {cable_radius * _MM:.6g} mm taken off" if cable_radius else "cable's centre line"
     lines = [f"Cam contour, {taken}; millimetres, 1:1", "no edge to be cut: without channel and run-out"]
     return contour_dxf(contour.outlines(cable_radius=cable_radius), lines=[*lines, note] if note else lines)

@@ -17,21 +17,7 @@ _MM = 1e3
 
 
 def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[ArcPath, ArcPath]:
-    """Return the lower and the upper half, each closed and clockwise.
-
-    Parameters
-    ----------
-    lip
-        Lower right lip.
-    numbers
-        ``cable_radius``, ``channel_width``, ``tool_radius``, ``corner_radius``, ``body_radius`` and, where
-        the cable has a ferrule on the axis, ``ferrule_seat``.
-
-    Raises
-    ------
-    ValueRangeError
-        If the channel has no room, or the lip turns back under itself.
-    """
+    """Return the lower and the upper half, each closed and clockwise."""
     end = _end_circle(lip, numbers)
     if lip.last_direction >= math.pi:
         raise ValueRangeError(
@@ -59,21 +45,7 @@ def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[A
 
 
 def one_sided_outline(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:
-    """Return the outline of a one-sided cam, closed and clockwise.
-
-    Parameters
-    ----------
-    lip
-        Edge under the cable.
-    numbers
-        ``cable_radius``, ``lead_in``, ``corner_radius``, ``body_radius``, ``minimum_wall`` and, where the
-        cable has a ferrule, ``ferrule_seat``.
-
-    Raises
-    ------
-    ArrangementError
-        If lip, lead-in and body cannot be joined by a convex back.
-    """
+    """Return the outline of a one-sided cam, closed and clockwise."""
     phi, corner = lip.first_direction, numbers["corner_radius"].number
     along = np.array([math.cos(phi), -math.sin(phi)])
     start = lip.path.points[0] - numbers["lead_in"].number * along

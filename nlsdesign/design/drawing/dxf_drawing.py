@@ -38,15 +38,7 @@ _TEXT_HEIGHT = 1.8
 
 
 def part_dxf(part: CamPart, *, note: str = "") -> str:
-    """Return a cam as it is made; the numbers of the file are millimetres, and it says so.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    note
-        One line, for instance a fingerprint.
-    """
+    """Return a cam as it is made; the numbers of the file are millimetres, and it says so."""
     document = _document()
     space = document.modelspace()
     for outline in part.outlines:
@@ -66,12 +58,7 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
 def contour_dxf(outlines: tuple[Array, ...], *, lines: list[str]) -> str:
     """Return closed polygons on the layer ``CONTOUR``.
 
-    Parameters
-    ----------
-    outlines
-        Each of shape (n, 2) in m; the last point is the first.
-    lines
-        What to write below.
+    ``outlines``: each of shape (n, 2) in m; the last point is the first.
     """
     document = _document()
     for outline in outlines:

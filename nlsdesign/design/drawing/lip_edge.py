@@ -48,20 +48,6 @@ def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> Li
     """Return the edge on which a cable has its centre line on the contour.
 
     Beyond the last angle the edge goes on as an arc with the last radius of curvature.
-
-    Parameters
-    ----------
-    contour
-        Of the cable's centre line.
-    cable_radius
-        In m.
-    over_travel
-        Angle of the cam beyond the last one in rad over which the cable still lies on the run-out.
-
-    Raises
-    ------
-    ValueRangeError
-        If the contour is concave or sharper than the cable, or the run-out reaches the anchor.
     """
     _check_curvature(contour, cable_radius)
     phi = contour.directions

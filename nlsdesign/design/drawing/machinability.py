@@ -18,20 +18,7 @@ _SLACK = 3e-6
 
 
 def check_machinable(part: CamPart) -> None:
-    """Refuse a part that cannot be made as drawn.
-
-    Parameters
-    ----------
-    part
-        The cam.
-
-    Raises
-    ------
-    ArrangementError
-        If an edge crosses itself, or a bore would cut the channel.
-    ValueRangeError
-        If a radius, a wall, a hole or the plate does not fit.
-    """
+    """Refuse a part that cannot be made as drawn."""
     _check_plate(part)
     _check_edges(part)
     _check_tool(part)

@@ -441,15 +441,7 @@ def _cable(contour: Contour, angle: float, beyond: float) -> Array:
 
 
 def as_quantity(given: Quantity | float, unit: str = "m") -> Quantity:
-    """Return a quantity.
-
-    Parameters
-    ----------
-    given
-        A quantity, or a number in SI.
-    unit
-        SI unit of a bare number.
-    """
+    """Return a quantity."""
     return given if isinstance(given, Quantity) else Quantity(given, unit)
 
 

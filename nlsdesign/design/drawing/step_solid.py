@@ -25,19 +25,7 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
 
     The base plate lies from z = 0 up, the lips on it; holes through the base alone end below them.
 
-    Parameters
-    ----------
-    part
-        The cam.
-    name
-        Name of the product in the file; what is neither letter nor digit becomes ``_``.
-
-    Raises
-    ------
-    MissingLibraryError
-        If Open CASCADE is not installed.
-    ExportError
-        If Open CASCADE makes no solid, or cannot write it.
+    ``name``: name of the product in the file; what is neither letter nor digit becomes ``_``.
     """
     name = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
     try:

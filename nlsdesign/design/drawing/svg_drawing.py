@@ -12,15 +12,7 @@ _TEXT = 2.2
 
 
 def part_svg(part: CamPart, *, note: str = "") -> str:
-    """Return a cam as it is made, at scale 1:1, its cable at angle zero and at both ends of the contour.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    note
-        One line, for instance a fingerprint.
-    """
+    """Return a cam as it is made, at scale 1:1, its cable at angle zero and at both ends of the contour."""
     reach = 1.12 * _MM * max(part.outermost, *(float(np.abs(cable.points).max()) for cable in part.cables))
     body = []
     if part.base_radius:
@@ -53,14 +45,8 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
 def page(reach: float, body: list[str], *, lines: list[str]) -> str:
     """Return a square page about the axis with some lines of text below.
 
-    Parameters
-    ----------
-    reach
-        Half the width of the drawing in mm.
-    body
-        Elements in mm with y upwards.
-    lines
-        Text below the drawing; the first is the title too.
+    ``reach``: half the width of the drawing in mm. ``body``: elements in mm with y upwards. ``lines``: text
+    below the drawing; the first is the title too.
     """
     lines = [_escaped(line) for line in lines if line]
     longest = max(len(line) for line in lines)
@@ -92,13 +78,7 @@ def page(reach: float, body: list[str], *, lines: list[str]) -> str:
 
 
 def path_data(path: ArcPath) -> str:
-    """Return the path in mm as the data of an SVG path, y upwards.
-
-    Parameters
-    ----------
-    path
-        In m.
-    """
+    """Return the path in mm as the data of an SVG path, y upwards."""
     points, (_, ends, bulges) = path.points * _MM, path.ends
     steps = [f"M {points[0][0]:.5f} {points[0][1]:.5f}"]
     for (x, y), bulge, radius in zip(ends * _MM, bulges, np.abs(path.radii) * _MM, strict=True):

@@ -142,22 +142,7 @@ def job_of(text: str, file: Path) -> DesignJob:
 
 
 def job_in(deck: Deck) -> DesignJob:
-    """Return what is asked of a design by tables that were read; see :func:`job_of`.
-
-    Parameters
-    ----------
-    deck
-        Tables of a design file, with their places.
-
-    Raises
-    ------
-    DeckError
-        If a table is of the wrong kind; file, line and column are named.
-    UnknownNameError
-        If there is no such table, limit, goal, target or field, with the nearest that exists.
-    NlsError
-        If a number is refused by what it is for, with its place.
-    """
+    """Return what is asked of a design by tables that were read; see :func:`job_of`."""
     file = deck.path
     for key in deck.tables:
         if key not in _TABLES:
@@ -184,13 +169,7 @@ def job_in(deck: Deck) -> DesignJob:
 
 
 def kinds(base: type) -> dict[str, type]:
-    """Return the classes that can be named in a design file, by name.
-
-    Parameters
-    ----------
-    base
-        Of targets, limits or goals.
-    """
+    """Return the classes that can be named in a design file, by name."""
     result: dict[str, type] = {}
     kind: type
     for kind in base.__subclasses__():
@@ -249,28 +228,7 @@ def _of_kinds(deck: Deck, key: str, base: type[Asked], table: Mapping[str, Any])
 
 
 def built(deck: Deck, kind: type, given: object, place: str) -> Any:
-    """Return the object of a table.
-
-    Parameters
-    ----------
-    deck
-        The file.
-    kind
-        A dataclass.
-    given
-        Its fields by name.
-    place
-        For messages.
-
-    Raises
-    ------
-    DeckError
-        If it is no table, or a field is missing.
-    UnknownNameError
-        If there is no such field.
-    NlsError
-        If a field is refused.
-    """
+    """Return the object of a table."""
     if not isinstance(given, Mapping):
         raise DeckError(
             place, f"{brief(given)} is not a table", next_step='write it as {field = "number unit", ...}'

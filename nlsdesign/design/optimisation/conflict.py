@@ -21,21 +21,6 @@ def feasible_point(search: Search, free: Sequence[str]) -> Array:
     Every limit gets a slack, and the sum of the slacks, each relative to the size of its limit, is made as
     small as possible. Where it does not vanish, each limit that has a price is relaxed alone, and each number
     that is held is freed alone.
-
-    Parameters
-    ----------
-    search
-        Whose starts all failed.
-    free
-        What may change in it.
-
-    Raises
-    ------
-    InfeasibleError
-        With the names of the limits in conflict, how much each would have to give, in its own unit, and which
-        number to free.
-    ConvergenceError
-        If the solver finds no answer.
     """
     loose = Loosened(search, free, largest_error=None, best=None)
     every = range(len(loose.bounds))
@@ -71,13 +56,7 @@ def feasible_point(search: Search, free: Sequence[str]) -> Array:
 
 
 def names_of(bounds: Iterable[Bound]) -> list[str]:
-    """Return the names of the limits of some bounds, each once.
-
-    Parameters
-    ----------
-    bounds
-        In any order.
-    """
+    """Return the names of the limits of some bounds, each once."""
     return list(dict.fromkeys(bound.limit for bound in bounds))
 
 

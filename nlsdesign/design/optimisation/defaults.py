@@ -62,14 +62,6 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
 
 
 def with_defaults(keep: Sequence[Limit], defaults: Sequence[Limit]) -> tuple[Limit, ...]:
-    """Return the limits asked for, and those defaults of whose kind none was asked for.
-
-    Parameters
-    ----------
-    keep
-        Asked for.
-    defaults
-        Otherwise.
-    """
+    """Return the limits asked for, and those defaults of whose kind none was asked for."""
     kinds = {type(limit) for limit in keep}
     return (*keep, *(limit for limit in defaults if type(limit) not in kinds))

@@ -81,13 +81,7 @@ class SolvedSearch:
         return self.rms(self.best)
 
     def rms(self, outcome: Solution) -> float:
-        """Return the torque error in N·m at a solution.
-
-        Parameters
-        ----------
-        outcome
-            Of this search, or of the same with knots rounded otherwise.
-        """
+        """Return the torque error in N·m at a solution."""
         problem = self.search.problem
         square = problem.evaluate(problem.design.mean_square_error, outcome.point)[0]
         return float(np.sqrt(max(square, 0.0)))
@@ -150,13 +144,7 @@ class SolvedSearch:
 
 
 def narrowed(solved: SolvedSearch) -> SolvedSearch:
-    """Return the design on a law whose knots are rounded less, where the rounding shows in the torque.
-
-    Parameters
-    ----------
-    solved
-        On the law with which the search began.
-    """
+    """Return the design on a law whose knots are rounded less, where the rounding shows in the torque."""
     for _ in range(_NARROWED):
         target, rounding = solved.search.problem.design.target, solved.search.rounding
         finer = solved.search.question.finer(rounding)
@@ -175,13 +163,7 @@ def narrowed(solved: SolvedSearch) -> SolvedSearch:
 
 
 def finished(solved: SolvedSearch) -> CamDesign:
-    """Return the finished design.
-
-    Parameters
-    ----------
-    solved
-        With its best solution.
-    """
+    """Return the finished design."""
     search, problem, best = solved.search, solved.search.problem, solved.best
     contour, fit = solved.contour_fit
     settings, design = search.question.settings, problem.design
@@ -403,17 +385,7 @@ def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Conto
 
 
 def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitState:
-    """Return how a design stands to a limit.
-
-    Parameters
-    ----------
-    problem
-        Its problem.
-    bound
-        One side of the limit.
-    point
-        Shape (variables,), scaled.
-    """
+    """Return how a design stands to a limit."""
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale

@@ -17,25 +17,7 @@ from .design_point import DesignPoint, anchor_of
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """One side of a limit on one quantity: expression ≤ value (upper) or ≥ value.
-
-    Parameters
-    ----------
-    limit
-        Name of the limit.
-    of
-        What is bounded, in words.
-    expression
-        Column of any length, in SI.
-    value
-        Bound in SI.
-    upper
-        Which side.
-    unit
-        Unit in which it is shown.
-    scale
-        Typical size in SI.
-    """
+    """One side of a limit on one quantity: expression ≤ value (upper) or ≥ value."""
 
     limit: str
     of: str
@@ -46,13 +28,7 @@ class Bound:
     scale: float
 
     def shown(self, value: float) -> str:
-        """Return a number in the unit of the limit as text.
-
-        Parameters
-        ----------
-        value
-            In SI.
-        """
+        """Return a number in the unit of the limit as text."""
         return with_unit(f"{value / parse_unit(self.unit).factor:.4g}", self.unit)
 
     def __str__(self) -> str:

@@ -48,15 +48,7 @@ def _outwards(value: float, upper: bool) -> float:
 
 @dataclass(frozen=True)
 class Give:
-    """How far one limit would have to move for all others to be kept.
-
-    Parameters
-    ----------
-    bound
-        The limit.
-    amount
-        In SI, positive.
-    """
+    """How far one limit would have to move for all others to be kept."""
 
     bound: Bound
     amount: float
@@ -153,14 +145,7 @@ class Loosened:
     def least(self, names: Sequence[str], slacks: Sequence[int], start: Array | None = None) -> Solution:
         """Return where the sum of some slacks is least; the solution says whether it is one.
 
-        Parameters
-        ----------
-        names
-            Candidates that may move; the others stay as declared.
-        slacks
-            Indices of the limits that may give.
-        start
-            Where to begin, before the starts of the whole.
+        ``names``: candidates that may move; the others stay as declared.
         """
         lower, upper = self._box(names)
         allowed = np.isin(np.arange(len(self.bounds)), slacks)
@@ -176,27 +161,14 @@ class Loosened:
     def several(
         self, questions: Sequence[tuple[Sequence[str], Sequence[int]]], start: Array | None = None
     ) -> list[Solution]:
-        """Return the answers to several questions, side by side on the cores.
-
-        Parameters
-        ----------
-        questions
-            Names and slacks as for :meth:`least`.
-        start
-            As for :meth:`least`.
-        """
+        """Return the answers to several questions, side by side on the cores."""
         self.program.prepare()
         return list(parallel_map(lambda k: self.least(*questions[k], start), len(questions)))
 
     def designed(self, names: Sequence[str], outcome: Solution) -> Freed:
         """Return freed numbers at the best design with them, found from a solution of :meth:`least`.
 
-        Parameters
-        ----------
-        names
-            Of candidates.
-        outcome
-            With them freed; where no better design is found from there, its own values count.
+        ``outcome``: with them freed; where no better design is found from there, its own values count.
         """
         lower, upper = self._box(names)
         point = outcome.point[: self.count]
@@ -205,15 +177,7 @@ class Loosened:
         return freed if better.solved and freed.error is not None else self.freed(names, outcome)
 
     def freed(self, names: Sequence[str], outcome: Solution) -> Freed:
-        """Return freed numbers with their values at a solution.
-
-        Parameters
-        ----------
-        names
-            Of candidates.
-        outcome
-            Of :meth:`least`.
-        """
+        """Return freed numbers with their values at a solution."""
         values = self.open.problem.named(outcome.point[: self.count])
         shown = tuple(self.open.problem.design.shown_units[name] for name in names)
         error = None
@@ -223,15 +187,7 @@ class Loosened:
         return Freed(tuple(names), tuple(values[name] for name in names), shown, error)
 
     def give(self, index: int, outcome: Solution) -> Give:
-        """Return how far a limit gives at a solution.
-
-        Parameters
-        ----------
-        index
-            Of the limit.
-        outcome
-            Of :meth:`least`.
-        """
+        """Return how far a limit gives at a solution."""
         return Give(self.bounds[index], float(outcome.point[self.count + index]) * self.bounds[index].scale)
 
     def _box(self, names: Sequence[str]) -> tuple[Array, Array]:

@@ -99,15 +99,7 @@ class Program:
     iterations: int = 300
 
     def with_unknowns(self, symbols: Expression, lower: float, upper: float) -> Program:
-        """Return a copy with more unknowns at the end, all between the same bounds.
-
-        Parameters
-        ----------
-        symbols
-            Column.
-        lower, upper
-            Bounds.
-        """
+        """Return a copy with more unknowns at the end, all between the same bounds."""
         count = symbols.shape[0]
         return replace(
             self,
@@ -126,14 +118,8 @@ class Program:
     ) -> Solution:
         """Solve from a starting point.
 
-        Parameters
-        ----------
-        start
-            Shape (n,).
-        lower, upper
-            Other bounds of the unknowns, shape (n,); an unknown is held where they are equal.
-        parameters
-            Numbers for the parameters of the program, if it has any.
+        ``lower``, ``upper``: other bounds of the unknowns, shape (n,); an unknown is held where they are
+        equal.
         """
         sizes = [r.expression.shape[0] for r in self.rows]
         answer = self._solver(
@@ -153,15 +139,7 @@ class Program:
     def solve_all(
         self, starts: Sequence[Array], progress: Callable[[], None] = lambda: None
     ) -> list[Solution]:
-        """Solve from several starting points side by side on the cores; the order is kept.
-
-        Parameters
-        ----------
-        starts
-            Shape (n,) each.
-        progress
-            Called after each.
-        """
+        """Solve from several starting points side by side on the cores; the order is kept."""
         outcomes = []
         self.prepare()
         for outcome in parallel_map(lambda number: self.solve(starts[number]), len(starts)):

@@ -332,13 +332,7 @@ def _in_its_unit(state: LimitState) -> LimitState:
 
 
 def design_frames(design: CamDesign) -> dict[str, Any]:
-    """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    """
+    """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`."""
     rows = [
         (name if len(q.values) == 1 else f"{name}[{k}]", each, q.unit, q.source, q.spread)
         for name, q in design.changes
@@ -369,13 +363,7 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
 
 
 def result_rows(design: CamDesign) -> list[tuple[str, str]]:
-    """Return what a design prints: pairs of text.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    """
+    """Return what a design prints: pairs of text."""
     target, check, curves, rho = design.target, design.check, design.curves, design.contour.radii_of_curvature
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"

@@ -72,14 +72,7 @@ class SizeRange:
 def size_ranges(search: Search, best: Array, rms: float) -> tuple[SizeRange, ...]:
     """Return the range of each free size over which the target is met as well, by two more solutions each.
 
-    Parameters
-    ----------
-    search
-        That found the design.
-    best
-        Where, shape (variables,).
-    rms
-        Its torque error in N·m; more than this, or 1 ‰ of the largest torque, is not allowed on the way.
+    ``rms``: its torque error in N·m; more than this, or 1 ‰ of the largest torque, is not allowed on the way.
     """
     problem = search.problem
     if not problem.scalars:

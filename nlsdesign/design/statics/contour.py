@@ -178,12 +178,7 @@ class Contour:
 def turn(points: Array, angle: float) -> Array:
     """Turn points about the centre.
 
-    Parameters
-    ----------
-    points
-        Shape (n, 2).
-    angle
-        In rad, anticlockwise.
+    ``points``: shape (n, 2).
     """
     cosine, sine = np.cos(angle), np.sin(angle)
     result: Array = points @ np.array([[cosine, sine], [-sine, cosine]])

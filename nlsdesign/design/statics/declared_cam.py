@@ -56,13 +56,7 @@ class CamFit:
 
 @dataclass(frozen=True)
 class DeclaredCam(ABC, Generic[Made]):
-    """A cam of an assembly as the design sees it.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    """
+    """A cam of an assembly as the design sees it."""
 
     part: Made
 
@@ -80,26 +74,15 @@ class DeclaredCam(ABC, Generic[Made]):
     def contour(self, last_angle: float | None, points: int) -> Contour:
         """Return the contour, without the change of sides or the onset near angle zero.
 
-        Parameters
-        ----------
-        last_angle
-            In rad; the end of the cam's table for ``None``.
-        points
-            Number of points.
+        ``last_angle``: in rad; the end of the cam's table for ``None``.
         """
 
     @abstractmethod
     def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam like this one with a given lever arm.
 
-        Parameters
-        ----------
-        angles, lever_arms
-            Shape (n,); angles ascend from zero.
-        count
-            Number of control values.
-        anchor
-            Another distance of the anchor in m; its own for ``None``.
+        ``angles``, ``lever_arms``: shape (n,); angles ascend from zero. ``anchor``: another distance of the
+        anchor in m; its own for ``None``.
         """
 
 
@@ -240,13 +223,6 @@ class DesignedCam:
     The contour of the fitted cam ripples: it is the second derivative of a spline that follows the lever arm
     of the designed contour to micrometres, through the change of sides near angle zero. What is cut is the
     designed one.
-
-    Parameters
-    ----------
-    part
-        The declared cam.
-    designed
-        The contour.
     """
 
     part: Cam
@@ -288,18 +264,7 @@ class _Designed(DeclaredCam[Cam]):
 
 
 def declared_cam(part: object) -> DeclaredCam[Any]:
-    """Return a cam of an assembly as the design sees it.
-
-    Parameters
-    ----------
-    part
-        Any part.
-
-    Raises
-    ------
-    ArrangementError
-        If it has no contour.
-    """
+    """Return a cam of an assembly as the design sees it."""
     if isinstance(part, DesignedCam):
         return _Designed(part.part, part.designed)
     if isinstance(part, TwoSidedCam):
@@ -317,12 +282,7 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
 def with_contour(part: object, contour: Contour | None) -> object:
     """Return a part as what the design sees of it: with its contour where that was designed.
 
-    Parameters
-    ----------
-    part
-        Declared cam.
-    contour
-        That it was fitted to; ``None`` where that is not known.
+    ``contour``: that it was fitted to; ``None`` where that is not known.
     """
     return DesignedCam(part, contour) if contour is not None and isinstance(part, Cam) else part
 
@@ -391,17 +351,7 @@ def cam_from_profile(
 
 
 def spline_basis(at: Array, last: float, count: int) -> Array:
-    """Return the values of all uniform cubic B-splines of a cam, shape (n, count).
-
-    Parameters
-    ----------
-    at
-        Angles, shape (n,).
-    last
-        End of the table.
-    count
-        Number of control values.
-    """
+    """Return the values of all uniform cubic B-splines of a cam, shape (n, count)."""
     return _basis_derivative(at, last, count, 0)
 
 

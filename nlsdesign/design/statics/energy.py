@@ -34,25 +34,7 @@ _JUST_ABOVE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class CamProfile:
-    """Lever arm over the angle and what the elements do meanwhile; arrays of shape (n,), in SI.
-
-    Parameters
-    ----------
-    angles
-        From zero to the last angle of the target.
-    extensions
-        δ(θ), counted from angle zero.
-    lever_arms
-        h(θ); the first is the limit from above.
-    forces
-        Force of one element.
-    torques
-        N·h·F.
-    elements
-        N.
-    pretension
-        e₀.
-    """
+    """Lever arm over the angle and what the elements do meanwhile; arrays of shape (n,), in SI."""
 
     angles: Array
     extensions: Array
@@ -76,22 +58,8 @@ def energy_profile(
 ) -> CamProfile:
     """Return the closed-form cam for the rubber, pretension and number of elements of an actuator.
 
-    Parameters
-    ----------
-    actuator
-        Assembly with a cam spring; its present cam does not matter.
-    target
-        Torque curve.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-    points
-        Number of angles.
-
-    Raises
-    ------
-    InfeasibleError
-        If the rubber cannot store the energy below the target, or carries no force at angle zero that
-        could give its slope.
+    ``actuator``: assembly with a cam spring; its present cam does not matter. ``spring``: path of the cam
+    spring; decided from the structure if it is left out.
     """
     model = flatten(actuator)
     law = elastic_law(model, spring)
@@ -105,28 +73,7 @@ def energy_profile(
 def closed_form(
     law: ElasticLaw, target: Target, *, elements: float, pretension: float = 0.0, points: int = 401
 ) -> CamProfile:
-    """Return the closed-form cam for an elastic law.
-
-    Parameters
-    ----------
-    law
-        Equilibrium law of one element.
-    target
-        Torque curve.
-    elements
-        Number of equal elements.
-    pretension
-        Extension at angle zero in m.
-    points
-        Number of angles.
-
-    Raises
-    ------
-    InfeasibleError
-        As :func:`energy_profile`.
-    ValueRangeError
-        If fewer than three angles are asked for.
-    """
+    """Return the closed-form cam for an elastic law."""
     if points < 3:
         raise ValueRangeError(f"points = {points}", "a profile needs at least three angles")
     angles = np.linspace(0.0, target.last_angle, points)

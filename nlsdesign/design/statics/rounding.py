@@ -19,27 +19,14 @@ _CORNERS = (ca.OP_FMAX, ca.OP_FMIN, ca.OP_FABS)
 
 
 def has_corners(function: ca.Function) -> bool:
-    """Tell whether a function of SX contains a maximum, minimum or absolute value.
-
-    Parameters
-    ----------
-    function
-        Any.
-    """
+    """Tell whether a function of SX contains a maximum, minimum or absolute value."""
     return any(function.instruction_id(k) in _CORNERS for k in range(function.n_instructions()))
 
 
 def rounded(function: ca.Function, samples: list[Array], share: float) -> ca.Function:
     """Return a function of SX with all corners rounded.
 
-    Parameters
-    ----------
-    function
-        Of columns.
-    samples
-        For each argument typical values, shape (argument, samples) or (argument,).
-    share
-        Width of the rounding relative to the largest distance from the corner among the samples.
+    ``samples``: for each argument typical values, shape (argument, samples) or (argument,).
     """
     arguments = [ca.SX.sym(function.name_in(i), function.size1_in(i)) for i in range(function.n_in())]
     _, distances = _rewritten(function, arguments, [])

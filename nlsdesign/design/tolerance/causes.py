@@ -15,13 +15,7 @@ from ...foundation.quantity import parse_unit, with_unit
 
 
 def shown_unit(unit: str) -> str:
-    """Return the unit in which a length, an area or a stress of a spring is shown.
-
-    Parameters
-    ----------
-    unit
-        In SI.
-    """
+    """Return the unit in which a length, an area or a stress of a spring is shown."""
     return {"m": "mm", "m^2": "mm^2", "Pa": "MPa"}.get(unit, unit)
 
 
@@ -181,11 +175,6 @@ class WaveCause(Cause):
     """An error of the contour's support function, a·cos(kπφ/φ_e) over the direction φ of the cable.
 
     With k = 0 it is an offset: a tool of another radius, or a thicker cable.
-
-    Parameters
-    ----------
-    order
-        k.
     """
 
     order: int
@@ -209,22 +198,6 @@ def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: 
 
     Each cause draws from a generator of its own, seeded by the seed and its name, so that another cause more
     or less, or another design with the same names, changes no other deviation.
-
-    Parameters
-    ----------
-    causes
-        In the order of the columns.
-    count
-        Number of draws.
-    seed
-        Any whole number from zero.
-    reading
-        How spreads are read.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (count, causes).
     """
     columns = [reading.drawn(np.random.default_rng([seed, *cause.name.encode()]), count) for cause in causes]
     return np.column_stack(columns) if columns else np.zeros((count, 0))

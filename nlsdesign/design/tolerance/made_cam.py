@@ -99,13 +99,7 @@ class MadeCam:
         return float(np.max(np.hypot(self.lever_arms, self._slopes))) * (1.0 + _CLEARANCE)
 
     def shape(self, cause: Cause) -> Callable[[Array, Array], Array] | None:
-        """Return the error of the contour per standard deviation over u and φ; None for other causes.
-
-        Parameters
-        ----------
-        cause
-            Any.
-        """
+        """Return the error of the contour per standard deviation over u and φ; None for other causes."""
         if isinstance(cause, ProfileCause):
             profile = self.profiles[cause.name]
             return lambda u, _: profile(u)
@@ -117,22 +111,8 @@ class MadeCam:
     def deviating(self, causes: Sequence[Cause], deviations: Array) -> tuple[Array, Array]:
         """Return lever arms and extensions of made cams.
 
-        Parameters
-        ----------
-        causes
-            Of any kind; those that are not of the cam are passed over.
-        deviations
-            In units of the standard deviations, shape (draws, causes).
-
-        Returns
-        -------
-        tuple of numpy.ndarray
-            Each of shape (draws, n), in m.
-
-        Raises
-        ------
-        ConvergenceError
-            If the point of contact is not found.
+        ``causes``: of any kind; those that are not of the cam are passed over. ``deviations``: in units of
+        the standard deviations, shape (draws, causes). Result: each of shape (draws, n), in m.
         """
         draws = len(deviations)
         shapes = [
@@ -159,13 +139,7 @@ class MadeCam:
         return np.append(0, np.arange(_FINER + 1, _FINER + len(self.angles)))
 
     def distance(self, causes: Sequence[Cause], deviations: Array) -> Array:
-        """Return the distance of the anchors of made springs, shape (draws,), in m.
-
-        Parameters
-        ----------
-        causes, deviations
-            As for :meth:`deviating`.
-        """
+        """Return the distance of the anchors of made springs, shape (draws,), in m."""
         moves = [c.deviation if isinstance(c, AnchorCause) else 0.0 for c in causes]
         result: Array = self.anchor + deviations @ np.array(moves)
         return result
@@ -208,10 +182,7 @@ class MadeCam:
     def sensitivity(self, cause: Cause) -> tuple[Array, Array]:
         """Return dh and dδ per standard deviation of a cause, to first order, shape (n,) each, in m.
 
-        Parameters
-        ----------
-        cause
-            Of any kind; one that is not of the cam changes nothing.
+        ``cause``: of any kind; one that is not of the cam changes nothing.
         """
         root = np.sqrt(self.anchor**2 - self.lever_arms**2)
         if isinstance(cause, AnchorCause):
@@ -230,16 +201,7 @@ class MadeCam:
 def made_cam(law: ElasticLaw, cam: ca.Function, angles: Array, causes: Sequence[Cause]) -> MadeCam:
     """Return the contour of a declared cam.
 
-    Parameters
-    ----------
-    law
-        Behind the cam; only its names and numbers are used.
-    cam
-        (angle, parameters) -> (lever arm, extension).
-    angles
-        From zero, shape (n,), in rad.
-    causes
-        Whose declared numbers of the cam are wanted.
+    ``law``: behind the cam; only its names and numbers are used.
     """
     numbers, names = law.numbers, [v.name for v in law.parameters]
     anchored = law.cam.anchor_distance

@@ -109,15 +109,7 @@ class MadeSpring:
     def rms(self, torques: Array) -> Array:
         """Return the root of the mean over angle and stroke of the squared error.
 
-        Parameters
-        ----------
-        torques
-            Shape (draws, columns), in N·m.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (draws,), in N·m.
+        ``torques``: shape (draws, columns), in N·m.
         """
         result: Array = np.sqrt((torques - self.wanted) ** 2 @ self.weights)
         return result
@@ -125,10 +117,7 @@ class MadeSpring:
     def held(self, deviations: Array) -> int:
         """Return in how many draws a number had to be held at the end of its range.
 
-        Parameters
-        ----------
-        deviations
-            In units of the standard deviations, shape (draws, causes).
+        ``deviations``: in units of the standard deviations, shape (draws, causes).
         """
         free = self.numbers + deviations @ self._amounts
         outside = np.any((free < self.ranges[:, 0]) | (free > self.ranges[:, 1]), axis=1)
@@ -138,22 +127,8 @@ class MadeSpring:
     def torques(self, deviations: Array, touched: tuple[Array, Array] | None = None) -> Array:
         """Return the torque of made springs.
 
-        Parameters
-        ----------
-        deviations
-            In units of the standard deviations, shape (draws, causes).
-        touched
-            Lever arms and extensions, where they are known already.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (draws, columns), in N·m.
-
-        Raises
-        ------
-        ConvergenceError
-            If the point of contact of cable and cam is not found.
+        ``deviations``: in units of the standard deviations, shape (draws, causes). Result: shape (draws,
+        columns), in N·m.
         """
         arms, longer = touched or self.contour.deviating(self.causes, deviations)
         numbers = np.clip(self.numbers + deviations @ self._amounts, self.ranges[:, 0], self.ranges[:, 1])
@@ -218,27 +193,7 @@ def made_spring(
 ) -> MadeSpring:
     """Return the springs that are made from a model's numbers.
 
-    Parameters
-    ----------
-    model
-        Flat model of the actuator.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-    target
-        Torque curve.
-    causes
-        What deviates, and what may be trimmed.
-    angles
-        Number of angles from zero to the last one of the target.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no cam spring of that name.
-    ArrangementError
-        If the structure does not decide.
-    ConvergenceError
-        If the inner states of the rubber find no equilibrium.
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     law = elastic_law(model, spring)
     cam, grid = law.cam, np.linspace(0.0, target.last_angle, angles)

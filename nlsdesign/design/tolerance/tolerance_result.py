@@ -52,13 +52,6 @@ def quantile(errors: Array, share: float) -> QuantileEstimate:
 
     The number of draws below the true quantile is binomial, whatever the distribution, so two of the ordered
     draws enclose it.
-
-    Parameters
-    ----------
-    errors
-        Shape (draws,).
-    share
-        Between 0 and 1.
     """
     ordered, count = np.sort(errors), len(errors)
     fewer = bdtr(np.arange(count + 1), count, share)

@@ -118,25 +118,8 @@ def trimmed(
     The error over the angle is nearly linear in the trim, so Gauss and Newton's step is used, with the
     change of the torque in the step before as derivative.
 
-    Parameters
-    ----------
-    spring
-        As made.
-    deviations
-        In units of the standard deviations, shape (draws, causes); the column of the trim is zero.
-    column
-        Of the trim.
-    ends
-        Range of the number as set, in SI.
-    touched
-        Lever arms and extensions before the trim, where they are known already.
-    start
-        Trim of similar springs.
-
-    Raises
-    ------
-    ArrangementError
-        If the number does not change the torque.
+    ``deviations``: in units of the standard deviations, shape (draws, causes); the column of the trim is
+    zero.
     """
     cause = spring.causes[column]
     if not np.max(np.abs(spring.sensitivities[column])) > 1e-12 * np.max(np.abs(spring.wanted)):
@@ -205,13 +188,7 @@ class _TrimSearch:
 def trim_range(
     spring: MadeSpring, deviations: Array, *, column: int, ends: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Return the least and largest trim of each spring in units of its cause, shape (draws,) each.
-
-    Parameters
-    ----------
-    spring, deviations, column, ends
-        As for :func:`trimmed`.
-    """
+    """Return the least and largest trim of each spring in units of its cause, shape (draws,) each."""
     cause = spring.causes[column]
     start = cause.nominal + deviations @ _moves(spring, column)
     return (ends[0] - start) / cause.deviation, (ends[1] - start) / cause.deviation

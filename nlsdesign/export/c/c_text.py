@@ -41,13 +41,7 @@ class Real(StrEnum):
 
     @classmethod
     def named(cls, name: str) -> Real:
-        """Return the type of that name, ``"double"`` or ``"float"``.
-
-        Raises
-        ------
-        ExportError
-            If there is none of that name.
-        """
+        """Return the type of that name, ``"double"`` or ``"float"``."""
         if name not in tuple(cls):
             raise ExportError(
                 f"real='{name}'",
@@ -81,13 +75,7 @@ class Real(StrEnum):
             return float(np.float32(value)) if self is Real.FLOAT else float(value)
 
     def literal(self, value: float) -> str:
-        """Return a number as C text that reads back as the same number; an infinite one as ``INFINITY``.
-
-        Raises
-        ------
-        ExportError
-            For NaN, and for a finite number that is infinite in this type.
-        """
+        """Return a number as C text that reads back as the same number; an infinite one as ``INFINITY``."""
         if math.isnan(value):
             raise ExportError(
                 "the equations", "contain the constant NaN", next_step="correct the law that contains it"

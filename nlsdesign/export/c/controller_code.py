@@ -68,13 +68,7 @@ def export_c(
 
 
 def check_discrete(model: FlatModel) -> None:
-    """Raise unless a model is discrete, smooth and free of time, as a step needs it.
-
-    Raises
-    ------
-    ExportError
-        Naming what a step cannot do.
-    """
+    """Raise unless a model is discrete, smooth and free of time, as a step needs it."""
     if model.switching is not None and model.switching.jumps:
         raise ExportError(
             f"model '{model.name}': '{model.switching.jumps[0]}'",

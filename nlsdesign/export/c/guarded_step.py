@@ -117,13 +117,7 @@ def reading_numbers(variable: Variable, sample_time: float, real: Real) -> Readi
 
 
 def mover(model: FlatModel, variable: Variable) -> tuple[str, int] | None:
-    """Return the group, ``"inputs"`` or ``"states"``, and the index of what moves a measured reading.
-
-    Raises
-    ------
-    ExportError
-        If the name is neither an input nor a state.
-    """
+    """Return the group, ``"inputs"`` or ``"states"``, and the index of what moves a measured reading."""
     name = variable.plausibility.moved_by if variable.plausibility is not None else None
     if name is None:
         return None

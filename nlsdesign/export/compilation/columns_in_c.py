@@ -106,13 +106,7 @@ class _Given:
 
 
 def sampled_run_in_c(graph: ColumnGraph) -> ColumnsInC:
-    """Return C code of a run of samples, for many columns.
-
-    Parameters
-    ----------
-    graph
-        (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
-    """
+    """Return C code of a run of samples, for many columns."""
     written = [filled("columns.c", {"width": str(WIDTH)})]
     if graph.tables:
         written.append(shell("columns_look_up.c"))

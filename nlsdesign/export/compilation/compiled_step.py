@@ -38,33 +38,11 @@ class Natively:
     """
 
     def __call__(self, function: ca.Function) -> ca.Function:
-        """Return a function as compiled code.
-
-        Parameters
-        ----------
-        function
-            Any CasADi function that can be written in C.
-
-        Raises
-        ------
-        ExportError
-            If the compiler is missing or fails, or its result cannot be loaded.
-        """
+        """Return a function as compiled code."""
         return _step(function)
 
     def columns(self, graph: ColumnGraph) -> ColumnRun:
-        """Return compiled code that runs samples of many columns.
-
-        Parameters
-        ----------
-        graph
-            (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
-
-        Raises
-        ------
-        ExportError
-            If the compiler is missing or fails, or its result cannot be loaded.
-        """
+        """Return compiled code that runs samples of many columns."""
         return CompiledColumns(sampled_run_in_c(graph), kept=len(graph.results[1]))
 
 
@@ -95,11 +73,6 @@ class CompiledColumns:
         With a function ``run``, and the numbers that are given to it.
     kept
         How many values are kept of a sample.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or fails, or its result cannot be loaded.
     """
 
     def __init__(self, code: ColumnsInC, kept: int) -> None:
@@ -114,14 +87,8 @@ class CompiledColumns:
     def __call__(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
         """Return the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
 
-        Parameters
-        ----------
-        state
-            Shape (states, columns).
-        given
-            Shape (T, given, columns).
-        parameter
-            Shape (parameters, columns).
+        ``state``: shape (states, columns). ``given``: shape (T, given, columns). ``parameter``: shape
+        (parameters, columns).
         """
         count = state.shape[1]
         after, inputs, numbers = (_filled_up(each) for each in (state, given, parameter))

@@ -26,11 +26,6 @@ class CompiledStep:
     parameters
         Parameters in the order of the model; those of the design by default.
 
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or reports an error.
-
     Examples
     --------
     >>> step = CompiledStep(export_c(observer, "out/c"))  # doctest: +SKIP
@@ -60,33 +55,14 @@ class CompiledStep:
     def __call__(self, inputs: Sequence[float]) -> tuple[Array, int]:
         """Advance by one sample.
 
-        Parameters
-        ----------
-        inputs
-            Shape (inputs,).
-
-        Returns
-        -------
-        tuple
-            Outputs, shape (outputs,), and the status word.
+        Result: outputs, shape (outputs,), and the status word.
         """
         outputs = self._array([0.0] * len(self._source.model.outputs))
         status = self._library.adapter_step(self._state, self._array(inputs), outputs)
         return self._plain(outputs, len(self._source.model.outputs)), int(status)
 
     def set_parameters(self, parameters: Sequence[float]) -> int:
-        """Change the parameters of the running instance.
-
-        Parameters
-        ----------
-        parameters
-            Shape (parameters,).
-
-        Returns
-        -------
-        int
-            Status word.
-        """
+        """Change the parameters of the running instance."""
         return int(self._library.adapter_set_parameters(self._state, self._array(parameters)))
 
     @property

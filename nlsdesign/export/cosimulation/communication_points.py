@@ -18,13 +18,7 @@ _SAME = 1e-9
 
 
 def sample_times(period: float, stop: float) -> Array:
-    """Return the samples of an instance from 0 to the end.
-
-    Parameters
-    ----------
-    period, stop
-        Sample time and end in s.
-    """
+    """Return the samples of an instance from 0 to the end."""
     return np.arange(math.floor(stop / period + 1e-6) + 1.0) * period
 
 
@@ -40,22 +34,6 @@ def communication_points(
 
     What lies between two samples is divided into equal steps no longer than asked for, so step and sample
     times are independent; sample times need not be multiples of each other.
-
-    Parameters
-    ----------
-    stop, step
-        End and longest step in s.
-    periods
-        Sample times in s.
-    changes
-        Sample time and delay in s of sampled values that change an input between samples.
-    parts
-        Parts into which each step is divided once more.
-
-    Raises
-    ------
-    ValueRangeError
-        If there would be too many.
     """
     rhythms = [(period, 0.0) for period in sorted(set(periods))] + sorted(set(changes))
     expected = parts * (stop / step + sum(stop / period for period, _ in rhythms))
@@ -87,13 +65,7 @@ def _merged(times: Array, stop: float, same: float) -> Array:
 
 
 def rows_of(points: Array, times: Array) -> NDArray[np.int64]:
-    """Return the numbers of the points that are nearest to times.
-
-    Parameters
-    ----------
-    points, times
-        In s, ascending.
-    """
+    """Return the numbers of the points that are nearest to times."""
     after = np.clip(np.searchsorted(points, times), 1, max(1, len(points) - 1))
     nearer = np.abs(points[after - 1] - times) <= np.abs(points[np.minimum(after, len(points) - 1)] - times)
     return np.where(nearer, after - 1, np.minimum(after, len(points) - 1))

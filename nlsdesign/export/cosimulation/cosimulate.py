@@ -83,13 +83,7 @@ class CoSimulation:
     ends: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Array:
-        """Return one recorded signal.
-
-        Parameters
-        ----------
-        name
-            ``instance.variable``.
-        """
+        """Return one recorded signal."""
         return self.trace[name]
 
     @property
@@ -349,17 +343,7 @@ class _Run:
 def unpacked_fmus(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, FmuDescription]:
     """Unpack all archives and read their descriptions.
 
-    Parameters
-    ----------
-    fmus
-        FMU by name of the instance.
-    folder
-        Gets a folder for each; its owner removes it.
-
-    Raises
-    ------
-    ExportError
-        If an FMU is damaged, or the name of an instance is not one word.
+    ``folder``: gets a folder for each; its owner removes it.
     """
     descriptions: dict[str, FmuDescription] = {}
     for number, (name, path) in enumerate(fmus.items()):
@@ -372,22 +356,7 @@ def unpacked_fmus(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, Fmu
 
 
 def check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
-    """Check that an order is empty or names each instance once.
-
-    Parameters
-    ----------
-    order
-        Names of instances.
-    fmus
-        By name of the instance.
-
-    Raises
-    ------
-    UnknownNameError
-        If an instance does not exist, with the nearest that does.
-    ValueRangeError
-        If some are missing or named twice.
-    """
+    """Check that an order is empty or names each instance once."""
     for name in order:
         if name not in fmus:
             raise unknown_name("instance in order", name, fmus)
@@ -401,24 +370,7 @@ def check_signals(
     inputs: Mapping[str, Signal],
     parameters: Mapping[str, float],
 ) -> None:
-    """Check that what is given from outside exists and is driven once.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    wires, inputs
-        Wires and signals by target.
-    parameters
-        By ``instance.variable``.
-
-    Raises
-    ------
-    UnknownNameError
-        If an input or parameter does not exist, with the nearest that does.
-    ExportError
-        If an input is driven twice.
-    """
+    """Check that what is given from outside exists and is driven once."""
     valid = {
         "signal for input": (inputs, ends(descriptions, "input")),
         "parameter": (parameters, ends(descriptions)),

@@ -51,15 +51,7 @@ class Coupling(Protocol):
         ...
 
     def step(self, system: Steppable, time: float, length: float) -> None:
-        """Take one step.
-
-        Parameters
-        ----------
-        system
-            All instances stand at the communication point.
-        time, length
-            Communication point and step in s.
-        """
+        """Take one step."""
         ...
 
 

@@ -74,21 +74,7 @@ class GivenFeed:
 
 @dataclass(frozen=True, eq=False)
 class HeldFeed:
-    """The value that stands in ``now``.
-
-    Parameters
-    ----------
-    now
-        Present values.
-    column
-        Of the source.
-    gain
-        Factor.
-    samples
-        What the source has computed so far; where it is given, the input keeps ``first`` before its first.
-    first
-        Start value of the input.
-    """
+    """The value that stands in ``now``."""
 
     now: Array
     column: int
@@ -189,26 +175,14 @@ class Curve:
     """Largest absolute value so far."""
 
     def arrive(self, time: float, value: float) -> None:
-        """Note the value at the end of a step.
-
-        Parameters
-        ----------
-        time, value
-            In s, and in the unit of the output.
-        """
+        """Note the value at the end of a step."""
         self.times.append(time)
         self.ends.append(value)
         self.begins.append(value)
         self.size = max(self.size, abs(value))
 
     def depart(self, value: float) -> None:
-        """Note the value at the same time after sampled inputs have changed.
-
-        Parameters
-        ----------
-        value
-            In the unit of the output.
-        """
+        """Note the value at the same time after sampled inputs have changed."""
         self.begins[-1] = value
 
     def past_slope(self) -> float:
@@ -218,13 +192,7 @@ class Curve:
         return (self.ends[-1] - self.begins[-2]) / (self.times[-1] - self.times[-2])
 
     def at(self, time: float) -> float:
-        """Return the value at a time, linear between what is known and along the slope beyond.
-
-        Parameters
-        ----------
-        time
-            In s, not before the first.
-        """
+        """Return the value at a time, linear between what is known and along the slope beyond."""
         if time >= self.times[-1]:
             return self.begins[-1] + self.slope * (time - self.times[-1])
         after = max(1, bisect_right(self.times, time))
@@ -235,21 +203,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class CurveFeed:
-    """A continuous output.
-
-    Parameters
-    ----------
-    now
-        Present values.
-    curve
-        Of the source.
-    gain
-        Factor.
-    delay
-        In s.
-    first
-        Value of the input before the first value arrives through a delay.
-    """
+    """A continuous output."""
 
     now: Array
     curve: Curve

@@ -20,22 +20,7 @@ MOST_BYTES = 2**30
 def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
     """Unpack an archive into a folder.
 
-    Parameters
-    ----------
-    what
-        The archive in messages.
-    archive
-        File.
-    folder
-        New; its owner removes it.
-    needs
-        Entry that must be there.
-
-    Raises
-    ------
-    ExportError
-        If the file is no archive or damaged, lacks the entry, would unpack to more than the limits, or has
-        an entry that is a link, appears twice or leads out of the folder.
+    ``folder``: new; its owner removes it.
     """
     try:
         with zipfile.ZipFile(archive) as opened:

@@ -94,22 +94,7 @@ class FmuDescription:
 
 
 def read_description(instance: str, archive: Path, folder: Path) -> FmuDescription:
-    """Read the description of an FMU that was unpacked.
-
-    Parameters
-    ----------
-    instance
-        Name of the instance, for messages.
-    archive
-        The FMU, for messages.
-    folder
-        Where it was unpacked.
-
-    Raises
-    ------
-    ExportError
-        If it is no valid co-simulation FMU of FMI 2.0 or 3.0, or states no possible sample time.
-    """
+    """Read the description of an FMU that was unpacked."""
     what = f"instance '{instance}' ({archive})"
     try:
         read = fmpy.read_model_description(str(folder))
@@ -134,18 +119,7 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
 
 
 def check_library(description: FmuDescription) -> None:
-    """Check that there is a binary for this machine.
-
-    Parameters
-    ----------
-    description
-        Of the FMU.
-
-    Raises
-    ------
-    ExportError
-        If there is none.
-    """
+    """Check that there is a binary for this machine."""
     if not description.library.is_file():
         place = description.library.parent.relative_to(description.folder).as_posix()
         raise ExportError(

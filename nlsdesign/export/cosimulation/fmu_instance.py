@@ -28,11 +28,6 @@ class FmuInstance(LoadedFmu):
         Of the FMU.
     watch
         Told what is called, so that a crash can be explained.
-
-    Raises
-    ------
-    ExportError
-        If its library cannot be loaded or instantiated, or lacks a function.
     """
 
     def __init__(self, description: FmuDescription, watch: Watch) -> None:
@@ -43,18 +38,7 @@ class FmuInstance(LoadedFmu):
             raise ExportError(f"instance '{self.name}'", f"could not be made: {error}") from error
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Set variables.
-
-        Parameters
-        ----------
-        values
-            Numbers by name.
-
-        Raises
-        ------
-        ExportError
-            With the message of the FMU if it refuses.
-        """
+        """Set variables."""
         for name, value in values.items():
             variable = self.description.variables[name]
             self.watch(self.number, Activity.SETTING)
@@ -69,12 +53,7 @@ class FmuInstance(LoadedFmu):
     def setter(self, names: Sequence[str], values: Array) -> Callable[[], None]:
         """Return a function that sets real variables to what an array holds when it is called.
 
-        Parameters
-        ----------
-        names
-            Of real variables.
-        values
-            Shape (n,), contiguous; the function reads it.
+        ``values``: shape (n,), contiguous; the function reads it.
         """
         variables = [self.description.variables[name] for name in names]
         call = self._access("fmi2SetReal" if self.two else "fmi3SetFloat64", variables, values.ctypes.data)
@@ -83,12 +62,7 @@ class FmuInstance(LoadedFmu):
     def reader(self, variables: Sequence[FmuScalar], values: Array) -> Callable[[], None]:
         """Return a function that reads variables into an array when it is called.
 
-        Parameters
-        ----------
-        variables
-            Reals first, then integers.
-        values
-            Shape (n,), contiguous; the function writes it.
+        ``values``: shape (n,), contiguous; the function writes it.
         """
         reals = [v for v in variables if v.kind == "real"]
         integers = [v for v in variables if v.kind != "real"]
@@ -151,18 +125,7 @@ class FmuInstance(LoadedFmu):
         return step
 
     def step(self, time: float, length: float) -> None:
-        """Advance by one communication step.
-
-        Parameters
-        ----------
-        time, length
-            Communication point and step in s.
-
-        Raises
-        ------
-        ConvergenceError
-            With the message of the FMU if it cannot.
-        """
+        """Advance by one communication step."""
         self.watch(self.number, _STEPPING)
         status = self._step(time, length)
         if status > _WARNING:
@@ -177,25 +140,13 @@ class FmuInstance(LoadedFmu):
             return self.fmu.getFMUstate() if self.two else self.fmu.getFMUState()
 
     def restore_state(self, state: Any) -> None:
-        """Go back to a state that was kept.
-
-        Parameters
-        ----------
-        state
-            From :meth:`keep_state`.
-        """
+        """Go back to a state that was kept."""
         self.watch(self.number, Activity.ROLLING_BACK)
         with self.explained("going back to an earlier state"):
             (self.fmu.setFMUstate if self.two else self.fmu.setFMUState)(state)
 
     def forget_state(self, state: Any) -> None:
-        """Free a state that was kept.
-
-        Parameters
-        ----------
-        state
-            From :meth:`keep_state`.
-        """
+        """Free a state that was kept."""
         self.watch(self.number, Activity.ROLLING_BACK)
         with self.explained("freeing a state"):
             (self.fmu.freeFMUstate if self.two else self.fmu.freeFMUState)(state)

@@ -6,13 +6,7 @@ _LONGEST = 300
 
 
 def fit_to_show(text: object) -> str:
-    """Return text in one line of printable characters, cut where it is long.
-
-    Parameters
-    ----------
-    text
-        Whatever a file or a library says.
-    """
+    """Return text in one line of printable characters, cut where it is long."""
     whole = str(text)
     line = " ".join("".join(c if c.isprintable() else " " for c in whole[: 4 * _LONGEST]).split())
     return line if len(line) <= _LONGEST else f"{line[:_LONGEST]} ..."

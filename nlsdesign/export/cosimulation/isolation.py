@@ -86,28 +86,14 @@ class Watch:
     cells: Any = field(default_factory=lambda: memoryview(mmap.mmap(-1, 32)).cast("q"))
 
     def __call__(self, instance: int, activity: int) -> None:
-        """Note a call that begins.
-
-        Parameters
-        ----------
-        instance
-            Its number in the names.
-        activity
-            An :class:`Activity`.
-        """
+        """Note a call that begins."""
         cells = self.cells
         cells[0] = instance
         cells[1] = activity
         cells[3] += 1
 
     def at_row(self, row: int) -> None:
-        """Note how far the work is.
-
-        Parameters
-        ----------
-        row
-            Number of the row that is being filled.
-        """
+        """Note how far the work is."""
         self.cells[2] = row
 
     @property
@@ -152,15 +138,7 @@ class IsolatedWork:
     progress: Progress
 
     def result(self) -> Array:
-        """Do the work and return the array, shape (rows, columns).
-
-        Raises
-        ------
-        NlsError
-            What the work raised.
-        ExportError
-            If a library crashes, ends the process, or does not return in time.
-        """
+        """Do the work and return the array, shape (rows, columns)."""
         rows = len(self.times)
         memory = mmap.mmap(-1, max(1, 8 * rows * self.columns))
         array: Array = np.frombuffer(memory, dtype=np.float64, count=rows * self.columns)
@@ -297,13 +275,7 @@ class _Child:
         return self._ended
 
     def ended_within(self, seconds: float) -> None:
-        """Wait for its end, so that its own way to end is known.
-
-        Parameters
-        ----------
-        seconds
-            At most.
-        """
+        """Wait for its end, so that its own way to end is known."""
         until = time.monotonic() + seconds
         while not self.ended() and time.monotonic() < until:
             time.sleep(0.001)

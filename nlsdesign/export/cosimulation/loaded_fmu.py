@@ -28,11 +28,6 @@ class LoadedFmu:
         Of the FMU.
     watch
         Told what is called, so that a crash can be explained.
-
-    Raises
-    ------
-    ExportError
-        If its library cannot be loaded or instantiated.
     """
 
     def __init__(self, description: FmuDescription, watch: Watch) -> None:
@@ -94,15 +89,7 @@ class LoadedFmu:
     def explained(
         self, what: str, kind: type[ExportError] | type[ConvergenceError] = ExportError
     ) -> Iterator[None]:
-        """Raise what the FMU refuses within with its own message.
-
-        Parameters
-        ----------
-        what
-            Is done.
-        kind
-            Of the error.
-        """
+        """Raise what the FMU refuses within with its own message."""
         try:
             yield
         except FMICallException as error:
@@ -111,10 +98,7 @@ class LoadedFmu:
     def begin(self, start: float, stop: float | None) -> None:
         """Enter the initialization mode.
 
-        Parameters
-        ----------
-        start, stop
-            Times in s; ``None`` without an end.
+        ``start``, ``stop``: times in s; ``None`` without an end.
         """
         self.watch(self.number, Activity.INITIALIZING)
         with self.explained("initialization"):
@@ -144,13 +128,5 @@ class LoadedFmu:
 
 
 def why(messages: Sequence[str], error: object) -> str:
-    """Return the last message of the FMU, or the error without one, made fit to be shown.
-
-    Parameters
-    ----------
-    messages
-        Of the FMU.
-    error
-        What is said without any.
-    """
+    """Return the last message of the FMU, or the error without one, made fit to be shown."""
     return fit_to_show(messages[-1] if messages else error)

@@ -52,25 +52,7 @@ class Given:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Everything that a run needs to know.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    links
-        All wires.
-    signals
-        Signals from outside by input.
-    parameters
-        By ``instance.variable``.
-    order
-        Of sampled instances that are due at the same time; empty if all read before any computes.
-    points
-        Communication points in s.
-    coupling
-        Of continuous instances.
-    """
+    """Everything that a run needs to know."""
 
     descriptions: Mapping[str, FmuDescription]
     links: tuple[Link, ...]
@@ -87,13 +69,7 @@ class Plan:
         return [*shown, *(link.target for link in self.links), *self.signals]
 
     def sampled(self, name: str) -> bool:
-        """Tell whether an instance, or the instance of a variable, is sampled.
-
-        Parameters
-        ----------
-        name
-            Of an instance, or ``instance.variable``.
-        """
+        """Tell whether an instance, or the instance of a variable, is sampled."""
         return self.descriptions[split_name(name)[0]].sample_time is not None
 
     @property
@@ -112,13 +88,7 @@ class Plan:
         return any(link.fresh and not link.delay and not self.sampled(link.target) for link in self.links)
 
     def curved(self, link: Link) -> bool:
-        """Tell whether the source of a wire is continuous.
-
-        Parameters
-        ----------
-        link
-            Wire.
-        """
+        """Tell whether the source of a wire is continuous."""
         return not self.sampled(link.source)
 
 
@@ -129,19 +99,7 @@ def points_of(
     step: float,
     parts: int = 1,
 ) -> Array:
-    """Return the communication points of a system in s.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    links
-        All wires.
-    stop, step
-        End and longest step in s.
-    parts
-        Parts into which each step is divided once more.
-    """
+    """Return the communication points of a system in s."""
     periods = {name: each.sample_time for name, each in descriptions.items() if each.sample_time is not None}
     changes = {
         (periods[split_name(link.source)[0]], link.delay)

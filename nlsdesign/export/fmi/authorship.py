@@ -108,15 +108,7 @@ class Authorship:
 
 
 def described(description: str, origin: Origin | None) -> str:
-    """Return the description of a model with its deck.
-
-    Parameters
-    ----------
-    description
-        Of the model.
-    origin
-        Deck behind the model.
-    """
+    """Return the description of a model with its deck."""
     if origin is None:
         return description
     return f"{description} (deck {origin.deck}, SHA-256 {origin.digest[:SHORT_DIGEST]})"

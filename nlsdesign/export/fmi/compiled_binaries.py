@@ -33,28 +33,7 @@ def compiled_binaries(
 ) -> dict[str, bytes]:
     """Return the shared library of an FMU for each platform, from the cache where nothing changed.
 
-    Parameters
-    ----------
-    sources
-        All C files by name.
-    main
-        The one to compile; it includes the others.
-    folder
-        Temporary folder to work in.
-    name
-        Of the library, without its extension.
-    platforms
-        Machines to build for.
-
-    Returns
-    -------
-    dict
-        Content of the library by name of the platform.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or finds a mistake.
+    ``main``: the one to compile; it includes the others.
     """
 
     def binary(platform: Platform) -> bytes:

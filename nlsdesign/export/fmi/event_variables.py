@@ -13,23 +13,12 @@ def located_switches(model: FlatModel) -> tuple[Switch, ...]:
     """Return the switches whose changes an importer has to locate.
 
     A model with corners only has none: an integrator gets across them, at the cost of shorter steps.
-
-    Parameters
-    ----------
-    model
-        Any.
     """
     return model.switching.switches if model.switching is not None and model.switching.jumps else ()
 
 
 def indicator_variables(model: FlatModel) -> list[Variable]:
-    """Return an event indicator for each located switch.
-
-    Parameters
-    ----------
-    model
-        Any.
-    """
+    """Return an event indicator for each located switch."""
     names = _names(located_switches(model))
     return [
         Variable(f"{name}.indicator", "1", f"Not negative as long as the mode of {name} lasts, in SI units")
@@ -38,13 +27,7 @@ def indicator_variables(model: FlatModel) -> list[Variable]:
 
 
 def mode_variables(model: FlatModel) -> list[Variable]:
-    """Return the mode of each located switch: −1, 0 or 1.
-
-    Parameters
-    ----------
-    model
-        Any.
-    """
+    """Return the mode of each located switch: −1, 0 or 1."""
     switches = located_switches(model)
     return [
         Variable(f"{name}.mode", "1", f"Mode of {name}: {_words(switch)}", minimum=-1.0, maximum=1.0)

@@ -40,25 +40,11 @@ class Dependence:
     nonlinear: int = 0
 
     def joined(self, other: Dependence) -> Dependence:
-        """Return the dependence of a sum.
-
-        Parameters
-        ----------
-        other
-            Of the other term.
-        """
+        """Return the dependence of a sum."""
         return Dependence(self.on | other.on, self.scaled | other.scaled, self.nonlinear | other.nonlinear)
 
     def times(self, factor: Dependence, changing: int) -> Dependence:
-        """Return the part of a product's dependence that comes through this operand.
-
-        Parameters
-        ----------
-        factor
-            Of the other operand.
-        changing
-            The symbols that change while the model runs.
-        """
+        """Return the part of a product's dependence that comes through this operand."""
         if not factor.on:
             return self
         return Dependence(self.on, self.on, self.on if factor.on & changing else self.nonlinear)
@@ -71,20 +57,8 @@ class Dependence:
 def dependences(function: ca.Function, symbols: Sequence[Sequence[int]], changing: int) -> list[Dependence]:
     """Return how each nonzero of the first result of an SX function depends on symbols.
 
-    Parameters
-    ----------
-    function
-        The function.
-    symbols
-        For each argument the number of the symbol that each element stands for. Looked-up numbers stand for
-        the argument of their table, and are nonlinear.
-    changing
-        Bits of the symbols that change while the model runs.
-
-    Returns
-    -------
-    list
-        One for each nonzero.
+    ``symbols``: for each argument the number of the symbol that each element stands for. Looked-up numbers
+    stand for the argument of their table, and are nonlinear.
     """
     looked_up = len(symbols) - 1
 
@@ -112,18 +86,6 @@ def ranges(function: ca.Function, bounds: Sequence[Sequence[Interval]]) -> list[
     """Return an interval that holds each nonzero of the first result, by interval arithmetic.
 
     The interval may be wider than the values that occur, never narrower.
-
-    Parameters
-    ----------
-    function
-        An SX function.
-    bounds
-        Range of each element of each argument.
-
-    Returns
-    -------
-    list
-        One for each nonzero.
     """
     return _walk(
         function,

@@ -115,21 +115,7 @@ def fmu_texts(
 ) -> dict[str, bytes]:
     """Return everything in an FMU but the binaries.
 
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    version
-        ``"3.0"`` or ``"2.0"``.
-    step
-        Communication step of the default experiment in s.
-    authorship
-        Author, licence and date. The date has no part in the token.
-
-    Returns
-    -------
-    dict
-        Content by path within the FMU.
+    ``authorship``: author, licence and date. The date has no part in the token.
     """
     variables, about = layout(model), authorship or Authorship()
 
@@ -185,13 +171,7 @@ def _binaries(
 
 
 def universal_binary(parts: Mapping[str, bytes]) -> bytes:
-    """Return one macOS library for several processors, which FMI 2.0 has only one folder for.
-
-    Parameters
-    ----------
-    parts
-        Mach-O libraries by platform name.
-    """
+    """Return one macOS library for several processors, which FMI 2.0 has only one folder for."""
     # (processor type, subtype) as in <mach/machine.h>; the header is big-endian, slices start on 16 KiB.
     processors = {"x86_64-darwin": (0x01000007, 3), "aarch64-darwin": (0x0100000C, 0)}
     align = 14

@@ -17,15 +17,7 @@ ORIGIN_FORMAT = "nlsdesign origin 1"
 
 
 def with_origin(model: FlatModel, contents: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the contents of an FMU with one file more, which says where they come from.
-
-    Parameters
-    ----------
-    model
-        In the FMU.
-    contents
-        Everything else in the archive, by path.
-    """
+    """Return the contents of an FMU with one file more, which says where they come from."""
     record = {
         "format": ORIGIN_FORMAT,
         "generator": f"nlsdesign {version()}",

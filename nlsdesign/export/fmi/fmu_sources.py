@@ -18,22 +18,7 @@ from .fmu_variables import FmuLayout
 
 
 def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
-    """Return the sources by file name; the shell ``fmi2.c`` or ``fmi3.c`` is the only one to be compiled.
-
-    Parameters
-    ----------
-    layout
-        Variables of the FMU.
-    version
-        ``"2.0"`` or ``"3.0"``.
-    token
-        Instantiation token.
-
-    Raises
-    ------
-    ExportError
-        If the model cannot be written in C.
-    """
+    """Return the sources by file name; the shell ``fmi2.c`` or ``fmi3.c`` is the only one to be compiled."""
     model = layout.model
     main = main_source(version)
     texts = {name: shell(name) for name in (main, "instance.c", "exchange.c", "saved_state.c")}
@@ -57,13 +42,7 @@ def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
 
 
 def main_source(version: str) -> str:
-    """Return the name of the file to compile.
-
-    Parameters
-    ----------
-    version
-        ``"2.0"`` or ``"3.0"``.
-    """
+    """Return the name of the file to compile."""
     return "fmi2.c" if version == "2.0" else "fmi3.c"
 
 

@@ -107,18 +107,7 @@ class FmuLayout:
 
 
 def layout(model: FlatModel) -> FmuLayout:
-    """Return the variables of the FMU of a model.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-
-    Raises
-    ------
-    ExportError
-        If a name is not allowed by FMI, or two different things have one name.
-    """
+    """Return the variables of the FMU of a model."""
     continuous = model.sample_time is None
     changing = "continuous" if continuous else "discrete"
     _check_names(model)

@@ -57,19 +57,7 @@ def reference_results(model: FlatModel, *, step: float | None = None) -> Referen
     Each input swings by a quarter of its typical size about its start value, the first with two periods, the
     next with three and so on; the motion of a body that is moved from outside fits its rate.
 
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    step
-        Communication step in s; by default 1 ms, or the sample time, the only one for a discrete model.
-
-    Raises
-    ------
-    ValueRangeError
-        If the step is not positive, or not the sample time of a discrete model.
-    ConvergenceError
-        If the model cannot be simulated.
+    ``step``: communication step in s; by default 1 ms, or the sample time, the only one for a discrete model.
     """
     length = step if step is not None else (model.sample_time or 1e-3)
     if not (math.isfinite(length) and length > 0.0):

@@ -33,13 +33,7 @@ Sizes = dict[str, float]
 
 
 def typical_sizes(model: FlatModel) -> Sizes:
-    """Return the typical size of each variable but the parameters, ``der(name)`` for derivatives, in SI.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    """
+    """Return the typical size of each variable but the parameters, ``der(name)`` for derivatives, in SI."""
     sizes = {v.name: size for v in (*model.states, *model.inputs) if (size := _stated(v))}
     if model.sample_time is None:
         _of_machine(model, sizes)
@@ -59,15 +53,7 @@ def typical_sizes(model: FlatModel) -> Sizes:
 
 
 def with_sizes(variables: Sequence[Variable], sizes: Mapping[str, float]) -> tuple[Variable, ...]:
-    """Return variables with these typical sizes.
-
-    Parameters
-    ----------
-    variables
-        Of the model.
-    sizes
-        By name.
-    """
+    """Return variables with these typical sizes."""
     return tuple(replace(v, nominal=sizes[v.name]) for v in variables)
 
 

@@ -39,20 +39,7 @@ class ModelicaEquations:
 
 
 def modelica_equations(model: FlatModel, names: Mapping[str, str]) -> ModelicaEquations:
-    """Return the equations of a continuous model.
-
-    Parameters
-    ----------
-    model
-        Continuous, without tables.
-    names
-        Modelica names of all its variables.
-
-    Raises
-    ------
-    ExportError
-        If a law uses an operation that Modelica does not have.
-    """
+    """Return the equations of a continuous model."""
     steps, results = read_instructions(model.equations)
     groups = (model.states, model.outputs, model.signals)
     given = {v.name for group in (model.states, model.inputs, model.parameters) for v in group}

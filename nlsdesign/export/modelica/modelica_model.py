@@ -61,18 +61,7 @@ def export_modelica(model: FlatModel, path: str | Path) -> Path:
 
 
 def modelica_text(model: FlatModel) -> str:
-    """Return a continuous model as Modelica text.
-
-    Parameters
-    ----------
-    model
-        Continuous and smooth.
-
-    Raises
-    ------
-    ExportError
-        If it is not, or uses an operation that Modelica does not have.
-    """
+    """Return a continuous model as Modelica text."""
     _refuse(model)
     groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
     names = quoted_names(v.name for group in groups for v in group)

@@ -44,13 +44,7 @@ class Term:
     number: str = ""
 
     def inside(self, least: int) -> str:
-        """Return the text, in brackets where it holds together less than is needed.
-
-        Parameters
-        ----------
-        least
-            Strength that is needed.
-        """
+        """Return the text, in brackets where it holds together less than is needed."""
         return self.text if self.strength >= least else f"({self.text})"
 
     def as_number(self) -> Term:
@@ -78,15 +72,7 @@ class Term:
 
 
 def kept(name: str, value: Term) -> Term:
-    """Return the term of a variable that holds a value, a truth value as 1 or 0.
-
-    Parameters
-    ----------
-    name
-        Of the variable.
-    value
-        That it holds.
-    """
+    """Return the term of a variable that holds a value, a truth value as 1 or 0."""
     if value.opposite is None:
         return Term(name)
     return Term(f"{name} > 0.5", RELATION, (f"{name} <= 0.5", RELATION), events=True, number=name)
@@ -152,17 +138,7 @@ WRITTEN_TWICE = SERIES | {ca.OP_EQ, ca.OP_NE}
 def term(operation: int, operands: Sequence[Term]) -> Term:
     """Return the text of an operation.
 
-    Parameters
-    ----------
-    operation
-        Code of CasADi.
-    operands
-        What it takes; CasADi names two also where there is one.
-
-    Raises
-    ------
-    ExportError
-        If Modelica has no such operation.
+    ``operands``: what it takes; CasADi names two also where there is one.
     """
     used = list(operands[:1] if operation in _UNARY else operands)
     size = 1 + sum(each.size for each in used)

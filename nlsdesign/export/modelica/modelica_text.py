@@ -26,10 +26,7 @@ _KEYWORDS = frozenset(
 def class_name(text: str) -> str:
     """Return a plain Modelica identifier made from a name.
 
-    Parameters
-    ----------
-    text
-        Any name; other characters become ``_``.
+    ``text``: any name; other characters become ``_``.
     """
     name = re.sub(r"[^A-Za-z0-9_]", "_", text) or "_"
     if name[0].isdigit():
@@ -39,11 +36,6 @@ def class_name(text: str) -> str:
 
 def quoted_names(names: Iterable[str]) -> dict[str, str]:
     """Return quoted Modelica identifiers, which may hold dots and brackets; different for different names.
-
-    Parameters
-    ----------
-    names
-        Full names.
 
     Examples
     --------
@@ -63,18 +55,7 @@ def quoted_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def literal(value: float) -> str:
-    """Return a number that reads back as the same number; an infinite one becomes the largest finite one.
-
-    Parameters
-    ----------
-    value
-        Any number but NaN.
-
-    Raises
-    ------
-    ExportError
-        If it is NaN, for which Modelica has no literal.
-    """
+    """Return a number that reads back as the same number; an infinite one becomes the largest finite one."""
     if value != value:
         raise ExportError(
             "the model", "contains the number NaN", next_step="correct the law or the start value behind it"
@@ -85,10 +66,7 @@ def literal(value: float) -> str:
 def string(text: str) -> str:
     """Return a Modelica string.
 
-    Parameters
-    ----------
-    text
-        Any text; line breaks become spaces.
+    ``text``: any text; line breaks become spaces.
     """
     flat = " ".join(text.split())
     # A last backslash is followed by a space, as not every tool sees that it is escaped itself.
@@ -98,16 +76,6 @@ def string(text: str) -> str:
 
 def modelica_unit(unit: str) -> str:
     """Return a unit in the syntax of Modelica: dots for products, one slash, no sign of a power.
-
-    Parameters
-    ----------
-    unit
-        SI unit as the package writes it.
-
-    Raises
-    ------
-    UnitError
-        If the unit is not known.
 
     Examples
     --------

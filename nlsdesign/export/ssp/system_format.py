@@ -21,12 +21,6 @@ ANNOTATION = "nlsdesign.cosimulation"
 
 
 def tag(name: str) -> str:
-    """Return the full name of an element.
-
-    Parameters
-    ----------
-    name
-        For instance ``"ssd:System"``.
-    """
+    """Return the full name of an element."""
     space, _, local = name.partition(":")
     return f"{{{NAMESPACES[space]}}}{local}"

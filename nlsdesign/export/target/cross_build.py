@@ -23,22 +23,7 @@ _OWN = ("-std=gnu99",)
 
 
 def controller_object(source: CSource, processor: Processor, folder: Path) -> Path:
-    """Compile the generated code alone, under the warnings that it must pass.
-
-    Parameters
-    ----------
-    source
-        Generated C files.
-    processor
-        What to compile for.
-    folder
-        Folder of the result.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or finds a mistake.
-    """
+    """Compile the generated code alone, under the warnings that it must pass."""
     _write_headers(folder)
     target = folder / f"{source.name}.o"
     run_compiler(
@@ -56,26 +41,7 @@ def image(
     main: str,
     values: Mapping[str, str | Sequence[str]],
 ) -> Path:
-    """Link the controller with a main program from a shell.
-
-    Parameters
-    ----------
-    source
-        Generated C files.
-    processor
-        What to compile for.
-    folder
-        Folder of the result, with the object of the controller.
-    main
-        Shell with the function ``run``.
-    values
-        What it is filled with.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or finds a mistake.
-    """
+    """Link the controller with a main program from a shell."""
     (folder / "run.c").write_text(filled(main, {"name": source.name, **values}), encoding="utf-8")
     for name in ("target_start.c", "target_link.ld", "target.h"):
         (folder / name).write_text(shell(name), encoding="utf-8")
@@ -93,22 +59,7 @@ def image(
 def controller_sizes(
     source: CSource, processor: Processor, folder: Path
 ) -> tuple[SectionSizes, SectionSizes]:
-    """Return what the controller alone takes, and what it adds to an image with what it calls.
-
-    Parameters
-    ----------
-    source
-        Generated C files.
-    processor
-        What to compile for.
-    folder
-        Folder for files.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or finds a mistake.
-    """
+    """Return what the controller alone takes, and what it adds to an image with what it calls."""
     alone = section_sizes(controller_object(source, processor, folder))
     images = []
     for present in (1, 0):
@@ -130,17 +81,7 @@ def controller_sizes(
 
 
 def sized_object(source: CSource, processor: Processor, folder: Path) -> Path:
-    """Compile an object with nothing but one instance of the controller.
-
-    Parameters
-    ----------
-    source
-        Generated C files.
-    processor
-        What to compile for.
-    folder
-        Folder of the result.
-    """
+    """Compile an object with nothing but one instance of the controller."""
     target = folder / "instance.o"
     (folder / "instance.c").write_text(filled("target_instance.c", {"name": source.name}), encoding="utf-8")
     include = source.header.parent.resolve()

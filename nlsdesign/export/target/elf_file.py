@@ -42,18 +42,7 @@ class SectionSizes:
 
 
 def section_sizes(file: Path) -> SectionSizes:
-    """Return what an object or image takes.
-
-    Parameters
-    ----------
-    file
-        32-bit ELF file of the least significant byte first.
-
-    Raises
-    ------
-    ExportError
-        If it is something else.
-    """
+    """Return what an object or image takes."""
     data = file.read_bytes()
     if data[:6] != b"\x7fELF\x01\x01":
         raise ExportError(f"{file}", "is no 32-bit ELF file", next_step="compile it for a microcontroller")

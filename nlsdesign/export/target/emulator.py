@@ -25,18 +25,6 @@ def emulated(image: Path, processor: Processor) -> list[list[int]]:
     """Run an image and return the numbers that it says, line by line.
 
     Each instruction takes one nanosecond of the emulator's clock.
-
-    Parameters
-    ----------
-    image
-        Linked program.
-    processor
-        What it was linked for.
-
-    Raises
-    ------
-    ExportError
-        If the emulator is missing, or the program ends by a fault or not at all.
     """
     missing = missing_emulator()
     if missing:

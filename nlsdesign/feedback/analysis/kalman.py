@@ -83,20 +83,7 @@ class NoiseAssumptions:
 
 
 def declared_deviation(model: FlatModel, name: str) -> float:
-    """Return the standard deviation with which a declared sensor shows a variable; quantum/√12 and noise.
-
-    Parameters
-    ----------
-    model
-        As flattened.
-    name
-        State or signal that is measured.
-
-    Raises
-    ------
-    ValueRangeError
-        If no sensor of it declares a resolution.
-    """
+    """Return the standard deviation with which a declared sensor shows a variable; quantum/√12 and noise."""
     deviations = []
     for reading in model.readings:
         if reading.measured == name:
@@ -117,14 +104,7 @@ def discrete_noise(a: Array, density: Array, sample_time: float) -> tuple[Array,
 
     Source: Van Loan 1978.
 
-    Parameters
-    ----------
-    a
-        Shape (n, n), in 1/s.
-    density
-        W, shape (n, n), in unit² / s.
-    sample_time
-        T in s.
+    ``a``: shape (n, n), in 1/s. ``density``: W, shape (n, n), in unit² / s.
     """
     n = len(a)
     block = np.block([[-a, density], [np.zeros((n, n)), a.T]]) * sample_time
@@ -139,19 +119,8 @@ def steady_state_kalman(
 ) -> tuple[Array, Array]:
     """Return the gain M of x̂ = x̂⁻ + M·(y − C·x̂⁻) and the covariance of x − x̂.
 
-    Parameters
-    ----------
-    transition, measured
-        Φ and C, shapes (n, n) and (r, n).
-    noise
-        Covariance of the process noise over one sample, shape (n, n).
-    spread
-        Standard deviations of the measurement, shape (r,).
-
-    Raises
-    ------
-    ConvergenceError
-        If there is no steady state: something unstable is not seen.
+    ``transition``, ``measured``: Φ and C, shapes (n, n) and (r, n). ``noise``: covariance of the process
+    noise over one sample, shape (n, n).
     """
     # In units in which states have size one: the Riccati solver works on entries of like size.
     unit = np.sqrt(np.where(np.diag(noise) > 0.0, np.diag(noise), 1.0))
@@ -255,14 +224,7 @@ class EstimateDeviation(View):
 def noise_over_a_sample(a: Array, density: Array, sample_time: float) -> tuple[Array, Array]:
     """Return Φ = e^(AT) and the covariance of white noise over one sample at many angles.
 
-    Parameters
-    ----------
-    a
-        Shape (N, n, n), in 1/s.
-    density
-        W, shape (n, n) or (N, n, n), in unit² / s.
-    sample_time
-        T in s.
+    ``a``: shape (N, n, n), in 1/s. ``density``: W, shape (n, n) or (N, n, n), in unit² / s.
     """
     backward, noise = exponential_and_gramian(transposed(a), np.broadcast_to(density, a.shape), sample_time)
     return transposed(backward), noise
@@ -273,19 +235,8 @@ def best_covariances(
 ) -> tuple[Array, Mask]:
     """Return the covariance of the best estimate at many angles, and where it has a steady state.
 
-    Parameters
-    ----------
-    a, density
-        As for :func:`noise_over_a_sample`.
-    measurement
-        C, shape (N, r, n), and the standard deviations, shape (r,).
-    sample_time
-        T in s.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        Shape (N, n, n), infinite where there is no steady state; and shape (N,), whether there is one.
+    ``measurement``: C, shape (N, r, n), and the standard deviations, shape (r,). Result: shape (N, n, n),
+    infinite where there is no steady state; and shape (N,), whether there is one.
     """
     transition, noise = noise_over_a_sample(a, density, sample_time)
     diagonal = np.einsum("Nii->Ni", noise)
@@ -304,12 +255,7 @@ def best_covariances(
 def deviation_of(row: Array, covariance: Array) -> Array:
     """Return the standard deviation of what a row of numbers makes of the states; infinite stays infinite.
 
-    Parameters
-    ----------
-    row
-        Shape (N, n).
-    covariance
-        Shape (N, n, n).
+    ``row``: shape (N, n). ``covariance``: shape (N, n, n).
     """
     known = np.all(np.isfinite(covariance), axis=(-1, -2))
     square = np.einsum("Ni,Nij,Nj->N", row, np.where(known[:, None, None], covariance, 0.0), row)

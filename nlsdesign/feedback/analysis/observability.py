@@ -177,10 +177,7 @@ class Observability(View):
 def observability_matrices(a: Array, c: Array) -> Array:
     """Return the rows C, CA, … up to the power n − 1, shape (N, r·n, n).
 
-    Parameters
-    ----------
-    a, c
-        Shapes (N, n, n) and (N, r, n).
+    ``a``, ``c``: shapes (N, n, n) and (N, r, n).
     """
     powers = [c]
     for _ in range(a.shape[-1] - 1):
@@ -191,14 +188,8 @@ def observability_matrices(a: Array, c: Array) -> Array:
 def unseen_of(directions: Array, a: Array, names: tuple[str, ...]) -> Unseen:
     """Return what becomes of directions that are not seen.
 
-    Parameters
-    ----------
-    directions
-        Orthonormal, shape (k, n), in units of the sizes.
-    a
-        Slopes in the same units, shape (n, n), in 1/s.
-    names
-        Of the states.
+    ``directions``: orthonormal, shape (k, n), in units of the sizes. ``a``: slopes in the same units, shape
+    (n, n), in 1/s.
     """
     eigenvalues = np.linalg.eigvals(directions @ a @ directions.T).astype(complex)
     zero = np.abs(eigenvalues) <= _STILL * np.max(np.abs(a))
@@ -210,15 +201,7 @@ def unseen_of(directions: Array, a: Array, names: tuple[str, ...]) -> Unseen:
 
 
 def in_words(direction: Array, names: tuple[str, ...]) -> str:
-    """Return the names of the states in a unit vector, largest share first, shares below 5 % left out.
-
-    Parameters
-    ----------
-    direction
-        Shape (n,).
-    names
-        Of the states.
-    """
+    """Return the names of the states in a unit vector, largest share first, shares below 5 % left out."""
     order = np.argsort(-np.abs(direction))
     sign = np.sign(direction[order[0]])
     large = [i for i in order if abs(direction[i]) > 0.05]

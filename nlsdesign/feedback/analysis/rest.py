@@ -19,22 +19,7 @@ from ...model.transform import named
 
 
 def rate_state(model: FlatModel, angle: str) -> str:
-    """Return the name of the state that is the derivative of another one.
-
-    Parameters
-    ----------
-    model
-        Continuous.
-    angle
-        Name of a state, for instance ``"motor.angle"``.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such state.
-    ArrangementError
-        If its derivative is not itself a state.
-    """
+    """Return the name of the state that is the derivative of another one."""
     states = [v.name for v in model.states]
     if angle not in states:
         raise unknown_name("state", angle, states)
@@ -58,31 +43,10 @@ def rest_states(
 ) -> Array:
     """Return the states in which everything rests while the angle is held, at many angles at once.
 
-    Parameters
-    ----------
-    model
-        Continuous; inputs are at their start values.
-    angles
-        Shape (n,), in rad.
-    angle
-        State that is held, its rate at zero; by default the motion of the driven body.
-    consistent
-        States that have to agree with a signal of the same model, such as the extension of the published
-        form with ``"spring.rubber.extension.geometric"``; state name to signal name.
-    tolerance
-        Of the states, relative to their largest value over the sweep, or to 1e-3 where that is larger.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (n, states).
-
-    Raises
-    ------
-    ConvergenceError
-        If a state does not come to rest.
-    ArrangementError
-        If no angle is named and the structure does not say which body is driven.
+    ``model``: continuous; inputs are at their start values. ``angle``: state that is held, its rate at zero;
+    by default the motion of the driven body. ``consistent``: states that have to agree with a signal of the
+    same model, such as the extension of the published form with ``"spring.rubber.extension.geometric"``;
+    state name to signal name.
     """
     return RestSolver(model, angle=angle, consistent=consistent)(model, angles, tolerance)
 
@@ -96,11 +60,6 @@ class RestSolver:
         Continuous; inputs are at their start values.
     angle, consistent
         As for :func:`rest_states`.
-
-    Raises
-    ------
-    ArrangementError
-        If no angle is named and the structure does not say which body is driven.
     """
 
     def __init__(
@@ -122,20 +81,7 @@ class RestSolver:
         self._newton = ca.Function("rate", arguments, [rate, ca.densify(slope)])
 
     def __call__(self, model: FlatModel, angles: Array, tolerance: float = 1e-9) -> Array:
-        """Return rest states, shape (n, states).
-
-        Parameters
-        ----------
-        model
-            The same with any numbers.
-        angles, tolerance
-            As for :func:`rest_states`.
-
-        Raises
-        ------
-        ConvergenceError
-            If a state does not come to rest.
-        """
+        """Return rest states, shape (n, states)."""
         x = np.tile(model.start(model.states), (len(angles), 1))
         x[:, self._angle] = angles
         x[:, self._rate] = 0.0
@@ -152,19 +98,7 @@ def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) 
     jump to if the angle moved there at once from zero. Speed: that of a swing with this amplitude and the
     largest acceleration at rest. What stays zero has size one.
 
-    Parameters
-    ----------
-    model
-        Continuous, with the inner states free.
-    angles
-        Shape (n,), ascending, in rad.
-    angle
-        Name of the state that is swept; by default the motion of the driven body.
-
-    Raises
-    ------
-    ArrangementError
-        If no angle is named and the structure does not say which body is driven.
+    ``angle``: name of the state that is swept; by default the motion of the driven body.
     """
     angle = measured_motion(model, angle)
     names = [v.name for v in model.states]
@@ -196,21 +130,7 @@ def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) 
 def evaluate_rows(function: ca.Function, x: Array, u: Array, p: Array) -> list[Array]:
     """Evaluate a function of (time, state, input, parameter) at many states, at time zero.
 
-    Parameters
-    ----------
-    function
-        Any number of results of fixed shape.
-    x
-        Shape (n, states).
-    u
-        Shape (inputs,), the same for all, or (n, inputs).
-    p
-        Shape (parameters,).
-
-    Returns
-    -------
-    list of numpy.ndarray
-        One per result, with one row per state: a matrix result is laid out row by row.
+    ``x``: shape (n, states). ``u``: shape (inputs,), the same for all, or (n, inputs).
     """
     count = len(x)
     if u.ndim == 2:
@@ -269,19 +189,7 @@ _ROUNDING = 1e-9
 
 
 class RangeAtRest(NamedTuple):
-    """A signal that leaves the stated range of its law at some angles.
-
-    Parameters
-    ----------
-    name, unit
-        Of the signal.
-    first, last
-        Nearest to zero and furthest from it of the angles outside, in rad.
-    furthest
-        Value furthest outside.
-    minimum, maximum
-        The range.
-    """
+    """A signal that leaves the stated range of its law at some angles."""
 
     name: str
     unit: str

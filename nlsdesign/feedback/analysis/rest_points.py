@@ -104,27 +104,10 @@ def plant_modes(
 ) -> tuple[PlantMode, ...]:
     """Return the modes of a plant; those in which it moves come first.
 
-    Parameters
-    ----------
-    model
-        Continuous.
-    states
-        Rest states, shape (N, n).
-    at_rest
-        Slopes there of rates in states and inputs, and of outputs in states, and the rates: shapes (N, n, n),
-        (N, n, m), (N, r, n) and (N, n).
-    rate
-        Name of the rate of the angle that is swept.
-    speed
-        Typical speed in rad/s, at which the slopes in the speeds are taken; it is doubled until dry friction
-        has its sliding level.
-
-    Raises
-    ------
-    ConvergenceError
-        If smoothed friction reaches no constant level at any speed.
-    ValueRangeError
-        If a slope is not finite.
+    ``states``: rest states, shape (N, n). ``at_rest``: slopes there of rates in states and inputs, and of
+    outputs in states, and the rates: shapes (N, n, n), (N, n, m), (N, r, n) and (N, n). ``speed``: typical
+    speed in rad/s, at which the slopes in the speeds are taken; it is doubled until dry friction has its
+    sliding level.
     """
     names = [v.name for v in model.states]
     rates = [names.index(b.rate) for b in model.bodies if not b.prescribed and b.rate in names]
@@ -258,12 +241,7 @@ class _Branches:
 def limit_at_zero_speed(at_speed: Callable[[float], Array], speed: float) -> Array:
     """Return the limit of numbers for a speed that goes to zero from one side, far above any creep speed.
 
-    Parameters
-    ----------
-    at_speed
-        Takes a speed and returns the numbers.
-    speed
-        From which, and shares of which, the limit is extrapolated; its sign says from which side.
+    ``speed``: from which, and shares of which, the limit is extrapolated; its sign says from which side.
     """
     return _extrapolated([at_speed(share * speed) for share in _SHARES])
 

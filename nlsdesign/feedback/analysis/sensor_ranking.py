@@ -307,15 +307,7 @@ class _Bench:
 def holding_current(points: RestPoints) -> tuple[int | None, Array]:
     """Return the place of the drive's input and what it has to be to hold the spring at each angle.
 
-    Parameters
-    ----------
-    points
-        The model at rest at each angle.
-
-    Returns
-    -------
-    tuple
-        Place among the inputs, ``None`` where nothing drives the body; and shape (N,).
+    Result: place among the inputs, ``None`` where nothing drives the body; and shape (N,).
     """
     body = next((b for b in points.model.bodies if b.motion == points.angle), None)
     inputs = [v.name for v in points.model.inputs]
@@ -335,17 +327,7 @@ def spread_offsets(points: RestPoints, hold: Array) -> Array:
     The items of one quantity vary together, as it has one spread. Of all numbers only what they do to rates
     and outputs counts, so their joint covariance is written in as few directions as it has.
 
-    Parameters
-    ----------
-    points
-        The model at rest at each angle.
-    hold
-        Current that holds the machine, shape (N,).
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (N, n + r, k).
+    Result: shape (N, n + r, k).
     """
     model = points.model
     groups: dict[str, dict[int, float]] = {}

@@ -68,15 +68,8 @@ class Stability(View):
 def least_damped(eigenvalues: NDArray[np.complex128]) -> tuple[Array, Array, Array]:
     """Return slowest real part in 1/s, and frequency in Hz and damping ratio of the least damped oscillation.
 
-    Parameters
-    ----------
-    eigenvalues
-        Of a continuous system, shape (N, n) with n > 0.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        Each of shape (N,); frequency 0 and damping ratio 1 where nothing oscillates.
+    ``eigenvalues``: of a continuous system, shape (N, n) with n > 0. Result: each of shape (N,); frequency 0
+    and damping ratio 1 where nothing oscillates.
     """
     size = np.abs(eigenvalues)
     swings = np.abs(eigenvalues.imag) > _STILL * np.max(size, axis=-1, keepdims=True)

@@ -56,23 +56,11 @@ class PointView(View):
 
     @abstractmethod
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return name, unit and description of each number.
-
-        Parameters
-        ----------
-        model
-            The model that is swept.
-        """
+        """Return name, unit and description of each number."""
 
     @abstractmethod
     def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
-        """Return the numbers, in the order of the columns, and findings in words.
-
-        Parameters
-        ----------
-        point
-            The model at rest at one angle.
-        """
+        """Return the numbers, in the order of the columns, and findings in words."""
 
     def over(self, points: RestPoints) -> Columns:
         """Return what :meth:`at` gives at each angle."""
@@ -110,13 +98,7 @@ class Chart:
     words: Mapping[str, tuple[str, ...]]
 
     def __getitem__(self, name: str) -> Array:
-        """Return one column.
-
-        Parameters
-        ----------
-        name
-            Name of the column or of the argument.
-        """
+        """Return one column."""
         if name == self.argument.name:
             return self.at
         names = [v.name for v in self.columns]
@@ -220,10 +202,7 @@ _DOUBLINGS = 60
 def transposed(a: Array) -> Array:
     """Return each matrix transposed.
 
-    Parameters
-    ----------
-    a
-        Shape (N, n, m).
+    ``a``: shape (N, n, m).
     """
     return np.swapaxes(a, -1, -2)
 
@@ -231,10 +210,7 @@ def transposed(a: Array) -> Array:
 def symmetric(a: Array) -> Array:
     """Return the symmetric part of each matrix.
 
-    Parameters
-    ----------
-    a
-        Shape (N, n, n).
+    ``a``: shape (N, n, n).
     """
     half: Array = (a + transposed(a)) / 2.0
     return half
@@ -246,12 +222,7 @@ def exponential_and_gramian(a: Array, weight: Array, horizon: float) -> tuple[Ar
     A power series over a short time, then doubling: W(2t) = W(t) + e^(Aᵀt)·W(t)·e^(At). Sums of what is not
     negative, so nothing cancels. With Aᵀ for A it is the covariance of white noise. Source: Van Loan 1978.
 
-    Parameters
-    ----------
-    a, weight
-        Shape (N, n, n), A in 1/s and W symmetric.
-    horizon
-        T in s.
+    ``a``, ``weight``: shape (N, n, n), A in 1/s and W symmetric.
     """
     norm = float(np.max(np.sum(np.abs(a), axis=-1), initial=0.0)) * horizon
     doublings = max(0, int(np.ceil(np.log2(max(norm, 1e-300) / 0.125))))
@@ -274,10 +245,7 @@ def exponential_and_gramian(a: Array, weight: Array, horizon: float) -> tuple[Ar
 def covariance_without_measurement(transition: Array, noise: Array) -> Array:
     """Return P = Φ·P·Φᵀ + Q of each pair by doubling; infinite where it grows without bound.
 
-    Parameters
-    ----------
-    transition, noise
-        Φ and Q, shape (N, n, n).
+    ``transition``, ``noise``: Φ and Q, shape (N, n, n).
     """
     total, power = noise, transition
     with np.errstate(over="ignore", invalid="ignore"):  # what grows overflows, and is said to be infinite
@@ -297,19 +265,8 @@ def riccati(transition: Array, information: Array, noise: Array) -> tuple[Array,
     covariance after 2^k samples from a known start. There is no steady state where something that does not
     decay is not seen. Source: Anderson 1978.
 
-    Parameters
-    ----------
-    transition
-        Φ, shape (N, n, n).
-    information
-        CᵀR⁻¹C, shape (N, n, n).
-    noise
-        Q, shape (N, n, n).
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        P, shape (N, n, n), not a number where there is none; and shape (N,), whether there is one.
+    ``transition``: Φ, shape (N, n, n). ``information``: CᵀR⁻¹C, shape (N, n, n). ``noise``: Q, shape (N, n,
+    n). Result: P, shape (N, n, n), not a number where there is none; and shape (N,), whether there is one.
     """
     size = transition.shape[-1]
     identity = np.eye(size)

@@ -1,11 +1,9 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
 from .closed_loop import ClosedLoop, encoder_loop, joined
-from .evaluation.linear_loop import LinearLoop, linear_loop
 from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .evaluation.margins import (
-    CoupledStability,
     LoopMargins,
     OutputImpedance,
     coupled_stability,
@@ -16,28 +14,24 @@ from .evaluation.onset import (
     LimitCycleOnset,
     LoopSpread,
     SaturationLine,
-    linear_onset,
     loop_over_spread,
     onset_of_limit_cycling,
     saturation_line,
 )
 from .evaluation.responses import (
-    HeldTorque,
     SineResponse,
-    StepResponse,
     Tracking,
     ZeroTorque,
     held_torque,
     sine_response,
-    step_response,
     torque_resolution,
     tracking,
     zero_torque,
 )
-from .laws.known_drive import TorqueLimit, check_torque, largest_torque, only_side, torque_limit
+from .laws.known_drive import check_torque, largest_torque, only_side
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
 from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
-from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
+from .laws.torque_loop import TorqueGains, torque_controller
 from .laws.velocity_loop import DisturbanceObserver, FrictionCompensation, VelocityLoop
 from .tuning import LoopChoice, LoopLimits, TunedLoop, bandwidth_against_impedance, best_choices, largest_gain
 
@@ -46,21 +40,17 @@ __all__ = [
     "BackCalculation",
     "ClosedLoop",
     "ConditionalIntegration",
-    "CoupledStability",
     "DesiredRate",
     "DisturbanceObserver",
     "FilteredDifference",
     "FrictionCompensation",
     "FrozenTables",
     "GivenRate",
-    "HeldTorque",
     "LimitCycleOnset",
-    "LinearLoop",
     "LoopChoice",
     "LoopJudge",
     "LoopLimits",
     "LoopMargins",
-    "LoopNames",
     "LoopSpread",
     "LoopVerdict",
     "OutputImpedance",
@@ -70,11 +60,9 @@ __all__ = [
     "SineResponse",
     "SlidingPlant",
     "SlopedTables",
-    "StepResponse",
     "StuckPlant",
     "TorqueGains",
     "TorqueLaw",
-    "TorqueLimit",
     "Tracking",
     "TunedLoop",
     "VelocityLoop",
@@ -88,19 +76,14 @@ __all__ = [
     "joined",
     "largest_gain",
     "largest_torque",
-    "linear_loop",
-    "linear_onset",
     "loop_margins",
-    "loop_names",
     "loop_over_spread",
     "only_side",
     "onset_of_limit_cycling",
     "output_impedance",
     "saturation_line",
     "sine_response",
-    "step_response",
     "torque_controller",
-    "torque_limit",
     "torque_resolution",
     "tracking",
     "with_fine_counts",

@@ -1,8 +1,8 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
 from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
-from .adaptive.duty_and_directions import AdaptiveSettings, Duty, Trust, UncertainDirections
-from .adaptive.estimator_bound import EstimatorBound, SensedTorque, estimator_bound
+from .adaptive.duty_and_directions import AdaptiveSettings, Trust
+from .adaptive.estimator_bound import EstimatorBound, estimator_bound
 from .certificates import (
     Assumptions,
     Certificate,
@@ -10,7 +10,6 @@ from .certificates import (
     CodeToCompare,
     ContinuousCertificate,
     HeldEstimateCertificate,
-    TorqueErrorBound,
     Verification,
     certified_design,
     certify,
@@ -19,20 +18,14 @@ from .certificates import (
     clamped_estimate_bound,
     declared_assumptions,
     read_certificate,
-    torque_bound,
     verify,
     write_certificate,
 )
 from .scheduling.angle_form import Minimal, PaperForm, StateForm
 from .scheduling.measured_angle import observe
-from .scheduling.scheduled import (
-    ErrorStability,
-    ObserverDesign,
-    check_stability,
-    design_observer_with_details,
-)
-from .scheduling.step import CascadeGain, ConstantGain, FittedGain, GainRule, PolePlacement, SteadyStateKalman
-from .scheduling.table import FixedGrid, Grid, GridByTolerance, TableTorqueError
+from .scheduling.scheduled import ErrorStability, ObserverDesign, design_observer_with_details
+from .scheduling.step import CascadeGain, ConstantGain, GainRule, PolePlacement, SteadyStateKalman
+from .scheduling.table import FixedGrid, Grid, GridByTolerance
 from .scheduling.torque_grid import GridByTorqueError
 from .spread.choice import ObserverOfChoice, choose_observer, design_observer, least_torque_error
 from .spread.observer_bench import ObserverBench, observer_bench
@@ -48,10 +41,8 @@ __all__ = [
     "CodeToCompare",
     "ConstantGain",
     "ContinuousCertificate",
-    "Duty",
     "ErrorStability",
     "EstimatorBound",
-    "FittedGain",
     "FixedGrid",
     "GainRule",
     "Grid",
@@ -64,20 +55,15 @@ __all__ = [
     "ObserverOfChoice",
     "PaperForm",
     "PolePlacement",
-    "SensedTorque",
     "SpreadErrors",
     "StateForm",
     "SteadyStateKalman",
-    "TableTorqueError",
-    "TorqueErrorBound",
     "Trust",
-    "UncertainDirections",
     "Verification",
     "certified_design",
     "certify",
     "certify_continuous",
     "certify_held_estimate",
-    "check_stability",
     "choose_observer",
     "clamped_estimate_bound",
     "declared_assumptions",
@@ -90,7 +76,6 @@ __all__ = [
     "observer_bench",
     "observer_errors",
     "read_certificate",
-    "torque_bound",
     "verify",
     "write_certificate",
 ]

@@ -9,13 +9,12 @@ from .dask_scheduler import DaskScheduler
 from .identity import CodeIdentity, code_identity
 from .in_this_process import InThisProcess
 from .mpi_ranks import MpiRanks
-from .shared_map import ChunkSizes, shared_map
+from .shared_map import shared_map
 from .spread_over import spread_over
 from .team import Executor
 from .worker_processes import Processes
 
 __all__ = [
-    "ChunkSizes",
     "CodeIdentity",
     "DaskScheduler",
     "Executor",

@@ -78,15 +78,7 @@ class ChunkLoss:
 
 @dataclass(frozen=True)
 class WorkerRefusal:
-    """A worker whose code is another one.
-
-    Parameters
-    ----------
-    worker
-        Machine and process.
-    identity
-        Of its code.
-    """
+    """A worker whose code is another one."""
 
     worker: str
     identity: CodeIdentity
@@ -98,15 +90,7 @@ def here() -> str:
 
 
 def computed(work: Callable[[Any], Any], chunk: Chunk) -> list[PointOutcome]:
-    """Return the outcomes of a chunk; whatever a point raises is its reason.
-
-    Parameters
-    ----------
-    work
-        Asked of each point.
-    chunk
-        Points.
-    """
+    """Return the outcomes of a chunk; whatever a point raises is its reason."""
     worker = here()
     outcomes = []
     for number, point in chunk.points:
@@ -123,13 +107,7 @@ def computed(work: Callable[[Any], Any], chunk: Chunk) -> list[PointOutcome]:
 
 
 def reason_of(error: BaseException) -> str:
-    """Return why a point failed: the message of our errors, and kind, message and line of any other.
-
-    Parameters
-    ----------
-    error
-        That was raised.
-    """
+    """Return why a point failed: the message of our errors, and kind, message and line of any other."""
     text = " ".join(str(error).split())
     if not isinstance(error, NlsError):
         last = traceback.extract_tb(error.__traceback__)[-1:]
@@ -139,13 +117,7 @@ def reason_of(error: BaseException) -> str:
 
 
 def pickled(outcomes: list[PointOutcome]) -> bytes:
-    """Return outcomes as bytes; where an answer cannot be pickled, that is why its point failed.
-
-    Parameters
-    ----------
-    outcomes
-        Of a chunk.
-    """
+    """Return outcomes as bytes; where an answer cannot be pickled, that is why its point failed."""
     try:
         return pickle.dumps(outcomes, pickle.HIGHEST_PROTOCOL)
     except Exception:
@@ -168,17 +140,7 @@ def _unpickled(payload: bytes) -> Callable[[Any], Any]:
 
 
 def computed_elsewhere(payload: bytes, chunk: Chunk, expected: CodeIdentity) -> bytes | WorkerRefusal:
-    """Return the outcomes of a chunk from a process that may run other code.
-
-    Parameters
-    ----------
-    payload
-        The pickled work.
-    chunk
-        Points.
-    expected
-        Code that the answers are to be of.
-    """
+    """Return the outcomes of a chunk from a process that may run other code."""
     own = own_identity()
     if own != expected:
         return WorkerRefusal(here(), own)

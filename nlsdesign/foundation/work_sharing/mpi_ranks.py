@@ -54,17 +54,7 @@ class MpiRanks:
 
 
 class FuturesTeam:
-    """Workers behind an executor of ``concurrent.futures``.
-
-    Parameters
-    ----------
-    pool
-        The executor.
-    work
-        Asked of each point; pickled.
-    count
-        Number of workers.
-    """
+    """Workers behind an executor of ``concurrent.futures``."""
 
     def __init__(self, pool: concurrent.futures.Executor, work: Callable[[Any], Any], count: int) -> None:
         self._pool, self._count = pool, count
@@ -80,29 +70,12 @@ class FuturesTeam:
         return self._count
 
     def submit(self, chunk: Chunk) -> None:
-        """Give one chunk to the executor.
-
-        Parameters
-        ----------
-        chunk
-            Points.
-        """
+        """Give one chunk to the executor."""
         expected = own_identity()
         self._flying[self._pool.submit(computed_elsewhere, self._payload, chunk, expected)] = chunk
 
     def finished(self, seconds: float) -> list[Finished]:
-        """Return what has come to an end.
-
-        Parameters
-        ----------
-        seconds
-            To wait at most.
-
-        Raises
-        ------
-        WorkSharingError
-            If a worker runs other code or has died.
-        """
+        """Return what has come to an end."""
         ended, _ = concurrent.futures.wait(
             self._flying, seconds, return_when=concurrent.futures.FIRST_COMPLETED
         )

@@ -12,13 +12,7 @@ from .identity import code_identity
 
 
 def refused(refusal: WorkerRefusal) -> WorkSharingError:
-    """Return the error for a worker whose code is another one; it names both.
-
-    Parameters
-    ----------
-    refusal
-        Of the worker.
-    """
+    """Return the error for a worker whose code is another one; it names both."""
     return WorkSharingError(
         f"worker {refusal.worker}",
         f"runs {refusal.identity}, and this program {code_identity()}: their answers must not be mixed",
@@ -27,18 +21,7 @@ def refused(refusal: WorkerRefusal) -> WorkSharingError:
 
 
 def sendable(work: Callable[[Any], Any]) -> bytes:
-    """Return work as bytes for another machine; functions of a script or notebook go with their code.
-
-    Parameters
-    ----------
-    work
-        Function or object.
-
-    Raises
-    ------
-    WorkSharingError
-        If it cannot be pickled.
-    """
+    """Return work as bytes for another machine; functions of a script or notebook go with their code."""
     try:
         import cloudpickle as library
     except ModuleNotFoundError:

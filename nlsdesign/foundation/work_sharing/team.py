@@ -23,23 +23,11 @@ class Team(Protocol):
         ...
 
     def submit(self, chunk: Chunk) -> None:
-        """Give one chunk to a worker.
-
-        Parameters
-        ----------
-        chunk
-            Points.
-        """
+        """Give one chunk to a worker."""
         ...
 
     def finished(self, seconds: float) -> list[Finished]:
-        """Return what has come to an end; an empty list after that time.
-
-        Parameters
-        ----------
-        seconds
-            To wait at most.
-        """
+        """Return what has come to an end; an empty list after that time."""
         ...
 
 

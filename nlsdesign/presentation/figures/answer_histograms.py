@@ -38,22 +38,7 @@ class MarkedQuantile(NamedTuple):
 def answer_histograms(
     columns: Sequence[ShownColumn], quantiles: Sequence[Sequence[MarkedQuantile]], *, words: str
 ) -> Figure:
-    """Draw a histogram of each answer; above it its quantiles, each with the interval in which it lies.
-
-    Parameters
-    ----------
-    columns
-        Answers, with finite numbers of the points only.
-    quantiles
-        Of each column.
-    words
-        Alternative text: what the figure shows.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is no answer, or one without a number.
-    """
+    """Draw a histogram of each answer; above it its quantiles, each with the interval in which it lies."""
     if not columns or any(not len(column.values) for column in columns):
         raise ValueRangeError("histograms", "have nothing to show", next_step="leave this figure out")
     wide = min(2, len(columns))

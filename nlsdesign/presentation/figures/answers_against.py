@@ -22,21 +22,8 @@ def answers_against(
 ) -> Figure:
     """Draw the first answer over each of the others; the points of the front of two are joined.
 
-    Parameters
-    ----------
-    columns
-        Two to five answers that are compared.
-    kinds
-        What the points are.
-    wanted
-        Of each column the value that is wanted, drawn as a line; ``None`` where it has a direction only.
-    words
-        Alternative text: what the figure shows.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are fewer than two answers or more than five.
+    ``wanted``: of each column the value that is wanted, drawn as a line; ``None`` where it has a direction
+    only.
     """
     if not 2 <= len(columns) <= MOST_PANELS + 1:
         rule = f"has {len(columns)} answers; two to {MOST_PANELS + 1} can be drawn"

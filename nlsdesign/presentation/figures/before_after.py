@@ -168,13 +168,7 @@ class HeldOut:
 
 @styled
 def held_out_series(record: HeldOut) -> Figure:
-    """Draw a record over time, measured and predicted; below, the errors, whose rms is that of the record.
-
-    Parameters
-    ----------
-    record
-        The record.
-    """
+    """Draw a record over time, measured and predicted; below, the errors, whose rms is that of the record."""
     unit, record = typeset_unit(record.unit), _interrupted(record)
     figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[1.3, 1])
     upper.plot(
@@ -228,19 +222,7 @@ def _interrupted(record: HeldOut) -> HeldOut:
 
 @styled
 def binned_errors(before: Curve, after: Curve, *, across: str, unit: str, name: str) -> Figure:
-    """Draw the mean error in bins of a quantity, before and after.
-
-    Parameters
-    ----------
-    before, after
-        Centres of the bins and mean errors, shape (n,) each.
-    across
-        Label of the abscissa, with its unit.
-    unit
-        Of the error.
-    name
-        What the error belongs to, for the alternative text.
-    """
+    """Draw the mean error in bins of a quantity, before and after."""
     figure, (axes,) = panels(height=3.0)
     changed = not np.array_equal(before[1], after[1])
     for label, (x, y), tone, dash, marker in (
@@ -280,18 +262,7 @@ class CandidateShare:
 
 @styled
 def candidate_shares(candidates: Sequence[CandidateShare]) -> Figure:
-    """Draw the share of the excess over the noise floor that each candidate explains, the largest on top.
-
-    Parameters
-    ----------
-    candidates
-        At least one.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is no candidate.
-    """
+    """Draw the share of the excess over the noise floor that each candidate explains, the largest on top."""
     if not candidates:
         raise ValueRangeError("candidates", "there is none to draw", next_step="leave this figure out")
     ordered = sorted(candidates, key=lambda c: c.share)

@@ -57,12 +57,7 @@ def cam_picture(motion: CamMotion, *, start: float | None = None) -> CamPicture:
     left-hand side being the same turned by half a turn; ``marker`` (shift of the marker in the torque curve,
     in points); and ``words``: lever arm, extension, force and torque with units.
 
-    Parameters
-    ----------
-    motion
-        Cam over its range.
-    start
-        Angle in rad that is shown first; 60 % of the range by default.
+    ``start``: angle in rad that is shown first; 60 % of the range by default.
     """
     first = motion.nearest(0.6 * float(motion.angles[-1]) if start is None else start)
     curve = torque_curve(motion, at=first)

@@ -189,19 +189,6 @@ def cam_motion(
     """Move a cam through its whole range, to both sides, with all relaxation at rest.
 
     The extension is the integral of the lever arm, the torque N·h·F.
-
-    Parameters
-    ----------
-    contour
-        Lower right lip of the cam.
-    force
-        Force of one element in N over its extension in m, for instance ``ElasticLaw.force``.
-    elements
-        Number of equal elements N.
-    rest_length, pretension
-        In m.
-    count
-        Number of angles, odd, so that zero is one of them.
     """
     last = float(contour.angles[-1])
     angles = np.linspace(-last, last, count | 1)

@@ -21,17 +21,9 @@ def figure_data(figure: Figure) -> dict[str, Any]:
 
     The numbers are those that are drawn: long records are thinned as they are in the figure.
 
-    Parameters
-    ----------
-    figure
-        Any figure.
-
-    Returns
-    -------
-    dict
-        ``panels``: each with ``title``, ``x`` and ``y`` (labels of the axes, with units) and ``series``.
-        A series has a ``label``, and ``x`` and ``y`` of equal length; a value that is not a number is
-        ``None``. Lines across a panel have ``x`` or ``y`` alone.
+    Result: ``panels``: each with ``title``, ``x`` and ``y`` (labels of the axes, with units) and ``series``.
+    A series has a ``label``, and ``x`` and ``y`` of equal length; a value that is not a number is ``None``.
+    Lines across a panel have ``x`` or ``y`` alone.
     """
     panels = []
     for axes in figure.axes:

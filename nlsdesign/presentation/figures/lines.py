@@ -18,17 +18,8 @@ def thinned(x: ArrayLike, y: ArrayLike, *, columns: int = COLUMNS) -> tuple[Arra
     peak is lost. Otherwise (a loop) points are left out that fall into the same cell of the figure as the one
     before. Short lines come back as they are.
 
-    Parameters
-    ----------
-    x, y
-        Shape (n,); NaN in y interrupts the line.
-    columns
-        Width of the figure in dots.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        x and y of shape (m,), m ≤ n, points of the given line in the given order.
+    ``x``, ``y``: shape (n,); NaN in y interrupts the line. Result: x and y of shape (m,), m ≤ n, points of
+    the given line in the given order.
     """
     abscissa, ordinate = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if len(abscissa) <= 2 * columns:

@@ -160,13 +160,7 @@ def coupled_stability_map(result: CoupledStability) -> Figure:
 
 
 def passivity_words(first: float) -> str:
-    """Return in words from which frequency on a loop is active.
-
-    Parameters
-    ----------
-    first
-        Lowest frequency in Hz with Re Z < 0.
-    """
+    """Return in words from which frequency on a loop is active."""
     if np.isnan(first):
         return "unstable, so it has no impedance"
     return f"active from {significant(first)} Hz on" if np.isfinite(first) else "passive"

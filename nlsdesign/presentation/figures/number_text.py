@@ -11,25 +11,12 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def root_mean_square(values: ArrayLike) -> float:
-    """Return the root of the mean square of all finite values.
-
-    Parameters
-    ----------
-    values
-        Any shape.
-    """
+    """Return the root of the mean square of all finite values."""
     return float(np.sqrt(np.nanmean(np.square(np.asarray(values, dtype=float)))))
 
 
 def significant(value: float, digits: int = 3) -> str:
     """Return a number with the given number of significant digits, typeset.
-
-    Parameters
-    ----------
-    value
-        Any number.
-    digits
-        Significant digits.
 
     Examples
     --------
@@ -70,11 +57,5 @@ def compact(value: float, digits: int = 4) -> str:
 
 
 def superscript(number: int) -> str:
-    """Return an integer in superscript digits.
-
-    Parameters
-    ----------
-    number
-        Of either sign.
-    """
+    """Return an integer in superscript digits."""
     return str(number).translate(_SUPERSCRIPTS)

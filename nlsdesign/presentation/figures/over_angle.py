@@ -122,13 +122,6 @@ def observer_stability(checks: Mapping[str, ErrorStability], *, sample_time: flo
 
     The decay is −ln(spectral radius)/T: below zero the error would grow. The legend states whether it is
     proved for a moving angle or checked at frozen angles only.
-
-    Parameters
-    ----------
-    checks
-        By name of the observer.
-    sample_time
-        T in s.
     """
     figure, (axes,) = panels(height=3.0)
     summaries = []

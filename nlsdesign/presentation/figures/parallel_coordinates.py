@@ -29,21 +29,7 @@ def parallel_coordinates(
 
     A line stops where a point has no finite number: a point that failed ends with the last axis.
 
-    Parameters
-    ----------
-    columns
-        At most twelve, axes first.
-    kinds
-        What the points are.
-    axis_count
-        How many of the columns are axes; a line divides them from the answers.
-    words
-        Alternative text: what the figure shows.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are fewer than two columns or more than twelve.
+    ``axis_count``: how many of the columns are axes; a line divides them from the answers.
     """
     if not 2 <= len(columns) <= MOST_COORDINATES:
         rule = f"has {len(columns)} columns; two to {MOST_COORDINATES} can be drawn"

@@ -45,20 +45,7 @@ class SurfacePanel(NamedTuple):
 
 @styled
 def response_surfaces(surfaces: Sequence[SurfacePanel], *, words: str) -> Figure:
-    """Draw answers over two axes each; the darker, the larger.
-
-    Parameters
-    ----------
-    surfaces
-        At least one.
-    words
-        Alternative text: what the figure shows.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is none.
-    """
+    """Draw answers over two axes each; the darker, the larger."""
     if not surfaces:
         raise ValueRangeError(
             "response surfaces", "there are none to draw", next_step="leave this figure out"

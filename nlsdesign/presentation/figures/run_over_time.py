@@ -19,15 +19,7 @@ MOST_PANELS = 6
 
 
 def groups_of_signals(run: Trace, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the signals by unit, in the given order.
-
-    Parameters
-    ----------
-    run
-        With these signals.
-    names
-        Of the signals.
-    """
+    """Return the signals by unit, in the given order."""
     groups: dict[str, tuple[str, ...]] = {}
     for name in names:
         unit = run.units[name]

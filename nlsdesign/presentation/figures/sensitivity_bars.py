@@ -36,20 +36,7 @@ class VarianceShare(NamedTuple):
 
 @styled
 def sensitivity_bars(shares: Mapping[str, Sequence[VarianceShare]], *, words: str) -> Figure:
-    """Draw for each answer the axes in their order, with the share of each and its interval.
-
-    Parameters
-    ----------
-    shares
-        By answer, largest first.
-    words
-        Alternative text: what the figure shows.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is no answer, or one without a share.
-    """
+    """Draw for each answer the axes in their order, with the share of each and its interval."""
     if not shares or not all(shares.values()):
         raise ValueRangeError("sensitivity", "there is none to draw", next_step="leave this figure out")
     most = max(len(rows) for rows in shares.values())

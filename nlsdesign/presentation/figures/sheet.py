@@ -23,13 +23,7 @@ _GAP = 0.8
 
 
 class Sheet:
-    """A page of a given size; (0, 0) is its lower left corner, lengths are mm on paper.
-
-    Parameters
-    ----------
-    width, height
-        In mm.
-    """
+    """A page of a given size; (0, 0) is its lower left corner, lengths are mm on paper."""
 
     def __init__(self, width: float, height: float) -> None:
         self.figure = Figure(figsize=(width / _INCH, height / _INCH), dpi=72, layout="constrained")
@@ -40,74 +34,29 @@ class Sheet:
         self.axes.set_axis_off()
 
     def line(self, *points: Sequence[float] | Array, width: float = THIN, **look: Any) -> None:
-        """Draw straight lines through points.
-
-        Parameters
-        ----------
-        *points
-            Each of two numbers.
-        width
-            In points.
-        **look
-            For matplotlib.
-        """
+        """Draw straight lines through points."""
         x, y = np.array(points, dtype=float).T
         self.axes.plot(x, y, linewidth=width, **{"color": INK.light, "solid_capstyle": "butt", **look})
 
     def text(self, x: float, y: float, *, text: str, **look: Any) -> None:
-        """Write text; by default from a point to the right, on its base line.
-
-        Parameters
-        ----------
-        x, y
-            Place.
-        text
-            One or more lines.
-        **look
-            For matplotlib.
-        """
+        """Write text; by default from a point to the right, on its base line."""
         self.axes.text(x, y, text, **{"fontsize": TEXT, "color": INK.light, "va": "baseline", **look})
 
     def box(self, x: float, y: float, *, width: float, height: float) -> None:
-        """Draw the frame of a rectangle.
-
-        Parameters
-        ----------
-        x, y
-            Lower left corner.
-        width, height
-            Size.
-        """
+        """Draw the frame of a rectangle."""
         self.line((x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y))
 
     def area(self, points: Array, **look: Any) -> Polygon:
         """Draw a closed area and return it.
 
-        Parameters
-        ----------
-        points
-            Shape (n, 2).
-        **look
-            For matplotlib.
+        ``points``: shape (n, 2).
         """
         patch = Polygon(points, closed=True, **{"linewidth": THICK, "edgecolor": INK.light, **look})
         self.axes.add_patch(patch)
         return patch
 
     def measure(self, start: Array, end: Array, *, text: str, away: float, upright: bool = False) -> None:
-        """Draw a dimension between two points, level or upright.
-
-        Parameters
-        ----------
-        start, end
-            Measured points, shape (2,).
-        text
-            The dimension.
-        away
-            Coordinate of the dimension line: y of a level one, x of an upright one.
-        upright
-            Whether the difference in height is measured.
-        """
+        """Draw a dimension between two points, level or upright."""
         level = not upright
         along = 0 if level else 1
         feet = [np.array([p[0], away] if level else [away, p[1]]) for p in (start, end)]
@@ -138,14 +87,7 @@ class Sheet:
     def pointer(self, tip: Array, corner: Sequence[float], *, text: str) -> None:
         """Draw an arrow from a text to what it speaks of.
 
-        Parameters
-        ----------
-        tip
-            Point of the arrow, shape (2,).
-        corner
-            Where the line to the text bends; the text stands behind it, seen from the tip.
-        text
-            One or more lines.
+        ``corner``: where the line to the text bends; the text stands behind it, seen from the tip.
         """
         bend = np.array(corner, dtype=float)
         side = 1.0 if bend[0] >= tip[0] else -1.0
@@ -167,16 +109,7 @@ class Sheet:
     ) -> float:  # fmt: skip
         """Draw a table, its first row as a head, and return the height of its lower edge.
 
-        Parameters
-        ----------
-        place
-            Upper left corner.
-        widths
-            Of the columns; the first is set left, the others right.
-        rows
-            Cells as text.
-        row
-            Height of a row.
+        ``widths``: of the columns; the first is set left, the others right.
         """
         x, top = place
         for number, cells in enumerate(rows):

@@ -140,25 +140,13 @@ class Look(NamedTuple):
 
 
 def look(number: int) -> Look:
-    """Return how a line is drawn; the first 25 differ in colour or dashes.
-
-    Parameters
-    ----------
-    number
-        Of the line, from zero.
-    """
+    """Return how a line is drawn; the first 25 differ in colour or dashes."""
     shift = number + number // len(SERIES)
     return Look(SERIES[number % len(SERIES)].light, DASHES[shift % len(DASHES)], POINTS[number % len(POINTS)])
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Let a function draw in the common style, independent of the user's settings of matplotlib.
-
-    Parameters
-    ----------
-    draw
-        Function that returns a figure.
-    """
+    """Let a function draw in the common style, independent of the user's settings of matplotlib."""
 
     @functools.wraps(draw)
     def wrapped(*arguments: P.args, **named: P.kwargs) -> Figure:
@@ -173,17 +161,7 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 def panels(
     rows: int = 1, columns: int = 1, *, height: float = 3.2, width: float = WIDTH, **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Return an empty figure and its panels, row by row.
-
-    Parameters
-    ----------
-    rows, columns
-        Number of panels.
-    height, width
-        Of the whole figure in inches.
-    **options
-        For ``Figure.subplots``, for instance ``sharex=True`` or ``height_ratios``.
-    """
+    """Return an empty figure and its panels, row by row."""
     # At 72 dots per inch a dot is a point, so the SVG has the requested layout.
     figure = Figure(figsize=(width, height), dpi=72)
     axes = figure.subplots(rows, columns, squeeze=False, **options)
@@ -194,13 +172,6 @@ def legend(axes: Axes, *, columns: int = 4) -> None:
     """Put the legend above a panel, where it covers no data; none without labelled lines.
 
     It stands beside the title where both fit into one line, else below it.
-
-    Parameters
-    ----------
-    axes
-        Panel.
-    columns
-        Largest number of entries side by side.
     """
     handles, labels = axes.get_legend_handles_labels()
     if not handles:
@@ -229,12 +200,7 @@ def legend(axes: Axes, *, columns: int = 4) -> None:
 def log_axis(axes: Axes, *, abscissa: bool = False) -> None:
     """Make an axis logarithmic with plain numbers: ``200``, ``5000``, ``10⁻⁶``.
 
-    Parameters
-    ----------
-    axes
-        Panel.
-    abscissa
-        Whether it is the abscissa; else the ordinate.
+    ``abscissa``: whether it is the abscissa; else the ordinate.
     """
     axis: Axis = axes.xaxis if abscissa else axes.yaxis
     (axes.set_xscale if abscissa else axes.set_yscale)("log")
@@ -258,23 +224,12 @@ def _short(axis: Axis) -> bool:
 def described(figure: Figure, text: str) -> Figure:
     """Attach the alternative text of a figure, for readers who cannot see it.
 
-    Parameters
-    ----------
-    figure
-        Changed in place.
-    text
-        What it shows, in one or two sentences; not empty.
+    ``text``: what it shows, in one or two sentences; not empty.
     """
     figure.set_label(" ".join(text.split()))
     return figure
 
 
 def alternative_text(figure: Figure) -> str:
-    """Return the text attached by :func:`described`, or an empty text.
-
-    Parameters
-    ----------
-    figure
-        Any figure.
-    """
+    """Return the text attached by :func:`described`, or an empty text."""
     return str(figure.get_label() or "")

@@ -30,13 +30,7 @@ _VARIABLES = {tone.light: f"var(--{tone.name})" for tone in TONES}
 
 
 def svg_text(figure: Figure) -> str:
-    """Return a figure as a file of its own: light colours on white.
-
-    Parameters
-    ----------
-    figure
-        Any figure.
-    """
+    """Return a figure as a file of its own: light colours on white."""
     stream = io.StringIO()
     with mpl.rc_context({**STYLE, "savefig.facecolor": "white"}), _any_letters():
         metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}

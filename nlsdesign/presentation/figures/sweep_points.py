@@ -87,19 +87,7 @@ class PointKinds:
 
 
 class PointGroup(NamedTuple):
-    """Points of one kind.
-
-    Parameters
-    ----------
-    label
-        What they are.
-    rows
-        Their rows.
-    color, dash, marker
-        How they are drawn.
-    strong
-        Whether they stand out.
-    """
+    """Points of one kind."""
 
     label: str
     rows: Indices
@@ -110,30 +98,12 @@ class PointGroup(NamedTuple):
 
 
 def links(points: NDArray[np.int64]) -> list[str]:
-    """Return the link of each point on its page.
-
-    Parameters
-    ----------
-    points
-        Numbers of the points.
-    """
+    """Return the link of each point on its page."""
     return [f"#point-{number}" for number in points.tolist()]
 
 
 def scatter_points(axes: Axes, across: Array, up: Array, *, kinds: PointKinds, small: bool = False) -> None:
-    """Draw points in their kinds, each a link; those without a finite place are left out.
-
-    Parameters
-    ----------
-    axes
-        Panel.
-    across, up
-        Places, shape (n,).
-    kinds
-        What the points are.
-    small
-        Whether points that do not stand out are small, where something else is to be seen below them.
-    """
+    """Draw points in their kinds, each a link; those without a finite place are left out."""
     size = 0.4 if small else 1.0
     for group in kinds.groups():
         rows = group.rows[np.isfinite(across[group.rows]) & np.isfinite(up[group.rows])]
@@ -160,29 +130,13 @@ def _mark_look(group: PointGroup, size: float) -> dict[str, Any]:
 
 
 def shortened(text: str, most: int) -> str:
-    """Return a text with its control characters written out and its middle cut where it is long.
-
-    Parameters
-    ----------
-    text
-        A name that somebody chose.
-    most
-        Letters.
-    """
+    """Return a text with its control characters written out and its middle cut where it is long."""
     plain = " ".join(visible(text).split())
     return plain if len(plain) <= most else f"{plain[: most // 3]}…{plain[-(2 * most // 3 - 1) :]}"
 
 
 def in_lines(name: str, letters: int = 15) -> str:
-    """Return a name on several short lines, broken behind dots where there are some.
-
-    Parameters
-    ----------
-    name
-        Full name.
-    letters
-        Longest line.
-    """
+    """Return a name on several short lines, broken behind dots where there are some."""
     lines: list[str] = []
     for piece in shortened(name, 80).replace(".", ".\n").replace("_", "_\u200b").split("\n"):
         if lines and len(lines[-1]) + len(piece) <= letters and "\u200b" not in lines[-1]:

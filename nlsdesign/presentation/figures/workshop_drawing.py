@@ -138,11 +138,6 @@ def workshop_drawing(part: CamPart, *, title: TitleBlock, rows: Sequence[Inspect
 def scale_text(scale: float) -> str:
     """Return a scale as it is written on drawings.
 
-    Parameters
-    ----------
-    scale
-        Length on paper over length of the part.
-
     Examples
     --------
     >>> scale_text(5.0), scale_text(0.5)

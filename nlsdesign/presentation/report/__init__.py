@@ -6,8 +6,7 @@ from .command_pages import write_analysis_report, write_fit_report, write_observ
 from .design_sections import design_sections, tolerance_sections, write_design_report
 from .diagnosis import verdict_sections
 from .equations_section import EquationsSection
-from .page import report_text, write_report
-from .point_table import PointTableSection
+from .page import write_report
 from .regeneration_sections import regeneration_sections
 from .sections import (
     Chapter,
@@ -19,9 +18,8 @@ from .sections import (
     TableSection,
     TextSection,
 )
-from .side_by_side import ComparedResult, differing_numbers, key_figures, torque_at_rest, write_comparison
-from .tables import PublishedNumber, comparison_table, numbers_table, range_table
-from .verdict_section import VerdictSection
+from .side_by_side import ComparedResult, differing_numbers, key_figures, write_comparison
+from .tables import PublishedNumber, comparison_table, numbers_table
 
 __all__ = [
     "OUTCOMES",
@@ -35,22 +33,17 @@ __all__ = [
     "FileSection",
     "KeyNumber",
     "NumbersSection",
-    "PointTableSection",
     "PublishedNumber",
     "Section",
     "TableSection",
     "TextSection",
-    "VerdictSection",
     "comparison_table",
     "design_sections",
     "differing_numbers",
     "key_figures",
     "numbers_table",
-    "range_table",
     "regeneration_sections",
-    "report_text",
     "tolerance_sections",
-    "torque_at_rest",
     "verdict_sections",
     "write_analysis_report",
     "write_comparison",

@@ -101,11 +101,6 @@ class CalculationSection(Section):
 def typeset(expression: Any) -> Html:
     """Return a SymPy expression as MathML; ``F_M``, ``F*`` and ``dF/dt`` get index, superscript and fraction.
 
-    Parameters
-    ----------
-    expression
-        Equation or expression.
-
     Examples
     --------
     >>> import sympy

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
-from ..figures import CamMotion, cam_picture, inline_svg
-from ..figures.cam_frames import MARKER
+from ..figures import CamMotion, inline_svg
+from ..figures.cam_frames import MARKER, cam_picture
 from .data_link import data_link
 from .html import Html
 from .sections import PagePosition, Section

@@ -36,15 +36,7 @@ class DataLink(NamedTuple):
 
 
 def file_link(file: Path, folder: Path) -> DataLink:
-    """Return a link to the file that holds the numbers behind a figure.
-
-    Parameters
-    ----------
-    file
-        Written beside the page.
-    folder
-        Of the page.
-    """
+    """Return a link to the file that holds the numbers behind a figure."""
     relative = Path(os.path.relpath(file, folder)).as_posix()
     return DataLink(
         file.name, quote(relative), f"Data behind this figure, all points ({file.suffix[1:].upper()})"
@@ -52,15 +44,7 @@ def file_link(file: Path, folder: Path) -> DataLink:
 
 
 def data_link(figure: Figure, title: str) -> DataLink | None:
-    """Return the numbers that a figure shows as a link that holds them; none where it shows none.
-
-    Parameters
-    ----------
-    figure
-        Any figure.
-    title
-        Gives the file its name.
-    """
+    """Return the numbers that a figure shows as a link that holds them; none where it shows none."""
     content = figure_data(figure)
     if not content["panels"]:
         return None

@@ -12,17 +12,15 @@ from ...bench.discrepancy.reporting.fitted_numbers import FittedNumber, fitted_n
 from ...bench.discrepancy.reporting.verdict import RecordGap, Verdict, best_forms, let_go, suspicions
 from ...foundation.quantity import typeset_unit, with_error
 from ...model import FlatModel, flatten
-from ..figures import (
+from ..figures import RecordError, compact, gap_bars
+from ..figures.before_after import (
     CandidateShare,
     HeldOut,
-    RecordError,
     binned_errors,
     candidate_shares,
-    compact,
-    gap_bars,
     held_out_series,
-    significant,
 )
+from ..figures.number_text import significant
 from .sections import Chapter, FigureSection, Section, TableSection
 from .verdict_section import VerdictSection
 
@@ -195,15 +193,7 @@ def _numbers(verdict: Verdict) -> list[Section]:
 
 
 def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
-    """Return the table of refitted numbers, highlighted those that left their declared range.
-
-    Parameters
-    ----------
-    numbers
-        Declared and fitted.
-    how
-        Under which model they were fitted, for the caption.
-    """
+    """Return the table of refitted numbers, highlighted those that left their declared range."""
     if not numbers:
         return []
     rows = tuple(

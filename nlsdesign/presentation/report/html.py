@@ -27,11 +27,6 @@ class Html(str):
 def words(text: str) -> Html:
     """Return plain text as HTML, escaped; names between backticks are set as code.
 
-    Parameters
-    ----------
-    text
-        Plain text.
-
     Examples
     --------
     >>> words("`a.b` < 3")
@@ -42,11 +37,6 @@ def words(text: str) -> Html:
 
 def visible(page: str) -> str:
     r"""Return a text in which control characters and marks of direction are written out, as ``\x1b``.
-
-    Parameters
-    ----------
-    page
-        Text or HTML.
 
     Examples
     --------
@@ -59,11 +49,6 @@ def visible(page: str) -> str:
 def breakable(text: Html) -> Html:
     """Return HTML in which a line may break behind the dots and underscores of names.
 
-    Parameters
-    ----------
-    text
-        HTML.
-
     Examples
     --------
     >>> breakable(words("`a.b` of 1.5"))
@@ -73,12 +58,6 @@ def breakable(text: Html) -> Html:
 
 
 def prose(text: str) -> Html:
-    """Return paragraphs as HTML; empty lines separate them.
-
-    Parameters
-    ----------
-    text
-        Plain text, as for :func:`words`.
-    """
+    """Return paragraphs as HTML; empty lines separate them."""
     paragraphs = [part.strip() for part in re.split(r"\n\s*\n", text) if part.strip()]
     return Html("\n".join(f"<p>{words(part)}</p>" for part in paragraphs))

@@ -24,13 +24,7 @@ _FENCES = {"Abs": ("|", "|"), "floor": ("⌊", "⌋"), "ceiling": ("⌈", "⌉")
 
 
 def equation_rows(equations: Equations) -> tuple[list[list[Html]], list[list[Html]]]:
-    """Return the derivatives (or next states) and the definitions, each in pieces between which it may break.
-
-    Parameters
-    ----------
-    equations
-        Of a flat model.
-    """
+    """Return the derivatives (or next states) and the definitions, in pieces between which they may break."""
     left = _next if equations.discrete else _derivative
     states = [_row(left(name), e) for name, e in equations.derivatives.items()]
     return states, [_row(_name(name), e) for name, e in equations.definitions.items()]
@@ -39,10 +33,7 @@ def equation_rows(equations: Equations) -> tuple[list[list[Html]], list[list[Htm
 def formula(expression: Any) -> Html:
     """Return a SymPy expression as one ``math`` element.
 
-    Parameters
-    ----------
-    expression
-        Any SymPy expression; one without a layout here is printed as by SymPy.
+    ``expression``: any SymPy expression; one without a layout here is printed as by SymPy.
     """
     return _math(_layout(expression))
 

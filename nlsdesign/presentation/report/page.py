@@ -76,15 +76,7 @@ def report_text(
     abstract: str = "",
     facts: Mapping[str, str] | None = None,
 ) -> str:
-    """Return a report as text; the same for the same sections.
-
-    Parameters
-    ----------
-    folder
-        Folder that relative links start from.
-    sections, title, abstract, facts
-        As for :func:`write_report`.
-    """
+    """Return a report as text; the same for the same sections."""
     pieces = list(sections)
     entries = _entries(folder, pieces)
     script = "\n".join(_source(name) for name in dict.fromkeys(["report.js", *_scripts(pieces)]))

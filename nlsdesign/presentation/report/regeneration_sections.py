@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...foundation.quantity import three_digits, typeset_unit
-from ..figures import HeldOut, held_out_series
+from ..figures.before_after import HeldOut, held_out_series
 from .sections import Chapter, FigureSection, FileSection, KeyNumber, NumbersSection, Section, TableSection
 
 if TYPE_CHECKING:

@@ -12,8 +12,9 @@ from typing import Any, ClassVar
 from urllib.parse import quote
 
 from ...foundation.errors import ExportError, ValueRangeError
-from ..figures import Figure, alternative_text, inline_svg
+from ..figures import Figure, inline_svg
 from ..figures.number_text import compact, significant
+from ..figures.style import alternative_text
 from .data_link import data_link, file_link
 from .html import Html
 
@@ -38,13 +39,7 @@ class PagePosition:
     folder: Path
 
     def inner(self, number: int) -> PagePosition:
-        """Return the place of a section inside this one.
-
-        Parameters
-        ----------
-        number
-            Its number there.
-        """
+        """Return the place of a section inside this one."""
         return PagePosition(f"{self.key}-{number}", self.folder)
 
 

@@ -171,18 +171,7 @@ def _table(
 
 
 def torque_at_rest(model: FlatModel) -> tuple[Array, Array]:
-    """Return angles in rad, to the end of the contour, and the torque of the spring at rest in N·m.
-
-    Parameters
-    ----------
-    model
-        With a spring whose motion is an angle.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not say which spring is meant.
-    """
+    """Return angles in rad, to the end of the contour, and the torque of the spring at rest in N·m."""
     cams = [cam for spring in model.springs for cam in spring.cams if cam.last_angle]
     last = min((model.values[cam.last_angle or ""] for cam in cams), default=_HALF_TURN)
     angles = np.linspace(0.0, last, _ANGLES)

@@ -46,13 +46,7 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
 
 
 def value_in_words(q: Quantity) -> str:
-    """Return a value without its unit; of a long row how many, the least and the largest.
-
-    Parameters
-    ----------
-    q
-        Number or row of numbers.
-    """
+    """Return a value without its unit; of a long row how many, the least and the largest."""
     shown = q.shown
     if not isinstance(shown, tuple):
         return compact(shown, 6)
@@ -87,15 +81,7 @@ class PublishedNumber:
 
 
 def range_table(title: str, traces: Mapping[str, Trace]) -> TableSection:
-    """Return the table of laws that were used beyond their stated range; the caption tells if there are none.
-
-    Parameters
-    ----------
-    title
-        Heading.
-    traces
-        Results by their label in the report.
-    """
+    """Return the table of laws used beyond their stated range; the caption tells if there are none."""
     rows = tuple(
         (label, w.name, f"{w.minimum:g} to {w.maximum:g}", typeset_unit(w.unit), compact(w.furthest, 4),
          compact(w.time, 4))

@@ -40,11 +40,6 @@ class VerdictSection(Section):
         How the model after differs from the one before.
     parts
         Sections with the evidence.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such verdict.
     """
 
     verdict: str

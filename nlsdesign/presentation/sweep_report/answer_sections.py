@@ -10,14 +10,10 @@ from ...foundation.arrays import Array
 from ...foundation.quantity import three_digits, typeset_unit, with_unit
 from ...sweeps.answer_quantiles import BoundedQuantile, answer_quantiles
 from ...sweeps.sensitivity import AnswerSensitivity
-from ..figures import (
-    Figure,
-    MarkedQuantile,
-    ShownColumn,
-    VarianceShare,
-    answer_histograms,
-    sensitivity_bars,
-)
+from ..figures import Figure
+from ..figures.answer_histograms import MarkedQuantile, answer_histograms
+from ..figures.sensitivity_bars import VarianceShare, sensitivity_bars
+from ..figures.sweep_points import ShownColumn
 from ..report import FigureSection, Section, TableSection, TextSection
 from .page_content import PageContent, listed_names
 from .shown_points import shown_column
@@ -52,13 +48,7 @@ class _Distribution(NamedTuple):
 
 
 def histogram_sections(content: PageContent) -> list[Section]:
-    """Return histograms and quantiles of the answers, and the quantiles as a table.
-
-    Parameters
-    ----------
-    content
-        Of the page.
-    """
+    """Return histograms and quantiles of the answers, and the quantiles as a table."""
     bounded = _are_draws(content)
     names = content.answers[:MOST_HISTOGRAMS]
     everything = [_distribution(content, name, bounded=bounded) for name in names]
@@ -130,13 +120,7 @@ def _not_finite(name: str, values: Array) -> str:
 
 
 def sensitivity_sections(content: PageContent) -> list[Section]:
-    """Return the shares of the variance that the axes cause, or why there are none.
-
-    Parameters
-    ----------
-    content
-        Of the page.
-    """
+    """Return the shares of the variance that the axes cause, or why there are none."""
     results = content.sensitivities
     shown = {name: each for name, each in results.items() if each.indices}
     refused = tuple((name, each.refusal) for name, each in results.items() if not each.indices)

@@ -18,28 +18,12 @@ _LONGEST: Final = 300
 
 
 def point_list(points: list[int], most: int = 6) -> str:
-    """Return the first numbers of points as text.
-
-    Parameters
-    ----------
-    points
-        Their numbers.
-    most
-        How many are written.
-    """
+    """Return the first numbers of points as text."""
     return ", ".join(map(str, points[:most])) + (", …" if len(points) > most else "")
 
 
 def asked_sections(table: SweepTable, ranked: RankedPoints) -> list[Section]:
-    """Return the sections in the order of the page.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    ranked
-        Its points.
-    """
+    """Return the sections in the order of the page."""
     return [_numbers(table, ranked), _axes(table), *_directions(table, ranked), *_failures(table)]
 
 
@@ -151,12 +135,6 @@ def _cut(text: str) -> str:
 
 
 def unit_of(column: SweepColumn) -> str:
-    """Return the unit of a column as people read it, with a word before it, or nothing.
-
-    Parameters
-    ----------
-    column
-        Of the table.
-    """
+    """Return the unit of a column as people read it, with a word before it, or nothing."""
     unit = typeset_unit(shown_unit(column.unit)[0] or "1")
     return f" in {unit}" if unit else ""

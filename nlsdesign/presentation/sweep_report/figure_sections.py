@@ -5,22 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from ...sweeps.preferences import NearIsBetter
-from ..figures import answers_against, parallel_coordinates
-from ..figures.answers_against import MOST_PANELS
-from ..figures.parallel_coordinates import MOST_COORDINATES
+from ..figures.answers_against import MOST_PANELS, answers_against
+from ..figures.parallel_coordinates import MOST_COORDINATES, parallel_coordinates
 from ..report import FigureSection, Section
 from .page_content import PageContent, listed_names
 from .shown_points import shown_column, shown_unit
 
 
 def front_sections(content: PageContent) -> list[Section]:
-    """Return the figure of the front, none without two directions.
-
-    Parameters
-    ----------
-    content
-        Of the page.
-    """
+    """Return the figure of the front, none without two directions."""
     preferences = content.ranked.preferences[: MOST_PANELS + 1]
     if len(preferences) < 2 or not np.any(content.ranked.compared):
         return []
@@ -51,13 +44,7 @@ def front_sections(content: PageContent) -> list[Section]:
 
 
 def coordinate_sections(content: PageContent) -> list[Section]:
-    """Return the parallel coordinates of axes and answers.
-
-    Parameters
-    ----------
-    content
-        Of the page.
-    """
+    """Return the parallel coordinates of axes and answers."""
     table, shown = content.table, content.shown
     axes, answers = content.varying_axes(), [table.column(name) for name in content.answers]
     same = [column.name for column in (*table.axes, *answers) if not content.varies(column)]

@@ -14,36 +14,12 @@ from .shown_points import ShownPoints
 
 
 def listed_names(names: list[str], most: int = 8) -> str:
-    """Return names as text, the first of them.
-
-    Parameters
-    ----------
-    names
-        Full names.
-    most
-        How many are written.
-    """
+    """Return names as text, the first of them."""
     return ", ".join(f"`{name}`" for name in names[:most]) + (", …" if len(names) > most else "")
 
 
 class PageContent(NamedTuple):
-    """What the figures of a page are made from.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    ranked
-        Its points.
-    shown
-        Those that figures draw.
-    answers
-        Names of the answers in the order of the page: those that are compared first.
-    sensitivities
-        By answer, of the first answers.
-    points_file
-        Table of all points.
-    """
+    """What the figures of a page are made from."""
 
     table: SweepTable
     ranked: RankedPoints

@@ -17,40 +17,18 @@ _DIGITS, _LONGEST = 6, 300
 
 
 def row_columns(table: SweepTable) -> list[SweepColumn]:
-    """Return the columns of a row: axes, then answers.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    """
+    """Return the columns of a row: axes, then answers."""
     return [*table.axes, *table.answers]
 
 
 def named_columns(table: SweepTable) -> list[tuple[str, str]]:
-    """Return name and unit of each column of a row, as people read them.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    """
+    """Return name and unit of each column of a row, as people read them."""
     shown = (shown_column(table, column) for column in row_columns(table))
     return [(each.name, typeset_unit(each.unit or "1")) for each in shown]
 
 
 def point_rows(table: SweepTable, ranked: RankedPoints, shown: ShownPoints) -> dict[int, Mapping[str, Any]]:
-    """Return for each point that is shown its status, reason and values, by number.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    ranked
-        Its points.
-    shown
-        Which points.
-    """
+    """Return for each point that is shown its status, reason and values, by number."""
     columns = [_texts(table, column, shown) for column in row_columns(table)]
     front = set(ranked.front.tolist())
     rows: dict[int, Mapping[str, Any]] = {}

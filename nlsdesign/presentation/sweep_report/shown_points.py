@@ -9,7 +9,7 @@ import numpy as np
 from ...foundation.arrays import Indices, Mask
 from ...sweeps import SweepColumn, SweepTable
 from ...sweeps.ranked_points import RankedPoints
-from ..figures import PointKinds, ShownColumn
+from ..figures.sweep_points import PointKinds, ShownColumn
 
 MOST_OTHERS: Final = 1500
 MOST_KEPT: Final = 10_000
@@ -38,10 +38,7 @@ class ShownPoints(NamedTuple):
 def shown_unit(unit: str) -> tuple[str, float]:
     """Return the unit that people read in place of one of SI, and how many of it make one of SI.
 
-    Parameters
-    ----------
-    unit
-        Of a column; empty for words and counts.
+    ``unit``: of a column; empty for words and counts.
     """
     return _UNITS.get(unit, (unit, 1.0))
 
@@ -49,14 +46,7 @@ def shown_unit(unit: str) -> tuple[str, float]:
 def shown_column(table: SweepTable, column: SweepColumn, rows: Indices | slice = slice(None)) -> ShownColumn:
     """Return a column as figures show it.
 
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    column
-        Of the table.
-    rows
-        Which rows; all by default.
+    ``rows``: which rows; all by default.
     """
     values = np.asarray(table.values[column.name])[rows]
     unit, factor = shown_unit(column.unit)
@@ -66,15 +56,7 @@ def shown_column(table: SweepTable, column: SweepColumn, rows: Indices | slice =
 
 
 def shown_points(table: SweepTable, ranked: RankedPoints) -> ShownPoints:
-    """Return the points that are shown: failures, the front, the ends of columns, and others by lot.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    ranked
-        Its points.
-    """
+    """Return the points that are shown: failures, the front, the ends of columns, and others by lot."""
     count = len(table)
     on_front = np.zeros(count, dtype=bool)
     on_front[ranked.front] = True

@@ -7,7 +7,8 @@ import numpy as np
 from ...foundation.quantity import three_digits, with_unit
 from ...sweeps import SweepColumn
 from ...sweeps.answer_surface import AnswerSurface, answer_surface
-from ..figures import ShownColumn, SurfacePanel, response_surfaces
+from ..figures.response_surfaces import SurfacePanel, response_surfaces
+from ..figures.sweep_points import ShownColumn
 from ..report import FigureSection, Section
 from .page_content import PageContent
 from .shown_points import shown_column
@@ -16,13 +17,7 @@ MOST_SURFACES = 4
 
 
 def surface_sections(content: PageContent) -> list[Section]:
-    """Return the surfaces of the first answers over the two axes that matter most for each.
-
-    Parameters
-    ----------
-    content
-        Of the page.
-    """
+    """Return the surfaces of the first answers over the two axes that matter most for each."""
     axes = content.varying_axes()
     numbers = [axis for axis in axes if not shown_column(content.table, axis).words]
     if len(numbers) < 2:

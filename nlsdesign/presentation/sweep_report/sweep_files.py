@@ -25,20 +25,7 @@ DECKS_FOLDER = "point_decks"
 
 
 def write_points(table: SweepTable, folder: Path) -> Path:
-    """Write all points as a table of comma-separated values, in SI, and return its path.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    folder
-        Of the page.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be written.
-    """
+    """Write all points as a table of comma-separated values, in SI, and return its path."""
     path = folder / POINTS_FILE
     write_table(path, _rows(table))
     return path
@@ -53,27 +40,7 @@ def _rows(table: SweepTable) -> Iterator[Sequence[str]]:
 
 
 def write_decks(table: SweepTable, points: Iterable[int], folder: Path) -> tuple[dict[int, str], list[str]]:
-    """Write the decks behind points; a point whose deck cannot be made has none, with the reason.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    points
-        Numbers of the points.
-    folder
-        Of the page.
-
-    Returns
-    -------
-    tuple
-        Paths from the folder by number of the point, and sentences on points that have no deck.
-
-    Raises
-    ------
-    ExportError
-        If a file cannot be written.
-    """
+    """Write the decks behind points; a point whose deck cannot be made has none, with the reason."""
     written: dict[int, str] = {}
     remarks: dict[str, list[int]] = {}
     for point, text in point_deck_texts(table, points):
@@ -92,13 +59,7 @@ def _numbers(points: Sequence[int]) -> str:
 
 
 def about_of(table: SweepTable) -> dict[str, str]:
-    """Return what the sweep says of itself, in texts by name.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    """
+    """Return what the sweep says of itself, in texts by name."""
     result = {}
     for name, value in table.about.items():
         if name in ("format", "columns") or value in (None, "", [], {}):

@@ -14,7 +14,8 @@ from ...sweeps import SweepTable
 from ...sweeps.preferences import NotBelow, Preference, Requirement
 from ...sweeps.ranked_points import RankedPoints, rank_points
 from ...sweeps.sensitivity import AnswerSensitivity, sensitivity
-from ..report import FileSection, PointTableSection, Section, TableSection, TextSection, write_report
+from ..report import FileSection, Section, TableSection, TextSection, write_report
+from ..report.point_table import PointTableSection
 from .answer_sections import histogram_sections, sensitivity_sections
 from .asked_sections import asked_sections, unit_of
 from .figure_sections import coordinate_sections, front_sections
@@ -144,13 +145,7 @@ def _written(
 
 
 def usual_requirements(table: SweepTable) -> list[Requirement]:
-    """Return what a point must keep where nothing is stated: a design must have met its target.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    """
+    """Return what a point must keep where nothing is stated: a design must have met its target."""
     return [NotBelow(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
 
 

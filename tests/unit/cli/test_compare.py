@@ -15,6 +15,7 @@ from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.foundation.locations import folder
 from nlsdesign.model import flatten
 from nlsdesign.presentation import report
+from nlsdesign.presentation.report.side_by_side import torque_at_rest
 from tests.command_line import Run, run
 
 __all__ = ["run"]
@@ -72,7 +73,7 @@ def test_designs_and_verdicts_stand_side_by_side(run: Run, tmp_path: Path) -> No
 
 def test_the_curves_are_those_of_the_springs_at_rest() -> None:
     model = flatten(declare(load_deck(SOFT)))
-    angles, torques = report.torque_at_rest(model)
+    angles, torques = torque_at_rest(model)
     stiffness = next(value for name, value in model.values.items() if name.endswith("stiffness"))
     assert angles[-1] == pytest.approx(np.pi / 2)
     assert torques == pytest.approx(stiffness * angles, rel=1e-9)

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import refit
-from nlsdesign.bench.identification import Column, RecordSet, load_records
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import Assembly, Dashpot, Mass, Spring, tie
 from nlsdesign.components.assembly.deck_writer import deck_digest, declare, write_deck
 from nlsdesign.components.assembly.named_parts import assembly

@@ -37,8 +37,8 @@ from nlsdesign.feedback.control import (
     check_torque,
     largest_torque,
     torque_controller,
-    torque_limit,
 )
+from nlsdesign.feedback.control.laws.known_drive import torque_limit
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten

@@ -27,7 +27,6 @@ from nlsdesign.components import (
     OneSidedCam,
     Pulley,
     Specimen,
-    Strength,
     Strip,
     TwoSidedCam,
     specimen,
@@ -35,6 +34,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.materials.specimen import Strength
 from nlsdesign.design.statics.declared_cam import cam_from_profile
 from nlsdesign.design.statics.equilibrium import elastic_law
 from nlsdesign.foundation.deck import load_deck, read_deck

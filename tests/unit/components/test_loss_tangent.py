@@ -25,12 +25,12 @@ from nlsdesign.components import (
     materials,
     measured_relaxation,
     peaked_relaxation,
-    relaxation_of,
     relaxing_law_of,
     relaxing_rubber_of,
     with_rubber,
 )
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
+from nlsdesign.components.materials.loss_tangent import relaxation_of
 from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten

@@ -25,6 +25,7 @@ from nlsdesign.design import (
 from nlsdesign.design.optimisation.program import Program, Solution
 from nlsdesign.foundation.errors import InfeasibleError, ValueRangeError
 from nlsdesign.presentation import figures
+from nlsdesign.presentation.figures.style import alternative_text
 from tests.cam_cases import CONCAVE, KEEP, RUBBER, TARGET, actuator
 
 AREA = RUBBER[:3]
@@ -138,7 +139,7 @@ def test_the_figure_draws_every_point_with_its_number() -> None:
     assert axes.get_ylabel() == "rubber volume in cm³"
     line = axes.lines[0].get_xydata()
     assert np.sort(line[:, 1]) == pytest.approx(front().shown[:, 0])
-    assert "Front of" in figures.alternative_text(figure)
+    assert "Front of" in alternative_text(figure)
 
 
 def test_three_goals_are_drawn_by_steps_of_the_third() -> None:

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.export import CompiledStep, export_c
+from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_SATURATED,
@@ -29,6 +29,7 @@ from nlsdesign.export.c.guarded_step import (
     index_bit,
 )
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_program, run_compiler
+from nlsdesign.export.compilation.running_c import CompiledStep
 from nlsdesign.feedback.observer import design_adaptive_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError

@@ -11,6 +11,7 @@ import nlsdesign as nls
 from benchmarks import targets
 from nlsdesign.export import CORTEX_M4F
 from nlsdesign.export.target.emulator import missing_emulator
+from nlsdesign.export.target.target_run import TargetRun
 from nlsdesign.feedback.control import joined
 from nlsdesign.feedback.observer import design_observer_with_details
 
@@ -51,7 +52,7 @@ def test_a_missed_goal_is_named(chosen, monkeypatch):
         alone=None,
         added=nls.export.target.elf_file.SectionSizes(20_000, 0, 0),
         state=10,
-        run=nls.export.TargetRun(np.array([450, 460, 470]), np.array([8]), np.zeros(1), np.zeros(1), True),
+        run=TargetRun(np.array([450, 460, 470]), np.array([8]), np.zeros(1), np.zeros(1), True),
     )
     assert targets.missed([("cascade observer", "float", CORTEX_M4F, cost)]) == [
         "cascade observer: 460 instructions, the goal is 400",

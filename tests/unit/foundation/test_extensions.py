@@ -15,7 +15,9 @@ from nlsdesign.bench.discrepancy.effects import catalogue
 from nlsdesign.components import component_classes, law_of, materials
 from nlsdesign.foundation.errors import ArrangementError, DeckError, NlsError
 from nlsdesign.foundation.extensions import extended_by, load_extension
-from nlsdesign.live import DropLimit, LiveDesign, question_of_deck
+from nlsdesign.live.edits import DropLimit
+from nlsdesign.live.gallery import question_of_deck
+from nlsdesign.live.live_design import LiveDesign
 from tests.command_line import Run, run
 
 __all__ = ["run"]

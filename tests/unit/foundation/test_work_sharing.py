@@ -18,7 +18,6 @@ import pytest
 from nlsdesign.foundation.errors import ValueRangeError, WorkSharingError
 from nlsdesign.foundation.processes import parallel_map
 from nlsdesign.foundation.work_sharing import (
-    ChunkSizes,
     CodeIdentity,
     DaskScheduler,
     Executor,
@@ -31,6 +30,7 @@ from nlsdesign.foundation.work_sharing import (
 from nlsdesign.foundation.work_sharing.chunks import Chunk, WorkerRefusal, computed_elsewhere
 from nlsdesign.foundation.work_sharing.mpi_ranks import FuturesTeam
 from nlsdesign.foundation.work_sharing.refusals import refused, sendable
+from nlsdesign.foundation.work_sharing.shared_map import ChunkSizes
 
 
 def square(number: int) -> int:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from nlsdesign.live import gallery_question
+from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.limit_kinds import LIMIT_KINDS
 from nlsdesign.live.quick_conflict import SoftenedProgram
 from nlsdesign.live.quick_rows import QuickRows

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.foundation.errors import NlsError, UnknownNameError, ValueRangeError
-from nlsdesign.live import (
+from nlsdesign.live.answers import LimitMargin, to_json
+from nlsdesign.live.edits import (
     AddPoint,
     ChangeLimit,
     ChooseDeck,
@@ -21,22 +22,15 @@ from nlsdesign.live import (
     FreeNumber,
     HoldNumber,
     LiveEdit,
-    LiveQuestion,
     MovePoint,
     RemovePoint,
-    SavedDesign,
     ScaleTarget,
     SetNumber,
     edit_from,
-    gallery_cards,
-    gallery_question,
-    question_of_deck,
-    reopened,
-    to_json,
 )
-from nlsdesign.live.answers import LimitMargin
-from nlsdesign.live.question import MOST_POINTS
-from nlsdesign.live.saved import saved
+from nlsdesign.live.gallery import gallery_cards, gallery_question, question_of_deck
+from nlsdesign.live.question import MOST_POINTS, LiveQuestion
+from nlsdesign.live.saved import SavedDesign, reopened, saved
 from nlsdesign.live.session_news import choices
 from nlsdesign.live.views import not_kept, unkept
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.live import gallery_question
+from nlsdesign.live.gallery import gallery_question
 from tests.browser import Tab, browser, chromium
 from tests.live_server import Server, running
 from tests.live_session import as_csv, bench_records

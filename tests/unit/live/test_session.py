@@ -22,7 +22,7 @@ from nlsdesign.design import tolerance_analysis
 from nlsdesign.design.statics.equilibrium import equilibrium_torque
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.foundation.errors import NlsError
-from nlsdesign.live import gallery_question
+from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.uploads import Uploads
 from tests.command_line import Run, run
 from tests.live_session import Message, Session, as_csv, bench_records, session

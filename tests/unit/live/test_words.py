@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlsdesign.live import FreeNumber, HoldNumber, LiveQuestion, gallery_question
 from nlsdesign.live.answers import LimitMargin, LiveColumn
+from nlsdesign.live.edits import FreeNumber, HoldNumber
+from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.limit_kinds import LIMIT_KINDS
 from nlsdesign.live.limit_words import holding, in_words
+from nlsdesign.live.question import LiveQuestion
 from nlsdesign.live.stretch import StrainEnd, smallest, stretched_beyond
 from nlsdesign.live.views import not_kept
 

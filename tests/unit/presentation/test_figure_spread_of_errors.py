@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from nlsdesign.feedback.observer import SpreadErrors
-from nlsdesign.presentation.figures import alternative_text, errors_over_spread
+from nlsdesign.presentation.figures import errors_over_spread
+from nlsdesign.presentation.figures.style import alternative_text
 
 DRAWN = np.array([[[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], [[7.0, 7.0], [7.0, 7.0], [7.0, 7.0]]]) * 1e-3
 

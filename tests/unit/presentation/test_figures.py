@@ -18,9 +18,14 @@ from matplotlib.colors import to_hex
 from nlsdesign.design import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.presentation import figures
+from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
 from nlsdesign.presentation.figures.cam_frames import MARKER, cam_picture
+from nlsdesign.presentation.figures.cam_motion import cam_motion
 from nlsdesign.presentation.figures.lines import thinned
-from nlsdesign.presentation.figures.style import SERIES, TONES, look
+from nlsdesign.presentation.figures.number_text import significant
+from nlsdesign.presentation.figures.over_angle import observer_stability
+from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look
+from nlsdesign.presentation.figures.svg import svg_text
 from tests import figure_samples as samples
 from tests.selection import quick_only
 
@@ -46,9 +51,9 @@ def drawn(name: str) -> figures.Figure:
 
 @pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::4]))
 def test_a_figure_is_drawn_the_same_whatever_the_user_has_set(name: str) -> None:
-    first = figures.svg_text(drawn(name))
+    first = svg_text(drawn(name))
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 20.0, "axes.facecolor": "red"}):
-        assert figures.svg_text(samples.FIGURES[name]()) == first
+        assert svg_text(samples.FIGURES[name]()) == first
     assert "<dc:date>" not in first
     assert "#ff0000" not in first
 
@@ -56,7 +61,7 @@ def test_a_figure_is_drawn_the_same_whatever_the_user_has_set(name: str) -> None
 @pytest.mark.parametrize("name", samples.FIGURES)
 def test_a_figure_has_words_labels_and_units(name: str) -> None:
     figure = drawn(name)
-    assert len(figures.alternative_text(figure)) > 40
+    assert len(alternative_text(figure)) > 40
     shown = [axes for axes in figure.axes if axes.get_visible()]
     if name == "cam_positions":
         assert "mm" in figure.get_supxlabel()
@@ -74,7 +79,7 @@ def test_an_inline_figure_fits_into_any_page(name: str) -> None:
     figure = drawn(name)
     root = ET.fromstring(figures.inline_svg(figure, "k7"))
     assert root.tag == f"{SVG}svg"
-    assert root.get("aria-label") == figures.alternative_text(figure)
+    assert root.get("aria-label") == alternative_text(figure)
     # What an image holds is not read out, and links are.
     assert root.get("role") == ("img" if root.find(f".//{SVG}a") is None else "group")
     assert root.get("viewBox")
@@ -217,7 +222,7 @@ def test_a_gap_in_a_line_stays_a_gap() -> None:
     ],
 )
 def test_numbers_as_people_write_them(value: float, digits: int, shown: str) -> None:
-    assert figures.significant(value, digits) == shown
+    assert significant(value, digits) == shown
 
 
 def test_numbers_without_zeros_at_their_end() -> None:
@@ -289,7 +294,7 @@ def test_a_cam_that_cannot_be_made_says_so() -> None:
     hollow = contour_from_curvature(
         nodes, np.where(nodes < 0.25, -2e-3, 9e-3), first_slope=8e-3, anchor_distance=25e-3
     )
-    warning = figures.cam_motion(hollow, lambda e: 9e3 * e, rest_length=12.5e-3).warning
+    warning = cam_motion(hollow, lambda e: 9e3 * e, rest_length=12.5e-3).warning
     assert "concave between 0.0° and" in warning
     assert "down to −2.0 mm" in warning
 
@@ -312,28 +317,28 @@ def test_the_area_of_a_loop() -> None:
 
 
 def test_the_errors_named_are_those_of_the_data() -> None:
-    assert "cam of the deck 10 mN·m" in figures.alternative_text(samples.against_target())
+    assert "cam of the deck 10 mN·m" in alternative_text(samples.against_target())
     observer = figures.observer_error(samples.TIME, samples.torque(), {"A": samples.torque() + 0.025})
-    assert "A 25.0 mN·m" in figures.alternative_text(observer)
+    assert "A 25.0 mN·m" in alternative_text(observer)
     assert [t.get_text() for t in observer.axes[1].get_legend().get_texts()] == ["A: rms 25.0 mN·m"]
 
 
 def test_angles_that_are_not_observable_are_marked() -> None:
     figure = figures.observability_over_angle({"F_M": samples.chart()})
-    assert "not observable at 0.0°" in figures.alternative_text(figure)
+    assert "not observable at 0.0°" in alternative_text(figure)
     crosses = [line for line in figure.axes[1].lines if line.get_marker() == "x"]
     assert [line.get_xdata().tolist() for line in crosses] == [[0.0]]
     assert figure.axes[1].get_yscale() == "log"
 
 
 def test_an_observer_that_diverges_is_not_hidden_by_the_axis() -> None:
-    bad = figures.observer_stability(
+    bad = observer_stability(
         {"A": samples.ErrorStability(np.array([-0.5, 0.0, 0.5]), np.array([0.9, 1.02, 0.9]), False, False)},
         sample_time=1e-3,
     )
     assert bad.axes[0].get_yscale() == "linear"
     assert bad.axes[0].lines[0].get_ydata().min() == pytest.approx(-np.log(1.02) / 1e-3)
-    assert "slowest −19.8 1/s at 0°, checked only" in figures.alternative_text(bad)
+    assert "slowest −19.8 1/s at 0°, checked only" in alternative_text(bad)
 
 
 def test_bars_are_as_high_as_the_errors_and_held_out_records_stand_right() -> None:
@@ -368,8 +373,8 @@ def test_no_number_of_a_bar_is_struck_through_by_the_noise_floor() -> None:
 
 def test_a_record_is_not_drawn_where_its_samples_do_not_count() -> None:
     time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(2.0, 3.0, 0.01)])
-    record = figures.HeldOut(time, np.sin(time), 0.9 * np.sin(time), np.sin(time), "force", "N")
-    upper, lower = figures.held_out_series(record).axes
+    record = HeldOut(time, np.sin(time), 0.9 * np.sin(time), np.sin(time), "force", "N")
+    upper, lower = held_out_series(record).axes
     for line in (*upper.lines, *lower.lines):
         inside = (line.get_xdata() > 1.0) & (line.get_xdata() < 2.0)
         assert inside.any()
@@ -390,7 +395,7 @@ def test_errors_in_bins_have_units_for_people() -> None:
     axes = drawn("binned_errors").axes[0]
     assert axes.get_xlabel() == "motor.angle in rad"
     assert axes.get_ylabel() == "mean error in N·m"
-    assert "N·m rms before" in figures.alternative_text(drawn("binned_errors"))
+    assert "N·m rms before" in alternative_text(drawn("binned_errors"))
 
 
 def test_candidates_are_ordered_by_what_they_explain() -> None:

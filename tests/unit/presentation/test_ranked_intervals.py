@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from nlsdesign.foundation.errors import ValueRangeError
-from nlsdesign.presentation.figures import alternative_text, ranked_intervals, svg_text
+from nlsdesign.presentation.figures import ranked_intervals
+from nlsdesign.presentation.figures.style import alternative_text
+from nlsdesign.presentation.figures.svg import svg_text
 
 GROUPS = {
     "size, mm": {"small": (1.0, 2.0, 3.0), "large": (4.0, 5.0, 5.5)},

@@ -29,6 +29,8 @@ from nlsdesign.model.equations import equations
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.html import prose, words
 from nlsdesign.presentation.report.mathml import formula
+from nlsdesign.presentation.report.page import report_text
+from nlsdesign.presentation.report.verdict_section import VerdictSection
 from tests import figure_samples as samples
 
 EVIL = "\"'><img src=x onerror=alert(1)><script>alert(2)</script>&amp;"
@@ -87,12 +89,12 @@ NUMBERS = {
 }
 
 
-def verdict(words: str = "`coulomb_friction` at the motor.") -> report.VerdictSection:
+def verdict(words: str = "`coulomb_friction` at the motor.") -> VerdictSection:
     table = report.TableSection(
         "Candidates", ("effect", "share"), (("coulomb_friction", 0.97), ("none", -0.02))
     )
     figure = report.FigureSection("Gap", samples.FIGURES["gap_bars"](), caption="Before and after.")
-    return report.VerdictSection("What is missing", "named", words, parts=(table, figure))
+    return VerdictSection("What is missing", "named", words, parts=(table, figure))
 
 
 PUBLISHED = report.PublishedNumber("rms error", 0.10, 0.083, "N*m", "Fig. 8")
@@ -210,7 +212,7 @@ def test_every_colour_has_a_value_in_both_themes_and_in_print(text: str) -> None
 
 def test_the_same_sections_give_the_same_bytes_and_a_small_file(text: str, tmp_path: Path) -> None:
     folder = tmp_path / "report"
-    again = report.report_text(
+    again = report_text(
         folder,
         sections(folder),
         title="Published actuator",
@@ -263,7 +265,7 @@ def test_hostile_names_stay_text_everywhere(tmp_path: Path) -> None:
         EVIL, report.mathml.Equations({EVIL: symbol / 2}, {EVIL: sympy.Function(EVIL)(symbol)}, False), EVIL
     )
     page = Page(
-        report.report_text(
+        report_text(
             tmp_path,
             [
                 report.Chapter(EVIL, EVIL),
@@ -275,7 +277,7 @@ def test_hostile_names_stay_text_everywhere(tmp_path: Path) -> None:
                 report.NumbersSection(EVIL, (report.KeyNumber(EVIL, EVIL, EVIL),)),
                 report.CamSection(EVIL, samples.motion(), caption=EVIL),
                 report.FileSection(EVIL, {tmp_path / "a & b ' <x>.c": EVIL}, caption=EVIL),
-                report.VerdictSection(EVIL, "unknown", EVIL, parts=(report.TextSection(EVIL, EVIL),)),
+                VerdictSection(EVIL, "unknown", EVIL, parts=(report.TextSection(EVIL, EVIL),)),
                 hostile,
             ],
             title=EVIL, abstract=EVIL, facts={EVIL: EVIL},
@@ -323,9 +325,7 @@ def test_numbers_of_a_deck_with_what_is_only_assumed() -> None:
 
 def test_columns_of_numbers_stand_right(tmp_path: Path) -> None:
     rows = (("a", 1.5, "–", "12"), ("b", -2e-9, "3.1·10⁻⁷", "x"))
-    page = Page(
-        report.report_text(tmp_path, [report.TableSection("T", ("n", "p", "q", "r"), rows)], title="t")
-    )
+    page = Page(report_text(tmp_path, [report.TableSection("T", ("n", "p", "q", "r"), rows)], title="t"))
     assert [cell.get("class") for cell in page.all("th")] == [None, "number", "number", None]
     assert {"1.5", "−2·10⁻⁹"} <= set(page.texts)
 
@@ -356,10 +356,10 @@ def test_links_to_files_are_relative_to_the_report(tmp_path: Path) -> None:
     ("make", "error", "message"),
     [
         (lambda: report.TableSection("T", ("a", "b"), (("1",),)), ValueRangeError, "row 1.*1 cells for 2"),
-        (lambda: report.VerdictSection("V", "nmaed", "?"), UnknownNameError, "did you mean 'named'"),
-        (lambda: report.report_text(Path(), [], title="t"), ValueRangeError, "has no section"),
+        (lambda: VerdictSection("V", "nmaed", "?"), UnknownNameError, "did you mean 'named'"),
+        (lambda: report_text(Path(), [], title="t"), ValueRangeError, "has no section"),
         (
-            lambda: report.report_text(Path(), [report.FileSection("F", {Path("gone.c"): ""})], title="t"),
+            lambda: report_text(Path(), [report.FileSection("F", {Path("gone.c"): ""})], title="t"),
             ExportError,
             r"gone\.c.*does not exist",
         ),
@@ -442,7 +442,7 @@ def test_long_equations_can_be_folded(tmp_path: Path) -> None:
     given = report.mathml.Equations({"x": A + B}, {}, False)
     for folded in (False, True):
         section = report.EquationsSection("E", given, "Of the model.", folded=folded)
-        page = report.report_text(tmp_path, [section], title="T")
+        page = report_text(tmp_path, [section], title="T")
         assert ("<summary>Of the model.</summary>" in page) == folded
         assert page.count("<details") == page.count("</details>") == int(folded)
 

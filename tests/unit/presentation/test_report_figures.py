@@ -15,9 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
 from nlsdesign.presentation import figures, report
+from nlsdesign.presentation.figures.before_after import CandidateShare, candidate_shares
 from nlsdesign.presentation.figures.figure_data import figure_data
 from nlsdesign.presentation.figures.style import AFTER, BEFORE, HOLDS, LIMIT, TONES
 from nlsdesign.presentation.report.html import visible
+from nlsdesign.presentation.report.page import report_text
 from nlsdesign.presentation.report.sections import KeyNumber, NumbersSection
 from tests import figure_samples as samples
 
@@ -127,9 +129,7 @@ def held_data(page: str) -> dict[str, object]:
 
 def test_the_numbers_behind_a_figure_come_with_it(tmp_path: Path) -> None:
     figure = samples.FIGURES["gap_bars"]()
-    page = report.report_text(
-        tmp_path, [report.FigureSection("Errors <of> each", figure, caption="c")], title="t"
-    )
+    page = report_text(tmp_path, [report.FigureSection("Errors <of> each", figure, caption="c")], title="t")
     assert 'download="errors_of_each.json"' in page
     (panel,) = held_data(page)["panels"]
     assert panel["y"] == "rms error in N"
@@ -153,13 +153,13 @@ def test_the_numbers_of_lines_areas_and_limits_are_those_that_are_drawn() -> Non
 
 def test_a_key_number_shows_what_was_before(tmp_path: Path) -> None:
     numbers = NumbersSection("Key", (KeyNumber("error", "0.96 × noise", "held out", before="23.7"),))
-    page = report.report_text(tmp_path, [numbers], title="t")
+    page = report_text(tmp_path, [numbers], title="t")
     assert '<span class="before">23.7</span> → <span class="after">0.96 × noise</span>' in page
 
 
 def test_control_characters_in_names_are_written_out(tmp_path: Path) -> None:
     evil = "name\x1b]0;title\x07\x9b31m\u202egnp"
-    page = report.report_text(
+    page = report_text(
         tmp_path, [report.TextSection(evil, evil, drawing=evil)], title=evil, facts={evil: evil}
     )
     assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", page)
@@ -172,5 +172,5 @@ def test_numbers_of_many_bars_stand_upright_and_no_share_is_minus_zero() -> None
     for errors, angle in ((many, 90.0), (many[:9], 0.0)):
         axes = figures.gap_bars(errors, unit="N").axes[0]
         assert {text.get_rotation() for text in axes.texts if text.get_text() == "0.300"} == {angle}
-    shares = figures.candidate_shares([figures.CandidateShare("slack", -0.001, True)])
+    shares = candidate_shares([CandidateShare("slack", -0.001, True)])
     assert [text.get_text() for text in shares.axes[0].texts] == ["0 %, added"]

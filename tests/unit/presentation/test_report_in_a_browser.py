@@ -12,6 +12,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.model.equations import equations
 from nlsdesign.presentation import report
+from nlsdesign.presentation.report.verdict_section import VerdictSection
 from tests import figure_samples as samples
 from tests.browser import Tab, browser, chromium
 
@@ -59,7 +60,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         report.EquationsSection("Equations", equations(flatten(swing)), "All of them."),
         report.CamSection("Cam", samples.motion(), caption="It turns."),
         table,
-        report.VerdictSection("What is missing", "named", LONG, headline=LONG, parts=(table, figure)),
+        VerdictSection("What is missing", "named", LONG, headline=LONG, parts=(table, figure)),
         report.FileSection("Files", {folder / f"{LONG}.toml": "deck"}, caption="Beside the page."),
         title=f"{LONG}: designed cam", abstract=LONG, facts={"deck": f"`{LONG}`"},
     )  # fmt: skip

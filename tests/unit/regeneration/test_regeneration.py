@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from nlsdesign import regeneration
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.estimation.least_squares import Fit
 from nlsdesign.bench.identification.estimation.parameters import declared_parameter
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import ROTATION, Assembly, Encoder, Fixed, GearedMotor, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.quantity import Quantity

@@ -15,8 +15,8 @@ from nlsdesign.export.compilation.cross_compiler import compiler
 from nlsdesign.foundation.errors import ArrangementError, ExportError
 from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.transform import replace_state, with_outputs, with_signal
-from nlsdesign.simulation import Event, Sine, simulate
-from nlsdesign.simulation.events import locate_event
+from nlsdesign.simulation import Sine, simulate
+from nlsdesign.simulation.events import Event, locate_event
 from nlsdesign.simulation.input_signals import drives_of
 
 LAWS: list[tuple[Callable[[float], float], float]] = [

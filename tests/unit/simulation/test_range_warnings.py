@@ -25,7 +25,8 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import Variable, flatten
-from nlsdesign.presentation.report import range_table, report_text
+from nlsdesign.presentation.report.page import report_text
+from nlsdesign.presentation.report.tables import range_table
 from nlsdesign.simulation import Trace, range_warnings, simulate
 from tests.stretched import LENGTH, pulled, run, stress_at
 

@@ -16,7 +16,8 @@ from nlsdesign.components.assembly.deck_writer import write_deck
 from nlsdesign.foundation.errors import ExportError, MeasurementError, UnknownNameError
 from nlsdesign.foundation.work_sharing import InThisProcess, Processes
 from nlsdesign.model import flatten
-from nlsdesign.sweeps import DiagnosisQuestion, Listed, SweepTable, read_sweep_file, sweep
+from nlsdesign.sweeps import DiagnosisQuestion, Listed, SweepTable, sweep
+from nlsdesign.sweeps.sweep_file import read_sweep_file
 from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, write_declaration, write_records
 

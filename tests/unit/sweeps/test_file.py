@@ -15,8 +15,8 @@ from nlsdesign.sweeps import (
     DiagnosisQuestion,
     LoopQuestion,
     read_sweep,
-    read_sweep_file,
 )
+from nlsdesign.sweeps.sweep_file import read_sweep_file
 from tests.command_line import Run, run
 
 __all__ = ["run"]

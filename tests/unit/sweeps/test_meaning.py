@@ -30,13 +30,11 @@ from nlsdesign.sweeps import (
     SobolSample,
     SpreadQuestion,
     Subject,
-    SweepSettings,
-    read_sweep_file,
-    sweep_task,
 )
 from nlsdesign.sweeps.axes import AxisSet
 from nlsdesign.sweeps.axis_values import with_settings
-from nlsdesign.sweeps.run_sweep import run_task
+from nlsdesign.sweeps.run_sweep import SweepSettings, run_task, sweep_task
+from nlsdesign.sweeps.sweep_file import read_sweep_file
 from nlsdesign.sweeps.sweep_parts import Parts
 from tests import sweeping
 from tests.command_line import Run, run

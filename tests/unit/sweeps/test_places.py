@@ -9,7 +9,7 @@ import pytest
 
 from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.foundation.errors import NlsError
-from nlsdesign.sweeps import read_sweep_file
+from nlsdesign.sweeps.sweep_file import read_sweep_file
 from tests.command_line import Run, run
 
 __all__ = ["run"]

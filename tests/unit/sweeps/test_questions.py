@@ -30,7 +30,6 @@ from nlsdesign.sweeps import (
     LatinHypercube,
     Listed,
     LoopQuestion,
-    PointPlan,
     RandomDraws,
     SobolSample,
     SpreadQuestion,
@@ -41,6 +40,7 @@ from nlsdesign.sweeps import (
 )
 from nlsdesign.sweeps.changes import changed_assembly
 from nlsdesign.sweeps.design_question import QUICK
+from nlsdesign.sweeps.sweep_plan import PointPlan
 from tests.sweeping import AREA, INERTIA, actuator, question
 
 CONSISTENT = declare(load_deck("austin2015_figure_consistent"))

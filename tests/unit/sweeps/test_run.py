@@ -26,12 +26,10 @@ from nlsdesign.sweeps import (
     RandomDraws,
     SaltelliSample,
     SobolSample,
-    SweepSettings,
     sweep,
-    sweep_task,
 )
 from nlsdesign.sweeps.axes import AxisSet
-from nlsdesign.sweeps.run_sweep import duration, run_task
+from nlsdesign.sweeps.run_sweep import SweepSettings, duration, run_task, sweep_task
 from tests import sweeping
 from tests.sweeping import AREA, INERTIA, actuator, question
 

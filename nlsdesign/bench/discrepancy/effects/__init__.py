@@ -11,7 +11,7 @@ import pkgutil
 
 from ....foundation.errors import ArrangementError, unknown_name
 from ....foundation.extensions import extension_modules
-from .effect import Candidate, Edit, Effect, EffectFunction, Form, Unknown, wrapped
+from .effect import Candidate, Edit, Effect, Form, Unknown
 
 
 def catalogue() -> tuple[Effect, ...]:
@@ -48,4 +48,12 @@ def __getattr__(name: str) -> Effect:
     raise AttributeError(str(unknown_name("effect", name, [row.identifier for row in ALL])))
 
 
-__all__ = ["ALL", "Candidate", "Edit", "Effect", "EffectFunction", "Form", "Unknown", "catalogue", "wrapped"]
+__all__ = [
+    "ALL",
+    "Candidate",
+    "Edit",
+    "Effect",
+    "Form",
+    "Unknown",
+    "catalogue",
+]

@@ -99,19 +99,9 @@ def wrapped(
 ) -> Assembly:
     """Return the assembly with an element inside a wrapper; sensors go on reading what they read.
 
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    path
-        Path of the element, for instance ``"spring.rubber"``. A tie keeps its name and takes the wrapper; any
-        other wrapper takes its own name beside the former neighbours.
-    name
-        Name of the wrapper; for a tie, of the element inside.
-    wrapper
-        Makes the wrapper from the name and the element.
-    read_outside
-        Whether sensors of the element's own motion and effort read those of the wrapper from now on.
+    ``path``: path of the element, for instance ``"spring.rubber"``. A tie keeps its name and takes the
+    wrapper; any other wrapper takes its own name beside the former neighbours. ``name``: name of the wrapper;
+    for a tie, of the element inside.
     """
     owner, _, last = path.rpartition(".")
     old = assembly.element(path)
@@ -147,12 +137,7 @@ def _reading_on(assembly: Assembly, old: str, new: str, renamed: Mapping[str, st
 def free_name(assembly: Assembly, name: str) -> str:
     """Return a name that no part at the top has yet.
 
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    name
-        The name wanted; a number is added where it is taken.
+    ``name``: the name wanted; a number is added where it is taken.
     """
     taken, number, free = {n for n, _ in assembly.parts}, 2, name
     while free in taken:
@@ -163,12 +148,7 @@ def free_name(assembly: Assembly, name: str) -> str:
 def free_inside(part: Part, name: str) -> str:
     """Return a name that no part inside another has yet.
 
-    Parameters
-    ----------
-    part
-        That holds others.
-    name
-        The name wanted; a number is added where it is taken.
+    ``name``: the name wanted; a number is added where it is taken.
     """
     taken, number, free = set(part.children()), 2, name
     while free in taken:
@@ -177,13 +157,7 @@ def free_inside(part: Part, name: str) -> str:
 
 
 def numbers_of(part: Part) -> dict[str, Any]:
-    """Return the fields of a part, to make a part of a more special kind from it.
-
-    Parameters
-    ----------
-    part
-        Of the declared model.
-    """
+    """Return the fields of a part, to make a part of a more special kind from it."""
     return {field.name: getattr(part, field.name) for field in fields(part)}
 
 
@@ -260,10 +234,7 @@ class Effect:
     def __call__(self, assembly: Assembly) -> Sequence[Candidate]:
         """Return one candidate for each form, place and edit.
 
-        Parameters
-        ----------
-        assembly
-            As declared; a place that has the phenomenon already is left out.
+        ``assembly``: as declared; a place that has the phenomenon already is left out.
         """
         return [
             Candidate(

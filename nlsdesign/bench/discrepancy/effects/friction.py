@@ -35,19 +35,7 @@ from .sizes import efforts_on
 
 
 def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[Assembly, str]:
-    """Return the assembly with one more element on a body, and the element's name.
-
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    name
-        The name wanted.
-    body
-        Name of the body.
-    element
-        Between the body and the resting frame.
-    """
+    """Return the assembly with one more element on a body, and the element's name."""
     part = free_name(assembly, name)
     return assembly.with_part(part, tie(element, body)), part
 

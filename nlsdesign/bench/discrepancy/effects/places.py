@@ -30,24 +30,12 @@ from .effect import free_inside, wrapped
 
 
 def law(part: Part) -> Part:
-    """Return what a tie ties, and any other part itself.
-
-    Parameters
-    ----------
-    part
-        Of an assembly.
-    """
+    """Return what a tie ties, and any other part itself."""
     return part.element if isinstance(part, Tie) else part
 
 
 def laws(assembly: Assembly) -> Iterator[tuple[str, Part]]:
-    """Yield path and law of every part.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Yield path and law of every part."""
     return ((path, law(part)) for path, part in assembly.walk())
 
 
@@ -56,77 +44,35 @@ def _free(assembly: Assembly, domain: Domain) -> list[str]:
 
 
 def turning_bodies(assembly: Assembly) -> list[str]:
-    """Return the names of the bodies that turn freely.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return the names of the bodies that turn freely."""
     return _free(assembly, ROTATION)
 
 
 def sliding_bodies(assembly: Assembly) -> list[str]:
-    """Return the names of the bodies that slide freely.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return the names of the bodies that slide freely."""
     return _free(assembly, TRANSLATION)
 
 
 def moving_bodies(assembly: Assembly) -> list[str]:
-    """Return the names of the bodies that turn or slide freely.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return the names of the bodies that turn or slide freely."""
     return [*turning_bodies(assembly), *sliding_bodies(assembly)]
 
 
 def domain_of(assembly: Assembly, body: str) -> Domain:
-    """Return whether a body turns or slides.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    body
-        Name of a body.
-    """
+    """Return whether a body turns or slides."""
     part = assembly[body]
     assert isinstance(part, Body)
     return part.domain
 
 
 def efforts_of_ties(assembly: Assembly, body: str) -> list[str]:
-    """Return the names of the efforts that elements exert on a body.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    body
-        Name.
-    """
+    """Return the names of the efforts that elements exert on a body."""
     ties = [(n, p) for n, p in assembly.parts if isinstance(p, Tie) and body in p.between]
     return [f"{name}.{part.element.domain.effort}" for name, part in ties]
 
 
 def turns_per_turn(assembly: Assembly, body: str) -> list[float]:
-    """Return how often shafts turn per turn of a body: itself, the motor in it, what is geared to it.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    body
-        Name of a turning body.
-    """
+    """Return how often shafts turn per turn of a body: itself, the motor in it, what is geared to it."""
     part, turns = assembly[body], [1.0]
     if isinstance(part, GearedMotor):
         turns.append(part.gear_ratio.number)
@@ -138,13 +84,7 @@ def turns_per_turn(assembly: Assembly, body: str) -> list[float]:
 
 
 def driven_ties(assembly: Assembly) -> list[str]:
-    """Return the ties that a prescribed motion strains, with no body of their own motion at an end.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return the ties that a prescribed motion strains, with no body of their own motion at an end."""
     result = []
     for name, part in assembly.parts:
         if isinstance(part, Tie):
@@ -155,28 +95,14 @@ def driven_ties(assembly: Assembly) -> list[str]:
 
 
 def driving_end(assembly: Assembly, tie: str) -> str:
-    """Return the name of the body whose motion strains a tie: the first that is driven or moves freely.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    tie
-        Name.
-    """
+    """Return the name of the body whose motion strains a tie: the first that is driven or moves freely."""
     part = assembly[tie]
     assert isinstance(part, Tie)
     return next(end for end in part.between if isinstance(assembly[end], Driven | Free))
 
 
 def restoring_ties(assembly: Assembly) -> list[str]:
-    """Return the names of the ties that pull back, in whatever domain.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return the names of the ties that pull back, in whatever domain."""
     return [n for n, p in assembly.parts if isinstance(p, Tie) and p.element.restores]
 
 
@@ -184,11 +110,6 @@ def loaded_ties(assembly: Assembly) -> list[str]:
     """Return the names of the ties whose load depends on where the body is: what pulls back, and weights.
 
     Friction in proportion to a load that never changes is Coulomb friction.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
     """
     pulling = restoring_ties(assembly)
     return [
@@ -202,11 +123,6 @@ def lumped_springs(assembly: Assembly) -> list[str]:
     """Return the paths of elastic laws of force or torque that are no piece of a material.
 
     What stands in series with something else, and what an effect has put beside a spring, is left out.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
     """
     return [
         path
@@ -219,13 +135,7 @@ def lumped_springs(assembly: Assembly) -> list[str]:
 
 
 def lumped_springs_without(phenomenon: str) -> Callable[[Assembly], list[str]]:
-    """Return the places of lumped springs with nothing beside them that has a phenomenon.
-
-    Parameters
-    ----------
-    phenomenon
-        As parts state it in :attr:`Part.phenomena`.
-    """
+    """Return the places of lumped springs with nothing beside them that has a phenomenon."""
 
     def places(assembly: Assembly) -> list[str]:
         return [
@@ -250,15 +160,7 @@ def _phenomena_beside(assembly: Assembly, path: str) -> set[str]:
 
 
 def effort_over_motion(assembly: Assembly, path: str) -> tuple[str, str]:
-    """Return the names of effort and motion of an element.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    path
-        Of the element.
-    """
+    """Return the names of effort and motion of an element."""
     domain = assembly.element(path).domain
     return f"{path}.{domain.effort}", f"{path}.{domain.motion}"
 
@@ -268,17 +170,6 @@ def beside(assembly: Assembly, path: str, name: str, law: Element) -> tuple[Asse
 
     A law of stress in a piece of material, and one among laws in parallel, takes its place beside them; any
     other is put in parallel with the piece, and sensors that read it read both from now on.
-
-    Parameters
-    ----------
-    assembly
-        To be edited.
-    path
-        Of a piece of material, or of a law.
-    name
-        The name wanted.
-    law
-        In the domain of what it stands beside.
     """
     piece = assembly.element(path)
     if isinstance(piece, Specimen) and law.domain != piece.domain:
@@ -297,15 +188,7 @@ def beside(assembly: Assembly, path: str, name: str, law: Element) -> tuple[Asse
 
 
 def turning_ties(assembly: Assembly, holds: Callable[[Part], bool]) -> list[str]:
-    """Return the ties of angle and torque with something in them.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    holds
-        Tells of the law of each part in a tie whether it is what is looked for.
-    """
+    """Return the ties of angle and torque with something in them."""
     ties = [n for n, p in assembly.parts if isinstance(p, Tie) and p.element.domain == ROTATION]
     return [
         name
@@ -315,13 +198,7 @@ def turning_ties(assembly: Assembly, holds: Callable[[Part], bool]) -> list[str]
 
 
 def stretched(assembly: Assembly) -> list[str]:
-    """Return the paths of what a cam stretches: behind the cam, and inside a cable that only pulls.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return the paths of what a cam stretches: behind the cam, and inside a cable that only pulls."""
     around = PullOnly | Buckling | InextensibleCable | Slack | CapstanFriction
     paths = []
     for path, element in laws(assembly):
@@ -334,13 +211,5 @@ def stretched(assembly: Assembly) -> list[str]:
 
 
 def wrapping(kind: type[Element], **fields: object) -> Callable[[str, Element], Element]:
-    """Return a function that puts an element of a name into a wrapper.
-
-    Parameters
-    ----------
-    kind
-        Of the wrapper.
-    **fields
-        Of the wrapper, without its members.
-    """
+    """Return a function that puts an element of a name into a wrapper."""
     return lambda name, element: kind(members=((name, element),), **fields)  # type: ignore[call-arg]

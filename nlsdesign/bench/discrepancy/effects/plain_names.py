@@ -16,11 +16,6 @@ _PHRASE = re.compile(r"(?:An? |The )?(?P<phrase>[^,.:;=(]+?)(?=[,.:;=(]|$)")
 def title(identifier: str) -> str:
     """Return the name of an effect in words.
 
-    Parameters
-    ----------
-    identifier
-        Of the catalogue.
-
     Examples
     --------
     >>> title("second_relaxation"), title("coulomb_friction")
@@ -30,25 +25,15 @@ def title(identifier: str) -> str:
 
 
 def capitalised(text: str) -> str:
-    """Return a text with its first letter as a capital, the others as they are.
-
-    Parameters
-    ----------
-    text
-        Beginning of a sentence.
-    """
+    """Return a text with its first letter as a capital, the others as they are."""
     return text[:1].upper() + text[1:]
 
 
 def place_in_words(assembly: Assembly, location: str) -> str:
     """Return a place with its preposition, such as ``in the rubber`` or ``at the motor``.
 
-    Parameters
-    ----------
-    assembly
-        Holds the part; a path that it does not have is put into words alone.
-    location
-        Path of a part. Where another part has the same name, the part around both is said as well.
+    ``assembly``: holds the part; a path that it does not have is put into words alone. ``location``: path of
+    a part. Where another part has the same name, the part around both is said as well.
     """
     parts = dict(assembly.walk())
     steps = location.split(".")
@@ -62,15 +47,7 @@ def place_in_words(assembly: Assembly, location: str) -> str:
 
 
 def kind_in_words(assembly: Assembly, location: str) -> str:
-    """Return what a part is, from the description of its law; empty for a path without a part.
-
-    Parameters
-    ----------
-    assembly
-        Holds the part.
-    location
-        Path of a part.
-    """
+    """Return what a part is, from the description of its law; empty for a path without a part."""
     parts = dict(assembly.walk())
     described = type(_law(parts[location])).__doc__ if location in parts else None
     first = _PHRASE.match(described or "")
@@ -81,14 +58,7 @@ def kind_in_words(assembly: Assembly, location: str) -> str:
 def effect_in_words(assembly: Assembly, identifier: str, location: str) -> str:
     """Return an effect with its place, such as ``second relaxation in the rubber``.
 
-    Parameters
-    ----------
-    assembly
-        Holds the part.
-    identifier
-        Of the catalogue.
-    location
-        Path of the part. It is left out where the effect has its name already.
+    ``location``: path of the part. It is left out where the effect has its name already.
     """
     named, place = title(identifier), place_in_words(assembly, location)
     part = place.partition(" the ")[2]
@@ -98,12 +68,7 @@ def effect_in_words(assembly: Assembly, identifier: str, location: str) -> str:
 def simpler_forms(assembly: Assembly, identifier: str) -> tuple[str, ...]:
     """Return the identifiers of the effects of which an effect is a richer form.
 
-    Parameters
-    ----------
-    assembly
-        As declared.
-    identifier
-        Of the catalogue; any other has none.
+    ``identifier``: of the catalogue; any other has none.
     """
     row = next((each for each in catalogue() if each.__name__ == identifier), None)
     candidates = row(assembly) if row is not None else ()

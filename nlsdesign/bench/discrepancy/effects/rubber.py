@@ -42,15 +42,7 @@ def _stress(assembly: Assembly, path: str) -> tuple[float, str, str]:
 
 
 def specimens(assembly: Assembly, *, without: str = "") -> list[str]:
-    """Return the paths of pieces of material.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    without
-        Name of a law that they must not have yet.
-    """
+    """Return the paths of pieces of material."""
     return [
         p for p, piece in laws(assembly) if isinstance(piece, Specimen) and without not in piece.children()
     ]

@@ -12,13 +12,7 @@ LONGEST = "longest record"
 
 
 def efforts_on(body: str) -> str:
-    """Return the name of the size of the largest effort on a body: of a tie, of its drive, or of its inertia.
-
-    Parameters
-    ----------
-    body
-        Name of the body.
-    """
+    """Return the name of the largest effort on a body: of a tie, of its drive, or of its inertia."""
     return f"efforts on {body}"
 
 
@@ -28,11 +22,6 @@ class Sizes(Mapping[str, float]):
     ``"piece.force * piece.extension"`` is asked for as units are written; a name may be the number 1. An
     element that an edit has put inside another keeps its size: of ``"spring.slack.rubber.force"`` the size is
     that of ``"spring.rubber.force"`` where only that was declared.
-
-    Parameters
-    ----------
-    known
-        By name; all positive.
 
     Examples
     --------

@@ -49,16 +49,7 @@ def limits_seen(
 ) -> MachineLimits:
     """Return as limits what the records show that the machine has done.
 
-    Parameters
-    ----------
-    records
-        Measured.
-    commanded
-        Signal that the experiment is going to command. A drive has no limits of rate.
-    drives
-        Measured drives.
-    motions
-        Measured motions.
+    ``commanded``: signal that the experiment is going to command. A drive has no limits of rate.
     """
 
     def smooth(record: Record, signal: str, order: int = 0) -> np.ndarray:
@@ -121,10 +112,7 @@ class Command:
 def smooth_step(x: Array) -> Array:
     """Return the step from 0 to 1 with zero slope and curvature at both ends, 6x⁵ − 15x⁴ + 10x³.
 
-    Parameters
-    ----------
-    x
-        Argument; the step is between 0 and 1.
+    ``x``: argument; the step is between 0 and 1.
     """
     x = np.clip(x, 0.0, 1.0)
     result: Array = x**3 * (x * (6.0 * x - 15.0) + 10.0)
@@ -132,17 +120,7 @@ def smooth_step(x: Array) -> Array:
 
 
 def commands(time: Array, rest: float, limits: MachineLimits) -> list[Command]:
-    """Return the candidates.
-
-    Parameters
-    ----------
-    time
-        Uniform, from zero, shape (n,).
-    rest
-        Value of the commanded signal at rest.
-    limits
-        Every candidate stays within travel and speed.
-    """
+    """Return the candidates."""
     up, down = max(limits.high - rest, 0.0), max(rest - limits.low, 0.0)
     family = _Family(time, up, down, limits)
     kept: list[Command] = []

@@ -63,15 +63,7 @@ class MeasuredSignals:
 
 
 def measured_signals(model: FlatModel, signals: Sequence[str]) -> MeasuredSignals:
-    """Sort measured signals by what they are.
-
-    Parameters
-    ----------
-    model
-        Of what is measured.
-    signals
-        Full names.
-    """
+    """Sort measured signals by what they are."""
     inputs = {v.name for v in model.inputs}
     motions, rates, drives, efforts = {}, {}, [], []
     for signal in signals:
@@ -90,20 +82,7 @@ def measured_signals(model: FlatModel, signals: Sequence[str]) -> MeasuredSignal
 
 
 def check_command(measured: MeasuredSignals, commanded: str) -> None:
-    """Check that all measured signals follow from the commanded one.
-
-    Parameters
-    ----------
-    measured
-        The measured signals.
-    commanded
-        One of them.
-
-    Raises
-    ------
-    MeasurementError
-        If it is neither a motion nor a drive, or another measured motion does not follow from it.
-    """
+    """Check that all measured signals follow from the commanded one."""
     if commanded in measured.drives:
         return
     if commanded not in measured.motions:
@@ -153,20 +132,6 @@ class Machine:
         """Return the record that a command would leave.
 
         A commanded motion is taken as followed by the machine; a commanded drive is simulated.
-
-        Parameters
-        ----------
-        time
-            Uniform, shape (n,).
-        commanded
-            Name of the measured signal.
-        value
-            Of it, shape (n,).
-
-        Raises
-        ------
-        ConvergenceError
-            If the model cannot be simulated.
         """
         if commanded in self.measured.drives:
             return self._simulated(time, commanded, value)

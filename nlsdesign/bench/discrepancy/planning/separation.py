@@ -80,27 +80,14 @@ class ReadyHypothesis:
     def responses(self, record: Record, floors: Mapping[str, Floor]) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of the numbers that the hypothesis may have.
 
-        Parameters
-        ----------
-        record
-            Measured, or what an experiment would leave.
-        floors
-            By the name of the block; blocks without one are left out.
+        ``floors``: by the name of the block; blocks without one are left out.
         """
         return self.at(record, floors, self.values)
 
     def at(
         self, record: Record, floors: Mapping[str, Floor], values: Sequence[Values]
     ) -> list[dict[str, BlockResponse]]:
-        """Return what each block says of a record, for each of some numbers.
-
-        Parameters
-        ----------
-        record, floors
-            As for :meth:`responses`.
-        values
-            Free numbers by name.
-        """
+        """Return what each block says of a record, for each of some numbers."""
         result: list[dict[str, BlockResponse]] = [{} for _ in values]
         for driven in self.driven:
             name = driven.block.name
@@ -131,19 +118,7 @@ class ReadyHypothesis:
 def made_ready(
     hypothesis: Hypothesis, bench: Bench, driven: Sequence[DrivenBlock], noise: Values
 ) -> ReadyHypothesis:
-    """Return a hypothesis ready to be evaluated, with the numbers that the records leave possible.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    bench
-        Records so far.
-    driven
-        Its blocks, with the fitted numbers free.
-    noise
-        Variance by block, in units of the noise floor.
-    """
+    """Return a hypothesis ready to be evaluated, with the numbers that the records leave possible."""
     parameters, information = {}, {}
     for names, fit in hypothesis.fits.items():
         matrix = _information(fit)
@@ -284,17 +259,7 @@ def apart(
     rival: ReadyHypothesis,
     noise: Values,
 ) -> Apart:
-    """Return how badly a hypothesis would explain what another one leaves, when it is refitted.
-
-    Parameters
-    ----------
-    one
-        What the hypothesis that is right says, for each of the numbers that it may have.
-    other, rival
-        What the other one says, and itself.
-    noise
-        Variance by block, in units of the noise floor.
-    """
+    """Return how badly a hypothesis would explain what another one leaves, when it is refitted."""
     results = [_once(each, other, rival, noise) for each in one]
     best = max(results, key=lambda a: a.squares)
     # The mean of the logarithm: one set of numbers that is far away does not speak for the others.

@@ -109,24 +109,12 @@ _EXPERIMENTS: Mapping[frozenset[str], str] = {
 
 
 def experiment(one: str, other: str) -> str | None:
-    """Return the experiment that tells two effects apart, if one is known.
-
-    Parameters
-    ----------
-    one, other
-        Identifiers of the catalogue.
-    """
+    """Return the experiment that tells two effects apart, if one is known."""
     return _EXPERIMENTS.get(frozenset((one, other)))
 
 
 def where_they_differ(one: Sequence[Judged], other: Sequence[Judged]) -> str:
-    """Return in words where the predictions of two hypotheses are furthest apart, in noise floors.
-
-    Parameters
-    ----------
-    one, other
-        What all records say of both.
-    """
+    """Return in words where the predictions of two hypotheses are furthest apart, in noise floors."""
     best, sentence = 0.0, "their predictions agree on every record"
     for a, b in zip(one, other, strict=True):
         gap = np.abs(a.residual - b.residual)
@@ -143,15 +131,7 @@ def where_they_differ(one: Sequence[Judged], other: Sequence[Judged]) -> str:
 
 
 def advice(name: str, aliases: Mapping[str, str]) -> tuple[str, ...]:
-    """Return one sentence for each effect that explains the records as well.
-
-    Parameters
-    ----------
-    name
-        The effect that was named.
-    aliases
-        By identifier, where the predictions differ most.
-    """
+    """Return one sentence for each effect that explains the records as well."""
     sentences = []
     for other, differ in aliases.items():
         known = experiment(name, other)
@@ -178,13 +158,7 @@ _DECIDING: Mapping[str, str] = {
 
 
 def more_excitation(fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Return what to record where the records leave numbers or combinations of them open.
-
-    Parameters
-    ----------
-    fits
-        Of the better model.
-    """
+    """Return what to record where the records leave numbers or combinations of them open."""
     sentences = []
     for fit in fits:
         units = {p.name: p.unit for p in fit.parameters}

@@ -92,11 +92,8 @@ class Setting(NamedTuple):
 def settings_of(criteria: Any) -> tuple[Setting, ...]:
     """Return the fields of a dataclass with their meanings, from their metadata or its docstring.
 
-    Parameters
-    ----------
-    criteria
-        A dataclass whose fields say their ``meaning``, or its docstring does below ``Parameters``;
-        ``None`` has no fields.
+    ``criteria``: a dataclass whose fields say their ``meaning``, or its docstring does below ``Parameters``;
+    ``None`` has no fields.
     """
     if criteria is None:
         return ()

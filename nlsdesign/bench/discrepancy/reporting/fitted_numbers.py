@@ -40,13 +40,7 @@ class FittedNumber(NamedTuple):
 
 
 def fitted_numbers(fits: Sequence[Fit]) -> tuple[FittedNumber, ...]:
-    """Return the refitted numbers of which something was declared, in the order of the fits.
-
-    Parameters
-    ----------
-    fits
-        One for each group of blocks that share numbers.
-    """
+    """Return the refitted numbers of which something was declared, in the order of the fits."""
     return tuple(_number(fit, p) for fit in fits for p in fit.parameters if math.isfinite(p.sigma))
 
 

@@ -100,13 +100,7 @@ class NamedEffect:
     evidence: EffectEvidence | None = None
 
     def headline(self, assembly: Assembly) -> str:
-        """Return effect and place in words, such as ``second relaxation in the rubber``.
-
-        Parameters
-        ----------
-        assembly
-            Holds the part.
-        """
+        """Return effect and place in words, such as ``second relaxation in the rubber``."""
         return effect_in_words(assembly, self.name, self.location)
 
     def numbers_in_words(self) -> str:
@@ -117,13 +111,7 @@ class NamedEffect:
         )
 
     def words(self, assembly: Assembly) -> str:
-        """Return what it is, how large, and what speaks for it.
-
-        Parameters
-        ----------
-        assembly
-            Holds the part.
-        """
+        """Return what it is, how large, and what speaks for it."""
         text = f"{capitalised(self.headline(assembly))} (`{self.name}` at `{self.location}`)"
         text += f": {self.numbers_in_words()}." if self.parameters else "."
         if math.isfinite(self.probability):
@@ -174,13 +162,7 @@ CONTRADICTION = "deck and records contradict each other, so nothing is named"
 
 
 def as_sentence(text: str) -> str:
-    """Return a reason as a sentence or a question; the name of a file at its beginning stays as it is.
-
-    Parameters
-    ----------
-    text
-        Without a full stop, perhaps.
-    """
+    """Return a reason as a sentence or a question; the name of a file at its beginning stays as it is."""
     begins = text.split(maxsplit=1)[0].isalpha()
     sentence = (capitalised(text) if begins else text).rstrip(".")
     return sentence if sentence.endswith("?") else f"{sentence}."

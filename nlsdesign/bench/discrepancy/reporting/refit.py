@@ -49,21 +49,7 @@ def fitted_over_windows(
 ) -> tuple[dict[str, float], Fit]:
     """Fit numbers so that simulations over windows, each from the measured state, follow the records.
 
-    Parameters
-    ----------
-    actuator
-        As declared; the spreads of its numbers are the prior.
-    records
-        Those held out are left out.
-    starts
-        Where the numbers that are free begin, in SI by name.
-    length
-        Of a window in s.
-
-    Returns
-    -------
-    tuple
-        Values in SI by name, and the fit.
+    ``actuator``: as declared; the spreads of its numbers are the prior.
     """
     model = flatten(actuator)
     free = [declared_parameter(model.variable(name), start) for name, start in starts.items()]
@@ -79,19 +65,7 @@ def fitted_over_windows(
 def window_gaps(
     actuator: Assembly, values: Mapping[str, float], records: RecordSet, length: float
 ) -> tuple[RecordGap, ...]:
-    """Return the error of predictions over windows, with the declared and with other numbers.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    values
-        Fitted, in SI by name.
-    records
-        Of all roles.
-    length
-        Of a window in s.
-    """
+    """Return the error of predictions over windows, with the declared and with other numbers."""
     models = [flatten(actuator), flatten(actuator.with_values(values))]
     wiring = wiring_of(models[0], records.signals)
     gaps = []
@@ -108,20 +82,7 @@ def window_gaps(
 
 
 def wiring_of(model: FlatModel, signals: Sequence[str]) -> Wiring:
-    """Wire readings to the inputs and states that they show; other readings to themselves.
-
-    Parameters
-    ----------
-    model
-        Of what is measured.
-    signals
-        Full names of measured signals.
-
-    Raises
-    ------
-    MeasurementError
-        If no window can begin at a measured state.
-    """
+    """Wire readings to the inputs and states that they show; other readings to themselves."""
     inputs: dict[str, Drive] = {}
     outputs: dict[str, str] = {}
     names, states = {v.name for v in model.inputs}, {v.name for v in model.states}
@@ -314,13 +275,7 @@ def refit(
 
 
 def sourced(hypothesis: Hypothesis) -> Assembly:
-    """Return the fitted assembly, its fitted numbers marked with where they come from.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    """
+    """Return the fitted assembly, its fitted numbers marked with where they come from."""
     fitted = hypothesis.fitted
     known, declared = fitted.quantities(), hypothesis.assembly.quantities()
     rows = {name.partition("[")[0] for name in hypothesis.values}

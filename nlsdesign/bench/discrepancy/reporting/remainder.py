@@ -52,17 +52,7 @@ class Formula:
 def sparse_formula(
     parts: Sequence[Part], unit: str, extra: Sequence[Mapping[str, Array]] = ()
 ) -> Formula | None:
-    """Return a short formula for an error, or nothing if none holds on the other records.
-
-    Parameters
-    ----------
-    parts
-        For each record: error, signals at the same places, whether the formula may be fitted to it.
-    unit
-        Of the error.
-    extra
-        Further terms of each record by name.
-    """
+    """Return a short formula for an error, or nothing if none holds on the other records."""
     columns = [_library(signals) for _, signals, _ in parts]
     for column, more in zip(columns, extra, strict=False):
         column |= more
@@ -205,14 +195,7 @@ class _Rows:
 def remainder_of(judged: Sequence[Judged], records: RecordSet, rounded: Sequence[str]) -> Remainder:
     """Return a description of the residual of one block.
 
-    Parameters
-    ----------
-    judged
-        What all records say of the block.
-    records
-        Give the measured signals.
-    rounded
-        Signals whose noise is rounding, as that of an encoder; the rate of the first is the speed.
+    ``rounded``: signals whose noise is rounding, as that of an encoder; the rate of the first is the speed.
     """
     block = judged[0].block
     motion = [*rounded, *records.signals][0]

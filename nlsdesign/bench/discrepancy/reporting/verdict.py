@@ -107,23 +107,7 @@ class Gap(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordGap:
-    """Error of one block on one record before and after, in the unit of the block.
-
-    Parameters
-    ----------
-    block, record, role
-        Which.
-    before, after, noise_floor
-        Root mean square of the filtered error of the refitted declared model, of the model with the effects,
-        and of the noise alone.
-    rows
-        Samples that count.
-    unit
-        Of the three.
-    signal, beside
-        Standard deviation of what the error is a part of, filtered alike, and its name: the measured signal,
-        or the effort of the drive.
-    """
+    """Error of one block on one record before and after, in the unit of the block."""
 
     block: str
     record: str
@@ -413,37 +397,19 @@ class Verdict:
 
 
 def let_go(verdict: Verdict) -> bool:
-    """Return whether the records contradict declared numbers, and other numbers explain them.
-
-    Parameters
-    ----------
-    verdict
-        Of a diagnosis.
-    """
+    """Return whether the records contradict declared numbers, and other numbers explain them."""
     return verdict.verdict == "data_suspect" and any(verdict.gap(name).changed for name in verdict.blocks)
 
 
 def suspicions(verdict: Verdict) -> tuple[str, ...]:
-    """Return why records or deck are suspect, in sentences; none with another verdict.
-
-    Parameters
-    ----------
-    verdict
-        Of a diagnosis.
-    """
+    """Return why records or deck are suspect, in sentences; none with another verdict."""
     if verdict.verdict != "data_suspect":
         return ()
     return tuple(text for text in verdict.findings if not text.startswith(f"{DECLARED}:"))
 
 
 def best_forms(tried: Sequence[tuple[Any, ...]]) -> tuple[tuple[Any, ...], ...]:
-    """Return of each effect the form or place that explains most: one name stands for all of them.
-
-    Parameters
-    ----------
-    tried
-        Name of the effect, share that it explains, and perhaps more, best first.
-    """
+    """Return of each effect the form or place that explains most: one name stands for all of them."""
     best: dict[str, tuple[Any, ...]] = {}
     for each in tried:
         best.setdefault(each[0], each)
@@ -473,15 +439,7 @@ def _why_richer(verdict: Verdict, effect: NamedEffect) -> str:
 
 
 def rms_over(gaps: Sequence[RecordGap], which: str) -> float:
-    """Return the root mean square over several records, each sample counted once.
-
-    Parameters
-    ----------
-    gaps
-        Of one block.
-    which
-        ``before``, ``after``, ``noise_floor`` or ``signal``.
-    """
+    """Return the root mean square over several records, each sample counted once."""
     total = sum(g.rows for g in gaps)
     # An exact sum, so that the order of the records makes no difference.
     squares = math.fsum(getattr(g, which) ** 2 * g.rows for g in gaps)
@@ -498,15 +456,7 @@ def _rounded(content: Any, digits: int) -> Any:
 
 
 def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tuple[RecordGap, ...]:
-    """Return the error of every block on every record, the records in the order in which they were given.
-
-    Parameters
-    ----------
-    before, after
-        Fitted to all samples.
-    comparison
-        Knows the records.
-    """
+    """Return the error of every block on every record, the records in the order in which they were given."""
     gaps = []
     acting = Acting(comparison.bench, flatten(before.fitted))
     for then, now in zip(comparison.judged(before), comparison.judged(after), strict=True):
@@ -526,13 +476,6 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
     """Return a held-out record of a block over time; the one with the largest error before.
 
     Everything passes the filter of the block, so that the errors are those of :func:`gaps_of`.
-
-    Parameters
-    ----------
-    before, after, comparison
-        As above.
-    block
-        Name.
     """
     pairs = zip(comparison.judged(before), comparison.judged(after), strict=True)
     own = [(a, b) for a, b in pairs if a.block.name == block]
@@ -556,13 +499,7 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
 def shapes_of(
     before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str
 ) -> dict[str, tuple[Binned, Binned]]:
-    """Return the residual of a block over every measured signal, before and after, from all records.
-
-    Parameters
-    ----------
-    before, after, comparison, block
-        As above.
-    """
+    """Return the residual of a block over every measured signal, before and after, from all records."""
     first, last = (_shapes(h, comparison, block) for h in (before, after))
     return {name: (first[name], last[name]) for name in first if name in last}
 

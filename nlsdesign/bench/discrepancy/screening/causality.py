@@ -43,15 +43,7 @@ class LaggingForces(NamedTuple):
 
 
 def lagging_forces(assembly: Assembly, records: RecordSet) -> LaggingForces:
-    """Return measured forces that give work over closed paths and never take any: no passive piece can.
-
-    Parameters
-    ----------
-    assembly
-        Tells which extension belongs to a force, and how it follows from the measured motion.
-    records
-        Of all roles.
-    """
+    """Return measured forces that give work over closed paths and never take any: no passive piece can."""
     model, motions = flatten(assembly), motions_of_efforts(assembly)
     findings: list[Finding] = []
     pace: list[float] = []

@@ -55,13 +55,7 @@ class Acting:
         self._driven: dict[Block, DrivenBlock] = {}
 
     def name(self, block: Block) -> str:
-        """Return the name of the signal or effort, for people.
-
-        Parameters
-        ----------
-        block
-            Of any hypothesis.
-        """
+        """Return the name of the signal or effort, for people."""
         if block.target is not None:
             return block.target
         drives, others = self._outside(block)
@@ -72,23 +66,11 @@ class Acting:
         return f"measured {effort}" if others else f"{effort} of the inertia"
 
     def drives(self, block: Block) -> list[str]:
-        """Return the measured signals that drive the body of a balance.
-
-        Parameters
-        ----------
-        block
-            Of any hypothesis.
-        """
+        """Return the measured signals that drive the body of a balance."""
         return self._outside(block)[0]
 
     def filtered(self, judged: Judged) -> Array:
-        """Return the signal or effort over a record, filtered as the error is, in the unit of the block.
-
-        Parameters
-        ----------
-        judged
-            The block on the record.
-        """
+        """Return the signal or effort over a record, filtered as the error is, in the unit of the block."""
         block, trace = judged.block, judged.record.trace
         if block.target is not None:
             result: Array = judged.floor.filter @ np.asarray(trace[block.target])
@@ -151,13 +133,6 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
 
     The model is evaluated where one of the measured signals, or the rate of a measured motion, is as large as
     it becomes; a single sample that stands out is not taken for a size.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    records
-        All records.
     """
     model = flatten(actuator)
     sizes = {LONGEST: max(float(r.trace.time[-1] - r.trace.time[0]) for r in records.records)}
@@ -236,15 +211,7 @@ def _rms(values: Array) -> float:
 
 
 def scale_findings(comparison: Comparison, base: Hypothesis) -> list[Finding]:
-    """Return records whose measured signal is many times, or a small part of, what the model predicts.
-
-    Parameters
-    ----------
-    comparison
-        Evaluates hypotheses.
-    base
-        Refitted declared model.
-    """
+    """Return records whose measured signal is many times, or a small part of, what the model predicts."""
     findings = []
     for judged in comparison.judged(base):
         target = judged.block.target
@@ -287,17 +254,7 @@ _LEFT = 0.02
 
 
 def drive_findings(actuator: Assembly, comparison: Comparison, base: Hypothesis) -> list[Finding]:
-    """Return the drives whose sign or unit is another than stated, with what shows it.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    comparison
-        Evaluates hypotheses on the records.
-    base
-        Refitted declared model.
-    """
+    """Return the drives whose sign or unit is another than stated, with what shows it."""
     findings = []
     records = comparison.bench.records
     for block, (signal, ratios) in _asked(comparison, base).items():

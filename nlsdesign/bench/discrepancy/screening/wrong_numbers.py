@@ -41,20 +41,8 @@ def with_numbers_let_go(
 ) -> Hypothesis | None:
     """Return a hypothesis with the numbers let go at whose ends a refit was stopped, if they explain enough.
 
-    Parameters
-    ----------
-    comparison
-        Evaluates hypotheses.
-    hypothesis
-        Fitted to all samples, with or without effects.
-    criteria
-        Of the decision.
-
-    Returns
-    -------
-    Hypothesis or None
-        Refitted; nothing where no block is open or no number stands at its end, where letting go explains
-        less than an effect would have to, or where the numbers end near their declared ranges.
+    Result: refitted; nothing where no block is open or no number stands at its end, where letting go explains
+    less than an effect would have to, or where the numbers end near their declared ranges.
     """
     stuck, every = stuck_numbers(hypothesis), excesses(hypothesis, comparison.bench, criteria)
     if not stuck or is_complete(every):
@@ -74,36 +62,18 @@ def with_numbers_let_go(
 
 
 def stuck_numbers(hypothesis: Hypothesis) -> list[str]:
-    """Return the names of the positive declared numbers that stand at the end of what their spread allows.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    """
+    """Return the names of the positive declared numbers that stand at the end of what their spread allows."""
     scores = {n: z for f in hypothesis.fits.values() for n, z in f.prior_z_scores().items()}
     return [n for n in positive_numbers(hypothesis) if abs(scores.get(n, 0.0)) >= AT_END]
 
 
 def positive_numbers(hypothesis: Hypothesis) -> list[str]:
-    """Return the names of the fitted numbers that are positive by nature.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    """
+    """Return the names of the fitted numbers that are positive by nature."""
     return [p.name for f in hypothesis.fits.values() for p in f.parameters if p.scale == "log"]
 
 
 def wrong_numbers(hypothesis: Hypothesis) -> list[str]:
-    """Return in words the numbers that were let go and lie outside what their declared spread allows.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted with some numbers let go.
-    """
+    """Return in words the numbers that were let go and lie outside what their declared spread allows."""
     words = []
     for fit in hypothesis.fits.values():
         for p in fit.parameters:
@@ -129,15 +99,6 @@ def is_explained_by_numbers(
     What is left may be as little as the inexact form of an effect may leave: a bench has friction that sticks
     or counts that round, which leave a trace whatever the numbers are. A wrong number that explains all but
     that is no reason to name an effect that explains less.
-
-    Parameters
-    ----------
-    criteria
-        Of the decision.
-    before
-        What the declared model leaves, its numbers held in their ranges.
-    with_effects, with_numbers
-        What is left with the effects that were named, if any, and with numbers let go instead.
     """
     first, effects, numbers = (
         sum(each.excess for each in _blocks(every).values()) for every in (before, with_effects, with_numbers)
@@ -150,13 +111,7 @@ def _blocks(every: Excesses) -> Excesses:
 
 
 def sentence_of(hypothesis: Hypothesis) -> str:
-    """Return one sentence on the wrong numbers of a hypothesis; empty where there are none.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted, perhaps with some numbers let go.
-    """
+    """Return one sentence on the wrong numbers of a hypothesis; empty where there are none."""
     words = wrong_numbers(hypothesis)
     return f"a declared number is probably wrong: {'; '.join(words)}" if words else ""
 
@@ -193,19 +148,7 @@ class OtherNumbers(NamedTuple):
 def other_numbers(
     comparison: Comparison, base: Hypothesis, better: Hypothesis, criteria: Criteria
 ) -> OtherNumbers:
-    """Let the declared numbers go where the records take them, if a refit has driven some to their ends.
-
-    Parameters
-    ----------
-    comparison
-        Evaluates hypotheses.
-    base
-        Refitted declared model.
-    better
-        With the effects that were added, if any.
-    criteria
-        Of the decision.
-    """
+    """Let the declared numbers go where the records take them, if a refit has driven some to their ends."""
     before, after = _left(base, comparison.bench, criteria), _left(better, comparison.bench, criteria)
     scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
     stuck = [n for n, z in scores.items() if abs(z) >= AT_END]
@@ -234,17 +177,7 @@ def other_numbers(
 
 
 def numbers_explain(share: float, *, left: float, after: float, before: float, named: bool) -> bool:
-    """Tell whether numbers let go explain records, and better than an effect.
-
-    Parameters
-    ----------
-    share
-        Of the excess that they explain.
-    left, after, before
-        Excess with numbers let go, with the effects that were added, and of the declared model.
-    named
-        Whether an effect was added at all.
-    """
+    """Tell whether numbers let go explain records, and better than an effect."""
     effect_is_simpler = named and after <= _CLOSED * before
     return share >= _SHARE and left < 0.5 * after and not effect_is_simpler
 
@@ -277,12 +210,7 @@ def _spread(base: Hypothesis, name: str) -> float:
 def out_of_reach(actuator: Assembly, records: RecordSet) -> list[Finding]:
     """Return the records whose angle goes far beyond the end of the declared cam.
 
-    Parameters
-    ----------
-    actuator
-        As declared.
-    records
-        Measured. Where more than one angle is measured nothing is said.
+    ``records``: measured. Where more than one angle is measured nothing is said.
     """
     model = flatten(actuator)
     ends = [cam.last_angle for spring in model.springs for cam in spring.cams if cam.last_angle]

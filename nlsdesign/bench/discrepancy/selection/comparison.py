@@ -82,19 +82,8 @@ class HypothesisFit:
     ) -> GroupFit | ConvergenceError:
         """Fit a group of blocks.
 
-        Parameters
-        ----------
-        hypothesis
-            With the effect in its assembly, and what was left over without it.
-        group
-            Blocks that share free numbers.
-        new
-            Numbers of the newest effect; nothing where none was added.
-
-        Returns
-        -------
-        GroupFit or ConvergenceError
-            The error says why there is no fit; it is returned so that others go on beside it.
+        ``new``: numbers of the newest effect; nothing where none was added. Result: the error says why there
+        is no fit; it is returned so that others go on beside it.
         """
         problem = self._problem(hypothesis, group, new)
         if reason := refusal(problem):
@@ -117,14 +106,7 @@ class HypothesisFit:
     ) -> Mapping[Key, Tally]:
         """Return what a hypothesis leaves over, its numbers as they are.
 
-        Parameters
-        ----------
-        hypothesis
-            Fitted; on thinned records where it is coarse.
-        group
-            Blocks that share free numbers.
-        folds
-            What is left out in turn.
+        ``hypothesis``: fitted; on thinned records where it is coarse.
         """
         names = tuple(each.block.name for each in group)
         return _tallies(self._problem(hypothesis, group, ()), hypothesis.fits[names], folds)
@@ -259,24 +241,12 @@ class Comparison:
         self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
 
     def base(self, assembly: Assembly) -> Hypothesis:
-        """Refit the declared assembly, so that a wrong number is not taken for a wrong structure.
-
-        Parameters
-        ----------
-        assembly
-            As declared.
-        """
+        """Refit the declared assembly, so that a wrong number is not taken for a wrong structure."""
         blank = Hypothesis(assembly)
         return self._refitted(blank, self._groups(blank))
 
     def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Return a hypothesis as the coarse look sees it.
-
-        Parameters
-        ----------
-        hypothesis
-            Fitted.
-        """
+        """Return a hypothesis as the coarse look sees it."""
         return self._refitted(replace(hypothesis, coarse=True), self._groups(hypothesis))
 
     def with_effect(
@@ -284,19 +254,7 @@ class Comparison:
     ) -> Hypothesis | None:
         """Fit a hypothesis with one more effect; blocks that it does not touch stay as they are.
 
-        Parameters
-        ----------
-        hypothesis
-            Fitted, coarsely or not.
-        candidate
-            Made from ``hypothesis.assembly``.
-        wanted
-            Names of blocks; ``None`` is returned for an effect that touches none of them.
-
-        Raises
-        ------
-        UnknownNameError
-            If the effect leaves a number open that its assembly does not have.
+        ``wanted``: names of blocks; ``None`` is returned for an effect that touches none of them.
         """
         known = candidate.assembly.quantities()
         for unknown in candidate.unknowns:
@@ -312,17 +270,8 @@ class Comparison:
     def polished(self, hypothesis: Hypothesis, *, released: Collection[str] = ()) -> Hypothesis:
         """Refit a hypothesis to all samples, from where it stands.
 
-        Parameters
-        ----------
-        hypothesis
-            Fitted, coarsely or not; without anything released the answer is remembered as long as it is.
-        released
-            Positive declared numbers of which nothing is taken as known from now on.
-
-        Raises
-        ------
-        ConvergenceError
-            If there is no response near where it stands.
+        ``hypothesis``: fitted, coarsely or not; without anything released the answer is remembered as long as
+        it is.
         """
         if not released and hypothesis in self._polished:
             return self._polished[hypothesis]
@@ -333,23 +282,11 @@ class Comparison:
         return result
 
     def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Return a coarsely fitted hypothesis, its numbers as they are, with what all samples say of it.
-
-        Parameters
-        ----------
-        hypothesis
-            Fitted.
-        """
+        """Return a coarsely fitted hypothesis, its numbers as they are, with what all samples say of it."""
         return self._rejudged(replace(hypothesis, coarse=False), by_pieces)
 
     def without_whole_records(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Return a hypothesis with what it leaves over on each record when that is left out.
-
-        Parameters
-        ----------
-        hypothesis
-            Fitted.
-        """
+        """Return a hypothesis with what it leaves over on each record when that is left out."""
         return self._rejudged(hypothesis, by_records)
 
     def _rejudged(self, hypothesis: Hypothesis, folds: Folds) -> Hypothesis:
@@ -360,10 +297,7 @@ class Comparison:
     def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:
         """Return what all records say about all blocks of a hypothesis, on all samples.
 
-        Parameters
-        ----------
-        hypothesis
-            Fitted; the answer is remembered as long as the hypothesis is.
+        ``hypothesis``: fitted; the answer is remembered as long as the hypothesis is.
         """
         if hypothesis not in self._judged:
             signals, records = self.bench.records.signals, self.bench.records.records
@@ -468,13 +402,6 @@ def moved_numbers(before: Assembly, after: Assembly) -> dict[str, str]:
     """Return the new name of each number that an edit has moved, by its old one.
 
     An edit that puts an element inside another keeps its numbers, as the very same objects.
-
-    Parameters
-    ----------
-    before
-        An assembly.
-    after
-        Made from it by an edit.
     """
     old, new = before.quantities(), after.quantities()
     departed = _by_identity({name: quantity for name, quantity in old.items() if name not in new})

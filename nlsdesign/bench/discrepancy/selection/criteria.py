@@ -330,21 +330,7 @@ class Choice(Generic[T]):
 def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], block: str) -> Choice[T] | None:
     """Return the simplest of the rivals that predict a block about as well as the best, and may be named.
 
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    before
-        Of the hypothesis that all rivals add to.
-    rivals
-        In the order of the catalogue.
-    block
-        Where something is lacking.
-
-    Returns
-    -------
-    Choice or None
-        Nothing where none of them may be named.
+    Result: nothing where none of them may be named.
     """
 
     def left(rival: Rival[T]) -> float:
@@ -388,17 +374,6 @@ def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -
     """Tell whether an effect only imitates another, whose numbers are not known but that explains far more.
 
     What it leaves shows that it is the other one.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    taken
-        Effect that may be named.
-    other
-        Effect that may not, because of its numbers alone.
-    block
-        Where something is lacking.
     """
     here, there = ({block: each.excesses[block]} for each in (taken, other))
     less = criteria.richer * other.left_in(block) < taken.left_in(block)
@@ -423,15 +398,7 @@ class Calibration:
     most: float = 0.99
 
     def probability(self, distance: float, *, complete: bool) -> float:
-        """Return the probability that a name is right.
-
-        Parameters
-        ----------
-        distance
-            ln(r).
-        complete
-            Whether nothing is left beyond the noise.
-        """
+        """Return the probability that a name is right."""
         score = self.offset + self.distance * distance + self.complete * complete
         return min(self.most, 1.0 / (1.0 + math.exp(-score)))
 
@@ -440,19 +407,7 @@ CALIBRATION = Calibration()
 
 
 def distance_to_next(criteria: Criteria, choice: Choice[T], rivals: Sequence[Rival[T]], block: str) -> float:
-    """Return ln(r): how many times as much the best other name leaves as the one that is taken.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    choice
-        What is taken, and what cannot be told from it.
-    rivals
-        All that were compared.
-    block
-        Where something was lacking.
-    """
+    """Return ln(r): how many times as much the best other name leaves as the one that is taken."""
     names = {choice.taken.effect, *(each.effect for each in choice.equals), *choice.taken.simpler}
     # A form that contains it is no other name for what is there.
     forms = {rival.effect for rival in rivals if choice.taken.effect in rival.simpler}

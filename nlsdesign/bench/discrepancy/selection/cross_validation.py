@@ -64,11 +64,6 @@ def by_pieces(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
 
     The first piece is in another fold from record to record: what shows at one phase of a motion that is
     repeated, such as the way back, is left out of some records and known from the others.
-
-    Parameters
-    ----------
-    evidence
-        Of all blocks that share numbers.
     """
     # In the order of the records, which follows from what they hold, not from their names.
     names, folds = list(dict.fromkeys(e.record.name for e in evidence)), []
@@ -80,13 +75,7 @@ def by_pieces(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
 
 
 def by_records(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
-    """Return folds that are whole records; pieces where there are too few to leave one out.
-
-    Parameters
-    ----------
-    evidence
-        Of all blocks that share numbers.
-    """
+    """Return folds that are whole records; pieces where there are too few to leave one out."""
     names = sorted({e.record.name for e in evidence if e.record.role == "fit"})
     if len(names) < _LEAST_RECORDS:
         return by_pieces(evidence)
@@ -101,17 +90,9 @@ def tallies_of(
 ) -> dict[Key, Tally]:
     """Return what a fit leaves over on each record, and what it would leave over on a record it has not seen.
 
-    Parameters
-    ----------
-    evidence
-        Of all blocks that share the numbers, on records for fits and for selection.
-    best
-        The fitted numbers.
-    folds
-        What is left out in turn; with ``None`` everything is predicted with the numbers as they are.
-    exact
-        Whether a fold is predicted by the block itself; otherwise by its linearisation at the optimum, which
-        is enough for what explains too little to be named.
+    ``folds``: what is left out in turn; with ``None`` everything is predicted with the numbers as they are.
+    ``exact``: whether a fold is predicted by the block itself; otherwise by its linearisation at the optimum,
+    which is enough for what explains too little to be named.
     """
     rows = StackedRows(evidence, best.parameters)
     x = np.array([p.inward(best.values[p.name]) for p in best.parameters])
@@ -162,19 +143,7 @@ def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array, *, exact: 
 
 
 class _Others:
-    """What is left of the records without a fold, over the fitted scale.
-
-    Parameters
-    ----------
-    rows
-        Of all records.
-    used
-        Pieces that were fitted, at the optimum.
-    fold
-        That is left out.
-    x
-        Optimum with the fold.
-    """
+    """What is left of the records without a fold, over the fitted scale."""
 
     def __init__(self, rows: StackedRows, used: Sequence[_Piece], fold: int, x: Array) -> None:
         self._rows, self._used, self._fold, self._x = rows, used, fold, x
@@ -186,11 +155,6 @@ class _Others:
         The numbers of all records are open to a fit without the fold too. A step that does not bring it
         half of what its slopes promise has left the place where they hold: along what the others hardly
         know, it may lead anywhere, and it would be blamed on the effect.
-
-        Parameters
-        ----------
-        moved
-            By one Gauss-Newton step.
         """
         try:
             before, slope = self(self._x)
@@ -203,15 +167,7 @@ class _Others:
         return minimise(self, self._x, (low, high), evaluations=_EVALUATIONS, share=_TOLERANCE).x
 
     def of(self, each: Evidence, x: Array) -> tuple[Array, Array]:
-        """Return residuals and slopes of one record; those at the last numbers are remembered.
-
-        Parameters
-        ----------
-        each
-            A record seen by a block.
-        x
-            In the fitted scale.
-        """
+        """Return residuals and slopes of one record; those at the last numbers are remembered."""
         if self._last[0] != x.tobytes():
             self._last = x.tobytes(), {}
         known = self._last[1]

@@ -92,28 +92,12 @@ class Hypothesis:
         return replace(self, values={n: to_resolution(v, errors.get(n, 0.0)) for n, v in self.values.items()})
 
     def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
-        """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do.
-
-        Parameters
-        ----------
-        tallies
-            By block and record, as they are.
-        """
+        """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do."""
         return replace(self, tallies=like_the_others(tallies, self.unpredictable))
 
 
 def excesses(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> dict[str, Excess]:
-    """Return the excess of each block, and of the declared numbers.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    bench
-        Its records and floors.
-    criteria
-        Of the decision.
-    """
+    """Return the excess of each block, and of the declared numbers."""
     names = dict.fromkeys(block for block, _ in hypothesis.tallies)
     result = {name: _block_excess(hypothesis, bench, name, criteria) for name in names}
     prior, count = hypothesis.prior, sum(len(f.prior_z_scores()) for f in hypothesis.fits.values())

@@ -127,24 +127,12 @@ class Standing:
 
 
 def total_excess(excesses: Excesses) -> float:
-    """Return the sum of squares beyond the floor over all blocks.
-
-    Parameters
-    ----------
-    excesses
-        Of one hypothesis.
-    """
+    """Return the sum of squares beyond the floor over all blocks."""
     return sum(each.excess for each in excesses.values())
 
 
 def explained(before: Excesses, after: Excesses) -> dict[str, float]:
-    """Return the explained share of each open block's excess, as predicted.
-
-    Parameters
-    ----------
-    before, after
-        Of two hypotheses on the same rows.
-    """
+    """Return the explained share of each open block's excess, as predicted."""
     return {
         name: 1.0 - after[name].excess / one.excess
         for name, one in before.items()
@@ -169,13 +157,7 @@ class Gain(NamedTuple):
 
 
 def gain(before: Excesses, after: Excesses) -> Gain:
-    """Return by how much predictions gain from one hypothesis to another, over all blocks.
-
-    Parameters
-    ----------
-    before, after
-        Of two hypotheses on the same rows.
-    """
+    """Return by how much predictions gain from one hypothesis to another, over all blocks."""
     differences = np.concatenate(
         [
             np.subtract(pieces, after[name].pieces[record]) / max(one.colour, after[name].colour)
@@ -191,13 +173,7 @@ def gain(before: Excesses, after: Excesses) -> Gain:
 
 
 def gains_by_record(before: Excesses, after: Excesses) -> dict[str, float]:
-    """Return by how much the prediction of each record gains, in effective squares of the noise.
-
-    Parameters
-    ----------
-    before, after
-        Of two hypotheses on the same rows.
-    """
+    """Return by how much the prediction of each record gains, in effective squares of the noise."""
     gains: dict[str, float] = {}
     for name, one in before.items():
         for record, pieces in one.pieces.items():
@@ -211,15 +187,7 @@ _CLOSE = 0.005
 
 
 def standing_of(unknowns: Sequence[Unknown], fits: Iterable[Fit]) -> Standing:
-    """Return distance from "no effect", errors and covariance of the numbers that an effect has brought.
-
-    Parameters
-    ----------
-    unknowns
-        Of the effect.
-    fits
-        In one of them its numbers were fitted, all together.
-    """
+    """Return distance from "no effect", errors and covariance of the numbers that an effect has brought."""
     known = {u.name: u for u in unknowns}
     for fit in fits:
         places = [k for k, p in enumerate(fit.parameters) if p.name in known]

@@ -22,15 +22,7 @@ from .trials import Skipped, Step, Trials, Tried, account, rival_of
 
 @dataclass(frozen=True, eq=False)
 class Revision:
-    """Builds steps anew from where they began, and keeps what the rule prefers.
-
-    Parameters
-    ----------
-    trials
-        That fit and judge.
-    start
-        Hypothesis without effects.
-    """
+    """Builds steps anew from where they began, and keeps what the rule prefers."""
 
     trials: Trials
     start: Hypothesis
@@ -40,11 +32,6 @@ class Revision:
         """Return the steps with what prediction gains by each effect beside all others that are named.
 
         A step says what it gained when it was added. What was added later may have taken most of that over.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
         """
         if len(steps) < 2:
             return steps
@@ -68,13 +55,7 @@ class Revision:
         return list(self._fewer[kept])
 
     def backward(self, steps: list[Step]) -> list[Step]:
-        """Drop the effects that later ones have made superfluous, the first added first.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
-        """
+        """Drop the effects that later ones have made superfluous, the first added first."""
         place = 0
         while len(steps) > 1 and place < len(steps) - 1:
             self.trials.progress(f"trying without {steps[place].effect}")
@@ -90,11 +71,6 @@ class Revision:
 
         A form of the same effect with more numbers is one too. Beside effects that were not named yet the
         simpler form may have done.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
         """
         if len(steps) < 2 or is_complete(self.trials.excesses_of(steps[-1].chosen)):
             return steps
@@ -109,11 +85,6 @@ class Revision:
         """Put a simpler form of an effect in its place where that predicts about as well.
 
         Before the other effects were named, the richer form may have stood for a part of them.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they were added.
         """
         if len(steps) < 2:
             return steps
@@ -147,15 +118,7 @@ class Revision:
         return Change(self.trials.criteria, *after).is_superfluous()
 
     def rebuilt(self, steps: Sequence[Step], changed: Mapping[int, Candidate] | None = None) -> list[Step]:
-        """Return the steps anew, some perhaps changed; nothing if one of them no longer fits.
-
-        Parameters
-        ----------
-        steps
-            In the order in which they are to be added.
-        changed
-            Candidates in the place of some, by place.
-        """
+        """Return the steps anew, some perhaps changed; nothing if one of them no longer fits."""
         present, rebuilt = self.start, list[Step]()
         for place, step in enumerate(steps):
             candidate = same_again(self.trials, present, (changed or {}).get(place, step.chosen.newest))
@@ -175,17 +138,7 @@ class Revision:
 
 
 def same_again(trials: Trials, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
-    """Return the same form of an effect at the same kind of place of another assembly.
-
-    Parameters
-    ----------
-    trials
-        With the catalogue.
-    hypothesis
-        To add to.
-    wanted
-        Made from another assembly.
-    """
+    """Return the same form of an effect at the same kind of place of another assembly."""
     same = [
         c for c in trials.candidates(hypothesis) if c.effect == wanted.effect and _kinds(c) == _kinds(wanted)
     ]
@@ -194,15 +147,7 @@ def same_again(trials: Trials, hypothesis: Hypothesis, wanted: Candidate) -> Can
 
 
 def objections_of_all(criteria: Criteria, last: Hypothesis) -> list[list[str]]:
-    """Return what the numbers of each effect have against it, all effects together.
-
-    Parameters
-    ----------
-    criteria
-        Of the rule.
-    last
-        With the effects.
-    """
+    """Return what the numbers of each effect have against it, all effects together."""
     return [
         criteria.objections_of_numbers(standing_of(each.unknowns, last.fits.values())) for each in last.added
     ]
@@ -258,21 +203,7 @@ def search(
     criteria: Criteria,
     progress: Callable[[str], None],
 ) -> Outcome:
-    """Add effects to a hypothesis while a block stays open and one may be named.
-
-    Parameters
-    ----------
-    comparison
-        Fits hypotheses to the records.
-    base
-        Refitted declared model.
-    catalogue
-        Effects to try.
-    criteria
-        Of the decision.
-    progress
-        Told what is being tried.
-    """
+    """Add effects to a hypothesis while a block stays open and one may be named."""
     return _Search(Trials(comparison, catalogue, criteria, progress)).outcome(base)
 
 
@@ -426,15 +357,6 @@ def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criter
     """Return a hypothesis with a table for what each open block leaves over, where one predicts it.
 
     The clauses are those of an effect that ask for prediction; no share is asked for, since nothing is named.
-
-    Parameters
-    ----------
-    comparison
-        Fits hypotheses to the records.
-    hypothesis
-        Fitted to all samples.
-    criteria
-        Of the rule.
     """
     present = hypothesis
     for block in lacking(excesses(hypothesis, comparison.bench, criteria)):

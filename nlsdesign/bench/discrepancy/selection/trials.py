@@ -132,33 +132,15 @@ class Trials:
     on_other_records: dict[Hypothesis, Excesses] = field(default_factory=dict)
 
     def excesses_of(self, hypothesis: Hypothesis) -> Excesses:
-        """Return what a hypothesis leaves over, block by block.
-
-        Parameters
-        ----------
-        hypothesis
-            Fitted.
-        """
+        """Return what a hypothesis leaves over, block by block."""
         return excesses(hypothesis, self.comparison.bench, self.criteria)
 
     def on_all(self, hypothesis: Hypothesis) -> Excesses:
-        """Return what a hypothesis leaves over on all samples, its numbers as they are.
-
-        Parameters
-        ----------
-        hypothesis
-            Fitted.
-        """
+        """Return what a hypothesis leaves over on all samples, its numbers as they are."""
         return self.excesses_of(self.comparison.on_all_samples(hypothesis))
 
     def candidates(self, present: Hypothesis) -> list[Candidate]:
-        """Return what the catalogue has to offer beside what is named already.
-
-        Parameters
-        ----------
-        present
-            Hypothesis to add to.
-        """
+        """Return what the catalogue has to offer beside what is named already."""
         return [c for effect in self.catalogue for c in effect(present.assembly)]
 
     def tried_on(
@@ -168,17 +150,6 @@ class Trials:
 
         What takes long is tried only where nothing else explains the block down to its noise, and where more
         is left than the inexact form of an effect leaves.
-
-        Parameters
-        ----------
-        present
-            Hypothesis to add to.
-        block
-            Where something is lacking.
-        done
-            What was tried before.
-        far
-            Whether the block has more left than the inexact form of an effect leaves.
         """
         known = {(h.newest.effect, h.newest.location) for h in done}
         tasks = [(present, c) for c in self.candidates(present) if (c.effect, c.location) not in known]
@@ -207,12 +178,7 @@ class Trials:
     ) -> list[Hypothesis]:
         """Return fits in the order of the tasks; what cannot be fitted is in :attr:`skipped`.
 
-        Parameters
-        ----------
-        tasks
-            Hypotheses, and what to add to each.
-        wanted
-            Blocks of which a candidate must touch one; empty for any.
+        ``wanted``: blocks of which a candidate must touch one; empty for any.
         """
         # What takes longest begins first, so that no core waits for it at the end.
         order = sorted(range(len(tasks)), key=lambda number: not tasks[number][1].strategy.takes_long)
@@ -237,17 +203,7 @@ class Trials:
         return [results[number] for number in sorted(results)]
 
     def step(self, present: Hypothesis, fresh: Sequence[Hypothesis], block: str) -> Step | None:
-        """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples.
-
-        Parameters
-        ----------
-        present
-            Hypothesis that the fits add to.
-        fresh
-            Fits with one more effect each.
-        block
-            Where something is lacking.
-        """
+        """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples."""
         before, left = self.excesses_of(present), {h: self.excesses_of(h) for h in fresh}
         if not before[block].open:
             best = sorted(fresh, key=lambda h: total_excess(left[h]))[:_LOOKED_AT_TWICE]
@@ -258,17 +214,7 @@ class Trials:
     def sound(
         self, present: Hypothesis, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str
     ) -> Step | None:
-        """Return the best of some hypotheses that also predicts whole records and stands on all samples.
-
-        Parameters
-        ----------
-        present
-            Hypothesis that all add to.
-        before, tried
-            What it leaves, and what each of them leaves.
-        block
-            Where something is lacking.
-        """
+        """Return the best of some hypotheses that also predicts whole records and stands on all samples."""
         left, unknown = dict(tried), list[Rival[Hypothesis]]()
         while step := self._chosen(before, left, block):
             rival = rival_of(step.chosen, left.pop(step.chosen))
@@ -295,13 +241,7 @@ class Trials:
         return not why
 
     def predicts_records(self, present: Hypothesis, chosen: Hypothesis) -> bool:
-        """Tell whether an effect predicts whole records that its numbers were not fitted to.
-
-        Parameters
-        ----------
-        present, chosen
-            Without it and with it.
-        """
+        """Tell whether an effect predicts whole records that its numbers were not fitted to."""
         for each in (present, chosen):
             if each not in self.on_other_records:
                 again = self.comparison.without_whole_records(each)
@@ -324,14 +264,7 @@ class Trials:
     def made(self, before: Excesses, rival: Rival[Hypothesis], block: str) -> Step:
         """Return a step with what it gains.
 
-        Parameters
-        ----------
-        before
-            What the hypothesis leaves without it.
-        rival
-            With it.
-        block
-            Where something is lacking; where it explains most stands in the step.
+        ``block``: where something is lacking; where it explains most stands in the step.
         """
         shares = explained(before, rival.excesses) or {block: 0.0}
         most = max(shares, key=lambda name: (shares[name], name == block))
@@ -340,17 +273,7 @@ class Trials:
 
 
 def account(trials: Trials, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
-    """Return how far each effect goes alone and what speaks against it, the best first.
-
-    Parameters
-    ----------
-    trials
-        That fitted them.
-    present
-        Hypothesis that they add to.
-    tried
-        Each with one more effect.
-    """
+    """Return how far each effect goes alone and what speaks against it, the best first."""
     before = trials.excesses_of(present)
     whole, every = max(total_excess(before), 1.0), []
     for each in tried:
@@ -365,15 +288,7 @@ def account(trials: Trials, present: Hypothesis, tried: Sequence[Hypothesis]) ->
 
 
 def rival_of(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:
-    """Return a hypothesis as the rule sees it.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted, with at least one effect.
-    after
-        What it leaves.
-    """
+    """Return a hypothesis as the rule sees it."""
     newest = hypothesis.newest
     return Rival(
         hypothesis,

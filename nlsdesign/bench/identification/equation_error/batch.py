@@ -112,12 +112,7 @@ class ColumnFunction:
     def __call__(self, count: int, arrays: Sequence[Array]) -> Array:
         """Return the outputs, shape (rows, count).
 
-        Parameters
-        ----------
-        count
-            Number of columns.
-        arrays
-            One for each input, shape (rows, count); a column, shape (rows,), is the same for all.
+        ``arrays``: one for each input, shape (rows, count); a column, shape (rows,), is the same for all.
         """
         result = np.zeros((self._rows, count))
         pieces = max(1, -(-count // _COLUMNS))
@@ -145,11 +140,6 @@ class ChainFunction:
 
     CasADi converts NumPy arrays number by number, which takes ten times as long as the arithmetic here; its
     buffers read and write them in place.
-
-    Parameters
-    ----------
-    function
-        With one dense output.
     """
 
     def __init__(self, function: ca.Function) -> None:
@@ -159,13 +149,8 @@ class ChainFunction:
     def __call__(self, count: int, arrays: Sequence[Array]) -> Array:
         """Return the outputs, shape (rows, count).
 
-        Parameters
-        ----------
-        count
-            Number of steps.
-        arrays
-            The start, shape (rows,), and one for each further input, shape (rows, count); a column, shape
-            (rows,), is the same for all.
+        ``arrays``: the start, shape (rows,), and one for each further input, shape (rows, count); a column,
+        shape (rows,), is the same for all.
         """
         f = self._function
         result = np.zeros((-(-count // _CHUNK) * _CHUNK, f.size1_out(0)))
@@ -215,13 +200,7 @@ class PointFunction:
                 self._buffer.set_res(i, memoryview(result))  # type: ignore[arg-type, call-arg]
 
     def __call__(self, *arrays: Array | float) -> list[Array]:
-        """Return all outputs, shape (rows, columns) each.
-
-        Parameters
-        ----------
-        arrays
-            One for each input.
-        """
+        """Return all outputs, shape (rows, columns) each."""
         for given, array in zip(self._given, arrays, strict=True):
             given[:] = array
         self._trigger()

@@ -44,12 +44,7 @@ _SHARE = 1e-3
 def refined(record: Record, times: int) -> Record:
     """Return a record with several samples in the place of one, between those that were measured.
 
-    Parameters
-    ----------
-    record
-        As measured.
-    times
-        How many; 1 leaves it as it is.
+    ``times``: how many; 1 leaves it as it is.
     """
     if times == 1:
         return record
@@ -82,17 +77,7 @@ def _between(clock: Array, values: Array, masked: Mask, finer: Array) -> Array:
 
 
 def refined_filter(rows: Smoothing, width: float, times: int) -> Smoothing:
-    """Return a filter of the same rows and the same width in time on a finer clock.
-
-    Parameters
-    ----------
-    rows
-        Of the samples as measured.
-    width
-        Standard deviation of its Gaussian in these samples.
-    times
-        How many samples stand in the place of one.
-    """
+    """Return a filter of the same rows and the same width in time on a finer clock."""
     return replace(
         rows,
         count=(rows.count - 1) * times + 1,
@@ -103,15 +88,7 @@ def refined_filter(rows: Smoothing, width: float, times: int) -> Smoothing:
 
 
 def on_clock(records: RecordSet, step: float) -> RecordSet:
-    """Return records with samples in between until none are further apart than a step.
-
-    Parameters
-    ----------
-    records
-        As measured.
-    step
-        In s.
-    """
+    """Return records with samples in between until none are further apart than a step."""
     times = [times_on(record, step) for record in records.records]
     changed = [(r, k) for r, k in zip(records.records, times, strict=True) if k > 1]
     if not changed:
@@ -126,15 +103,7 @@ def on_clock(records: RecordSet, step: float) -> RecordSet:
 
 
 def times_on(record: Record, step: float) -> int:
-    """Return how many samples stand in the place of one on a clock.
-
-    Parameters
-    ----------
-    record
-        As measured.
-    step
-        Of the clock in s.
-    """
+    """Return how many samples stand in the place of one on a clock."""
     return max(1, math.ceil(record.step / step - _SHARE))
 
 
@@ -164,11 +133,6 @@ class BlockRecord(NamedTuple):
 
 def resolving_step(block_records: Sequence[BlockRecord]) -> float:
     """Return the time between samples in s at which blocks show what they do; infinite if any is enough.
-
-    Parameters
-    ----------
-    block_records
-        Of the records that may decide on filters.
 
     Notes
     -----

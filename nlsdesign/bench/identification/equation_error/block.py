@@ -69,13 +69,7 @@ class Block:
     effort_per_drive: float = 1.0
 
     def scaled_to(self, effort_per_drive: float) -> Block:
-        """Return the block with another constant factor in its output.
-
-        Parameters
-        ----------
-        effort_per_drive
-            That of the declared model, so that all hypotheses are judged in one scale.
-        """
+        """Return the block with another constant factor in its output."""
         if effort_per_drive == self.effort_per_drive:
             return self
         s, model = self.model.symbols(), self.model

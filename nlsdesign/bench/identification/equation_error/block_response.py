@@ -98,11 +98,6 @@ class DrivenBlock:
     straightened
         Names of inputs whose noise the output rectifies: it is evaluated where they are smoothed over the
         span, and what is smoothed away counts with the slope of the output there.
-
-    Raises
-    ------
-    UnknownNameError
-        If the model has no such parameter.
     """
 
     def __init__(
@@ -139,12 +134,7 @@ class DrivenBlock:
     def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
         """Return the inputs of the block from a record.
 
-        Parameters
-        ----------
-        record
-            Must hold every signal that drives the block.
-        values
-            Free parameters by name; a late signal is advanced by what stands there.
+        ``values``: free parameters by name; a late signal is advanced by what stands there.
         """
         inputs, rates = self._inputs(record, values, smooth=self.stiff)
         at = self._digest(inputs.shape[1], [inputs, rates])
@@ -202,20 +192,7 @@ class DrivenBlock:
         return self._walk.instructions if self._walk is not None else 0
 
     def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
-        """Return the output and its derivatives.
-
-        Parameters
-        ----------
-        given
-            From :meth:`samples`, with the same values where :attr:`needs_new_samples`.
-        values
-            Free parameters by name.
-
-        Raises
-        ------
-        ConvergenceError
-            If a number is not finite.
-        """
+        """Return the output and its derivatives."""
         p = np.array([values[name] for name in (*self.free, *self._late)])
         n = given.at.shape[1]
         states, mean = (np.zeros((0, n)), None) if self._walk is None else self._states(self._walk, given, p)
@@ -334,20 +311,7 @@ def _centred(mean: Array) -> Array:
 
 
 def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
-    """Return the parameters that the output depends on, directly, through the states, or as a delay.
-
-    Parameters
-    ----------
-    block
-        Model, drives and output.
-    free
-        Names of parameters.
-
-    Raises
-    ------
-    UnknownNameError
-        If the model has no such parameter.
-    """
+    """Return the parameters that the output depends on, directly, through the states, or as a delay."""
     s = block.model.symbols()
     names = [v.name for v in block.model.parameters]
     for name in free:

@@ -73,17 +73,6 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
     """Return filter and noise floor of a block on a record.
 
     The noise of each input is carried to the output by the slope of the output with respect to it.
-
-    Parameters
-    ----------
-    block
-        As declared.
-    record
-        Holds all signals that drive the block.
-    noise
-        Of the measured signals.
-    filters
-        Of the block.
     """
     n, step, span = len(record.trace), record.step, filters.span
     stride = max(1, round(filters.spacing / step))
@@ -202,18 +191,7 @@ class Evidence:
     samples: Samples
 
     def residual(self, values: Mapping[str, float]) -> tuple[Array, Array]:
-        """Return measured minus predicted over the noise floor, and its derivatives.
-
-        Parameters
-        ----------
-        values
-            Free parameters by name.
-
-        Returns
-        -------
-        tuple
-            Shapes (rows,) and (rows, free parameters of the block).
-        """
+        """Return measured minus predicted over the noise floor, and its derivatives."""
         samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
         response = self.driven.respond(samples, values)
         target = self.driven.block.target
@@ -222,13 +200,7 @@ class Evidence:
         return (self.floor.filter @ error) / sigma, -(self.floor.filter @ response.slope) / sigma[:, None]
 
     def predicted(self, values: Mapping[str, float]) -> Array:
-        """Return the unfiltered output over the record.
-
-        Parameters
-        ----------
-        values
-            Free parameters by name.
-        """
+        """Return the unfiltered output over the record."""
         samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
         return self.driven.respond(samples, values).output
 
@@ -249,11 +221,6 @@ class Bench:
     clock
         Time in s between samples at which the blocks show what they do, where that is known from other
         records of the same bench.
-
-    Raises
-    ------
-    MeasurementError
-        If no record moves enough to say anything about a block.
     """
 
     def __init__(
@@ -313,13 +280,7 @@ class Bench:
         return self.records.of("fit", "selection") or self.records.records
 
     def with_records(self, records: RecordSet) -> Bench:
-        """Return other records of the same bench as they are seen with the same noise and filters.
-
-        Parameters
-        ----------
-        records
-            All records.
-        """
+        """Return other records of the same bench as they are seen with the same noise and filters."""
         return Bench(records, self._blocks, noise=self.noise, filters=self.filters, clock=self.clock)
 
     def _check_alive(self, block: Block) -> None:
@@ -352,11 +313,8 @@ class Bench:
     ) -> DrivenBlock:
         """Return a block ready for evaluation on these records.
 
-        Parameters
-        ----------
-        block, free, values
-            As for :class:`~.block_response.DrivenBlock`. The records that fits may see decide what is stiff;
-            if there are none, as where a finished model is only looked at, all do.
+        ``block``, ``free``, ``values``: as for :class:`~.block_response.DrivenBlock`. The records that fits
+        may see decide what is stiff; if there are none, as where a finished model is only looked at, all do.
         """
         filters = self.filters.get(block.name)
         span, straightened = (filters.span, filters.straightened) if filters else (0.0, ())
@@ -374,18 +332,9 @@ class Bench:
     ) -> list[Evidence]:
         """Return what records say about a block.
 
-        Parameters
-        ----------
-        driven
-            The block, of any hypothesis.
-        records
-            Some of the records.
-        values
-            Free parameters by name, by which late signals are advanced.
-        coarse
-            Whether blocks with a target are simulated on every k-th sample alone and compared unfiltered: a
-            quick look, less sharp by the square root of the number of samples left out. Blocks that are
-            faster than a sample are simulated on all.
+        ``coarse``: whether blocks with a target are simulated on every k-th sample alone and compared
+        unfiltered: a quick look, less sharp by the square root of the number of samples left out. Blocks that
+        are faster than a sample are simulated on all.
         """
         name, thin = driven.block.name, coarse and driven.block.target is not None
         result = []
@@ -398,24 +347,12 @@ class Bench:
         return result
 
     def typical_floor(self, block: str) -> float:
-        """Return the noise floor of a block over all records, root mean square, in its unit.
-
-        Parameters
-        ----------
-        block
-            Name of the block.
-        """
+        """Return the noise floor of a block over all records, root mean square, in its unit."""
         rows = np.concatenate([f.sigma for (name, _), f in self.floors.items() if name == block])
         return float(np.sqrt(np.mean(rows**2)))
 
     def known_from(self, block: str) -> float:
-        """Return the effective squares of noise from which the floor of a block is known.
-
-        Parameters
-        ----------
-        block
-            Name of the block.
-        """
+        """Return the effective squares of noise from which the floor of a block is known."""
         # One estimate of the noise serves all records, so more of them make it no better.
         doubt = float(np.mean([1.0 / f.known for (name, _), f in self.floors.items() if name == block]))
         return 1.0 / doubt if doubt else math.inf

@@ -95,15 +95,6 @@ def pace_of(signals: Sequence[tuple[Array, float]], noise: float, order: int = 1
     """Return the typical angular frequency of a derivative in rad/s: the next over it, root mean squares.
 
     Both behind the narrowest filter that makes the noise of the next small; zero where none does.
-
-    Parameters
-    ----------
-    signals
-        Of each record, shape (n,), with the time between samples in s.
-    noise
-        Standard deviation of its white noise.
-    order
-        1 for the pace of the rate, 2 for that of the acceleration.
     """
     for width in _widths(0.5 * min(step for _, step in signals), signals):
         power, share = _power(signals, width, (order + 1, 0.0), noise)
@@ -114,15 +105,7 @@ def pace_of(signals: Sequence[tuple[Array, float]], noise: float, order: int = 1
 
 
 def rate_span(records: Sequence[Record], signal: str) -> float:
-    """Return the time in s over which the rate of a measured signal is taken; zero where it does not move.
-
-    Parameters
-    ----------
-    records
-        All that are compared.
-    signal
-        Full name.
-    """
+    """Return the time in s over which the rate of a measured signal is taken; zero where it does not move."""
     resolutions = [r.resolution_of(signal) for r in records]
     noise = float(np.median([max(g.noise, g.quantum / math.sqrt(12.0)) for g in resolutions]))
     runs = [(r.trace[signal], r.step) for r in records]
@@ -132,17 +115,7 @@ def rate_span(records: Sequence[Record], signal: str) -> float:
 
 
 def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> dict[tuple[str, int], float]:
-    """Return the pace in rad/s of every signal and order that decide on a filter.
-
-    Parameters
-    ----------
-    blocks
-        As declared.
-    records
-        Those that fits may see.
-    noise
-        Of the measured signals.
-    """
+    """Return the pace in rad/s of every signal and order that decide on a filter."""
     wanted = dict.fromkeys(
         (signal, order)
         for block in blocks
@@ -185,24 +158,7 @@ def _deciding(block: Block) -> dict[str, int]:
 def chosen_filters(
     block: Block, records: Sequence[Record], noise: Noise, pace_by_order: Mapping[tuple[str, int], float]
 ) -> Filters:
-    """Return the filters of a block for all records of a set and all hypotheses.
-
-    Parameters
-    ----------
-    block
-        As declared.
-    records
-        Those that fits may see.
-    noise
-        Of the measured signals.
-    pace_by_order
-        From :func:`paces`.
-
-    Raises
-    ------
-    MeasurementError
-        If the motion is sampled too coarsely for derivatives.
-    """
+    """Return the filters of a block for all records of a set and all hypotheses."""
     moving = any(d.order > 0 for d in block.drives.values())
     seen = _deciding(block)
     usual_pace = max((pace_by_order[signal, 1] for signal in seen), default=0.0)
@@ -229,14 +185,7 @@ def chosen_filters(
 def output_slopes(block: Block, inputs: Array, stride: int) -> Array:
     """Return the derivative of a block's output with respect to each input, shape (inputs, rows).
 
-    Parameters
-    ----------
-    block
-        As declared.
-    inputs
-        Shape (inputs, n).
-    stride
-        Of so many samples one is looked at.
+    ``inputs``: shape (inputs, n).
     """
     s, model = block.model.symbols(), block.model
     slope = ca.Function(
@@ -249,17 +198,7 @@ def output_slopes(block: Block, inputs: Array, stride: int) -> Array:
 
 
 def measured_inputs(block: Block, record: Record, span: float) -> Array:
-    """Return the inputs of a block's model from a record, shape (inputs, n); those not measured rest.
-
-    Parameters
-    ----------
-    block
-        As declared.
-    record
-        Holds all signals that drive the block.
-    span
-        Time in s over which rates are taken.
-    """
+    """Return the inputs of a block's model from a record, shape (inputs, n); those not measured rest."""
     model = block.model
     inputs = np.repeat(model.start(model.inputs)[:, None], len(record.trace), axis=1)
     for i, variable in enumerate(model.inputs):
@@ -275,17 +214,6 @@ def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[s
     A filter behind the output averages noise only where the output is straight in it. Where it is bent, as
     that of a lossy gear where the power turns over, noise is rectified: half the sum of what it causes
     upwards and downwards stays. Rates are smooth already, and so is a motion.
-
-    Parameters
-    ----------
-    block
-        As declared.
-    record
-        Holds all signals that drive the block.
-    noise
-        Of the measured signals.
-    span
-        Time in s over which rates are taken.
     """
     model, s = block.model, block.model.symbols()
     output = ca.Function("output", [s.state, s.input, s.parameter, s.table], [s.output])

@@ -12,50 +12,19 @@ from .block import Block, Drive
 
 
 def advanced(time: Array, signal: Array, delay: Array) -> tuple[Array, Array]:
-    """Return a signal read later by linear interpolation, and the slope of the line it is read from.
-
-    Parameters
-    ----------
-    time
-        In s, shape (n,).
-    signal
-        Shape (n,).
-    delay
-        By how much later, in s, shape (n,).
-    """
+    """Return a signal read later by linear interpolation, and the slope of the line it is read from."""
     slopes = np.append(np.diff(signal) / np.diff(time), 0.0)
     place = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
     return np.interp(time + delay, time, signal), slopes[place]
 
 
 def late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
-    """Return the drives that a free parameter shifts in time.
-
-    Parameters
-    ----------
-    block
-        Model and drives.
-    free
-        Names of parameters.
-    """
+    """Return the drives that a free parameter shifts in time."""
     return [d for d in block.drives.values() if set(d.shifted_by) & set(free)]
 
 
 def free_delay(drive: Drive, free: Sequence[str]) -> str:
-    """Return the one delay of a signal that is free; of several, records show the sum alone.
-
-    Parameters
-    ----------
-    drive
-        Of the signal.
-    free
-        Names of parameters.
-
-    Raises
-    ------
-    MeasurementError
-        If several are free.
-    """
+    """Return the one delay of a signal that is free; of several, records show the sum alone."""
     names = [name for name in drive.shifted_by if name in free]
     if len(names) > 1:
         raise MeasurementError(

@@ -52,42 +52,16 @@ class Noise:
     seen: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def deviation(self, signal: str) -> float:
-        """Return the standard deviation of the whole noise of a signal.
-
-        Parameters
-        ----------
-        signal
-            Full name.
-        """
+        """Return the standard deviation of the whole noise of a signal."""
         return math.sqrt(self.level[signal] ** 2 + sum(p.variance for p in self.parts.get(signal, ())))
 
     def behind(self, signal: str, weights: Array, step: float) -> float:
-        """Return the standard deviation of the noise of a signal behind a filter.
-
-        Parameters
-        ----------
-        signal
-            Full name.
-        weights
-            Of the filter.
-        step
-            Time between samples in s.
-        """
+        """Return the standard deviation of the noise of a signal behind a filter."""
         white = self.level[signal] * float(np.linalg.norm(weights))
         return math.sqrt(white**2 + variance_behind(self.parts.get(signal, ()), weights, step))
 
     def memory(self, signal: str, weights: Array, step: float) -> tuple[NoisePart, ...]:
-        """Return the parts of the noise of a signal that remember, with their variances behind a filter.
-
-        Parameters
-        ----------
-        signal
-            Full name.
-        weights
-            Of the filter.
-        step
-            Time between samples in s.
-        """
+        """Return the parts of the noise of a signal that remember, with their variances behind a filter."""
         parts = self.parts.get(signal, ())
         return tuple(NoisePart(variance_behind([p], weights, step), p.time) for p in parts)
 
@@ -95,19 +69,10 @@ class Noise:
 def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     """Estimate the noise of every channel from the records themselves.
 
-    Parameters
-    ----------
-    records
-        Those held out are not looked at, unless there are no others; the median over the records is taken.
-    targets
-        Signals that blocks predict, whose noise may have a colour: it is told where all motions are at rest,
-        and from what is left of a motion that repeats when it is subtracted from itself one period later.
-        What drives a block varies at rest for other reasons than noise.
-
-    Returns
-    -------
-    Noise
-        At least that of rounding, quantum/√12. Declared noise is not used: it is a claim.
+    ``records``: those held out are not looked at, unless there are no others; the median over the records is
+    taken. ``targets``: signals that blocks predict, whose noise may have a colour: it is told where all
+    motions are at rest, and from what is left of a motion that repeats when it is subtracted from itself one
+    period later. What drives a block varies at rest for other reasons than noise.
     """
     seen = records.of("fit", "selection") or records.records
     level, rounded, quanta = {}, {}, {}

@@ -41,15 +41,7 @@ class Stage(NamedTuple):
 
 
 def stages_of(derivative: Expression, state: Expression, moving: Expression) -> list[Stage]:
-    """Return the stages, earlier ones first.
-
-    Parameters
-    ----------
-    derivative, state
-        f and x, columns of n.
-    moving
-        Everything that changes from sample to sample besides the state.
-    """
+    """Return the stages, earlier ones first."""
     n = state.numel()
     coupled = np.array([[depends(derivative[i], state[j]) for j in range(n)] for i in range(n)])
     count, label = connected_components(coupled, directed=True, connection="strong")
@@ -76,17 +68,7 @@ def exact_step(matrix: Expression, length: Expression) -> Expression:
     taken, which stay bounded for any decay, and then it is doubled again. Relative error below 1e-12 for
     ‖A·h‖ ≤ 4, and decaying with the mode beyond.
 
-    Parameters
-    ----------
-    matrix
-        A, shape (n, n).
-    length
-        h in s.
-
-    Returns
-    -------
-    Expression
-        Shape (n, 3n).
+    ``matrix``: A, shape (n, n).
     """
     n = matrix.shape[0]
     one = ca.SX.eye(n)
@@ -112,19 +94,8 @@ def rosenbrock_step(
 ) -> Expression:
     """Return the state one step later.
 
-    Parameters
-    ----------
-    rate
-        f(x, v).
-    state
-        x at the start.
-    ends
-        v at both ends of the step.
-    w
-        Any approximation of ∂f/∂x for one step; ``None`` for several shorter steps, each with its own
-        derivative.
-    length
-        h in s.
+    ``w``: any approximation of ∂f/∂x for one step; ``None`` for several shorter steps, each with its own
+    derivative.
     """
     x, left, right, h = state, ends[0], ends[1], length
     if w is not None:
@@ -172,11 +143,6 @@ def implicit_steps(
 
     These end at the root where the right-hand side is piecewise linear, as contact is; there the first goes
     to the wrong side of a stop and the second comes back. Nothing rebounds. First order.
-
-    Parameters
-    ----------
-    rate, state, ends, length
-        As for :func:`rosenbrock_step`.
     """
     (left, right), h = ends, length / _SHORT_STEPS
     at, old, now = (ca.SX.sym(n, x.shape) for n, x in (("at", state), ("old", state), ("now", left)))
@@ -214,13 +180,7 @@ def _stages(
 
 
 def is_short(expression: Expression) -> bool:
-    """Tell whether an expression is cheap enough to be differentiated twice in every step.
-
-    Parameters
-    ----------
-    expression
-        Right-hand side of a stage.
-    """
+    """Tell whether an expression is cheap enough to be differentiated twice in every step."""
     return bool(
         ca.Function("f", [ca.vertcat(*ca.symvar(expression))], [expression]).n_instructions() < _SHORT
     )
@@ -229,17 +189,7 @@ def is_short(expression: Expression) -> bool:
 def placed(
     value: Expression, symbols: tuple[Expression, Expression], states: Sequence[int]
 ) -> Callable[[Expression, Expression], Expression]:
-    """Return an expression as a function of some states and of everything else, all states and samples.
-
-    Parameters
-    ----------
-    value
-        Over the symbols.
-    symbols
-        Of all states, and of the samples.
-    states
-        Indices of the states that come first.
-    """
+    """Return an expression as a function of some states and of everything else, all states and samples."""
     state, digested = symbols
 
     def at(x: Expression, v: Expression) -> Expression:

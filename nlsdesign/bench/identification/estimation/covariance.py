@@ -57,12 +57,7 @@ class Piece(NamedTuple):
 def robust_covariance(rows: Sequence[Piece], prior: Array) -> Array:
     """Return the covariance of fitted numbers.
 
-    Parameters
-    ----------
-    rows
-        All that were fitted, at the fitted numbers.
-    prior
-        Slopes of the residuals of the priors, shape (priors, parameters).
+    ``prior``: slopes of the residuals of the priors, shape (priors, parameters).
     """
     information = sum((r.slope.T @ r.slope for r in rows), start=prior.T @ prior)
     # In the axes and units in which the information is one.
@@ -78,13 +73,7 @@ def robust_covariance(rows: Sequence[Piece], prior: Array) -> Array:
 
 
 def independent_covariance(rows: Sequence[Piece], prior: Array) -> Array:
-    """Return the covariance if residuals are coloured noise that has nothing to do with the slopes.
-
-    Parameters
-    ----------
-    rows, prior
-        As for :func:`robust_covariance`.
-    """
+    """Return the covariance if residuals are coloured noise that has nothing to do with the slopes."""
     information = prior.T @ prior
     for block in dict.fromkeys(r.block for r in rows):
         own = [r for r in rows if r.block == block]
@@ -134,10 +123,7 @@ def _segments(rows: Sequence[Piece]) -> list[tuple[Array, Array]]:
 def inverse_information(information: Array) -> Array:
     """Return the covariance that information gives, if residuals are white noise of unit size.
 
-    Parameters
-    ----------
-    information
-        Shape (parameters, parameters).
+    ``information``: shape (parameters, parameters).
     """
     # What the records leave open altogether gets a large variance, not an infinite one.
     strength, axes = np.linalg.eigh(information)

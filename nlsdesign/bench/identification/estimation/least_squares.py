@@ -68,13 +68,7 @@ class Fit:
     white: Array | None = None
 
     def standard_error(self, name: str) -> float:
-        """Return the standard error of a parameter in SI.
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return the standard error of a parameter in SI."""
         i = [p.name for p in self.parameters].index(name)
         return float(np.sqrt(self.covariance[i, i])) * abs(self.parameters[i].slope(self.values[name]))
 
@@ -138,27 +132,10 @@ def fit(
 ) -> Fit:
     """Fit parameters to everything that the records say.
 
-    Parameters
-    ----------
-    evidence
-        Records seen by blocks.
-    parameters
-        What is free; each must be free in at least one block or have a prior.
-    evaluations
-        Bound on the number of evaluations.
-    tolerance
-        Ends too when the predicted gain is below this share of the cost: enough to tell a bad hypothesis.
-    least
-        Ends too when the predicted gain is below this.
-    known
-        Sum of squares by block and record that another model reaches. If this is given, then where a body
-        flies freely outlying residuals count as Huber says, and a record that is worse than what is known
-        counts ever less, see :func:`~.losses.bounded_total`. Without it every residual counts alike.
-
-    Raises
-    ------
-    ConvergenceError
-        If the fit ends without a finite cost.
+    ``parameters``: what is free; each must be free in at least one block or have a prior. ``known``: sum of
+    squares by block and record that another model reaches. If this is given, then where a body flies freely
+    outlying residuals count as Huber says, and a record that is worse than what is known counts ever less,
+    see :func:`~.losses.bounded_total`. Without it every residual counts alike.
     """
     rows = StackedRows(evidence, parameters, known)
     low, high, start = box(parameters)
@@ -195,13 +172,7 @@ def fit(
 
 
 def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
-    """Return the cost that the linearised problem would reach from a start, at the price of one evaluation.
-
-    Parameters
-    ----------
-    evidence, parameters
-        As for :func:`fit`.
-    """
+    """Return the cost that the linearised problem reaches from a start, at the price of one evaluation."""
     low, high, start = box(parameters)
     residual, slope = StackedRows(evidence, parameters)(start)
     size = np.linalg.norm(slope, axis=0)
@@ -212,13 +183,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
 
 
 class StackedRows:
-    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered.
-
-    Parameters
-    ----------
-    evidence, parameters, known
-        As for :func:`fit`.
-    """
+    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered."""
 
     def __init__(
         self,
@@ -233,13 +198,7 @@ class StackedRows:
         self._last: tuple[bytes, tuple[Array, Array]] | None = None
 
     def values(self, x: Array) -> dict[str, float]:
-        """Return the numbers in SI by name.
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return the numbers in SI by name."""
         # At a bound the last digit of a product may lie beyond it, and a part refuses such a value.
         return {
             p.name: min(max(p.outward(v), p.lower), p.upper) for p, v in zip(self.parameters, x, strict=True)
@@ -251,47 +210,21 @@ class StackedRows:
         return np.asarray(self._prior.T @ self._prior, dtype=np.float64)
 
     def prior_gradient(self, x: Array) -> Array:
-        """Return the gradient of half the sum of squares of the priors.
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return the gradient of half the sum of squares of the priors."""
         return np.asarray(self.prior_information @ (x - self._centre), dtype=np.float64)
 
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
-        """Return residuals of the priors, shape (parameters,), and slopes, shape (parameters, parameters).
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return residuals of the priors, shape (parameters,), and slopes, shape (parameters, parameters)."""
         return self._prior @ (x - self._centre), self._prior
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        """Return residuals and slopes of priors and evidence, one below the other.
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return residuals and slopes of priors and evidence, one below the other."""
         if self._last is None or self._last[0] != x.tobytes():
             self._last = x.tobytes(), self._evaluated(x)
         return self._last[1]
 
     def of(self, each: Evidence, x: Array) -> tuple[Array, Array]:
-        """Return residuals of one piece of evidence, shape (rows,), and slopes, shape (rows, parameters).
-
-        Parameters
-        ----------
-        each
-            A record seen by a block.
-        x
-            In the fitted scale.
-        """
+        """Return residuals of one piece of evidence, shape (rows,), and slopes, shape (rows, parameters)."""
         values = self.values(x)
         residual, slope = each.residual(values)
         wide = np.zeros((len(residual), len(x)))

@@ -61,27 +61,8 @@ def minimise(
 ) -> Minimum:
     """Return the minimum of half a sum of squares within bounds.
 
-    Parameters
-    ----------
-    rows
-        Residuals and their derivatives at a point.
-    start
-        Inside the bounds.
-    box
-        Lower and upper bounds.
-    evaluations
-        At most so many; a point where there is no response counts as a bad one.
-    share
-        Ends when the predicted gain is below this share of the cost, or below :data:`ENOUGH`.
-    least
-        Ends too when the predicted gain is below this.
-    logarithmic
-        Which coordinates are logarithms of positive numbers, in the shape of the start; by default none.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is no response at the start, or its slopes are not finite.
+    ``evaluations``: at most so many; a point where there is no response counts as a bad one. ``logarithmic``:
+    which coordinates are logarithms of positive numbers, in the shape of the start; by default none.
     """
     x, damping, used = start, _FIRST_DAMPING, 0
     residual, slope = rows(x)

@@ -131,13 +131,7 @@ def free_parameter(variable: Variable, *, reach: float = 10.0) -> Parameter:
 
 
 def box(parameters: Sequence[Parameter]) -> tuple[Array, Array, Array]:
-    """Return lower bounds, upper bounds and a start inside them, in the fitted scale.
-
-    Parameters
-    ----------
-    parameters
-        What is free.
-    """
+    """Return lower bounds, upper bounds and a start inside them, in the fitted scale."""
     low = np.array(
         [p.inward(p.lower) if p.scale == "linear" or p.lower > 0.0 else -np.inf for p in parameters]
     )

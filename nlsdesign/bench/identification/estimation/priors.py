@@ -17,12 +17,8 @@ _LEAST = 1e-12
 def prior_rows(parameters: Sequence[Parameter], known: Sequence[Fit] = ()) -> tuple[Array, Array]:
     """Return M and m, so that M·x − m are the residuals of everything known before, x in the fitted scale.
 
-    Parameters
-    ----------
-    parameters
-        In the order of x; those with a finite sigma give a row each.
-    known
-        Earlier fits; each gives as many rows as it has parameters among these, correlated as they were.
+    ``parameters``: in the order of x; those with a finite sigma give a row each. ``known``: earlier fits;
+    each gives as many rows as it has parameters among these, correlated as they were.
     """
     names = [p.name for p in parameters]
     rows = [np.diag([1.0 / p.sigma for p in parameters]).reshape(len(names), len(names))]

@@ -49,26 +49,7 @@ class Profile:
 def profile_of(
     fit: Fit, name: str, refit: Callable[[str, float], Fit], *, points: int = 9, reach: float = 3.0
 ) -> Profile:
-    """Hold a number at several values and fit the others again.
-
-    Parameters
-    ----------
-    fit
-        Ended.
-    name
-        Of the number.
-    refit
-        Fits everything but the named number, which it holds at the given value in SI.
-    points
-        How many values, odd.
-    reach
-        So many standard errors to either side.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is no such number in the fit, or there are less than five points.
-    """
+    """Hold a number at several values and fit the others again."""
     names = [p.name for p in fit.parameters]
     if name not in names or points < 5:
         raise ValueRangeError(f"profile of '{name}' with {points} points", "needs a fitted number and five")

@@ -50,21 +50,9 @@ def fit_by_cma(
 ) -> Evolved:
     """Fit parameters with the evolution strategy of Hansen and Ostermeier 2001.
 
-    Parameters
-    ----------
-    model, records, parameters, shots, weights
-        As for :func:`fit_by_simulation`; the windows must be apart, since nothing here joins them.
-    seed
-        Of the random numbers; the same seed gives the same result.
-    simulations
-        At most so many.
-
-    Raises
-    ------
-    MissingLibraryError
-        If ``cma`` is not installed.
-    ConvergenceError
-        If no set of numbers could be simulated.
+    ``model``, ``records``, ``parameters``, ``shots``, ``weights``: as for :func:`fit_by_simulation`; the
+    windows must be apart, since nothing here joins them. ``seed``: of the random numbers; the same seed gives
+    the same result.
     """
     try:
         cma = importlib.import_module("cma")

@@ -231,13 +231,5 @@ def _effective_size(rows: Sequence[Array]) -> float:
 
 
 def without(fit: SimulatedFit, name: str) -> tuple[Parameter, ...]:
-    """Return the parameters of a fit, at their fitted values, without one of them.
-
-    Parameters
-    ----------
-    fit
-        Ended.
-    name
-        Of the parameter left out.
-    """
+    """Return the parameters of a fit, at their fitted values, without one of them."""
     return tuple(replace(p, start=fit.fit.values[p.name]) for p in fit.fit.parameters if p.name != name)

@@ -114,34 +114,10 @@ class Linear(NamedTuple):
 class SimulationError:
     """Records against a model with some parameters free.
 
-    Parameters
-    ----------
-    model
-        Continuous, without tables.
-    records
-        To be fitted.
-    parameters
-        What is free; delays of ``wiring.late_by`` among them.
-    shots
-        Windows.
-    wiring
-        Of measured signals; by name where ``None``.
-    weights
-        What counts how much; see :class:`Weights`.
-    slopes
-        Whether derivatives are wanted.
-
     Attributes
     ----------
     priors
         How many of the residuals are those of priors; they come first.
-
-    Raises
-    ------
-    MeasurementError
-        If there is no record.
-    ValueRangeError
-        If a window is shorter than a sample, or the model has tables.
     """
 
     def __init__(
@@ -177,13 +153,7 @@ class SimulationError:
         self._unknown = model.start(model.states)
 
     def values(self, x: Array) -> dict[str, float]:
-        """Return the parameters in SI by name.
-
-        Parameters
-        ----------
-        x
-            In the fitted scale.
-        """
+        """Return the parameters in SI by name."""
         return {p.name: p.outward(v) for p, v in zip(self.parameters, x, strict=True)}
 
     def start(self) -> Point:
@@ -203,29 +173,13 @@ class SimulationError:
         return Point(self._first, tuple(starts))
 
     def room(self, point: Point) -> tuple[Array, Array]:
-        """Return how far a step may go in each direction.
-
-        Parameters
-        ----------
-        point
-            Present point.
-        """
+        """Return how far a step may go in each direction."""
         open_end = np.full(self._columns - len(point.x), np.inf)
         low = np.concatenate([self._low - point.x, -open_end])
         return np.minimum(low, 0.0), np.maximum(np.concatenate([self._high - point.x, open_end]), 0.0)
 
     def moved(self, point: Point, linear: Linear, step: Array, share: float) -> Point:
-        """Return the point after a share of a step.
-
-        Parameters
-        ----------
-        point, linear
-            Present point, and what it gave.
-        step
-            Of parameters and first states.
-        share
-            Between 0 and 1.
-        """
+        """Return the point after a share of a step."""
         x = np.clip(point.x + share * step[: len(point.x)], self._low, self._high)
         starts = [
             s + share * (c.slope @ step + c.gap) for s, c in zip(point.starts, linear.carries, strict=True)
@@ -238,13 +192,7 @@ class SimulationError:
         return len(self.parameters) + free
 
     def residual(self, point: Point) -> Array:
-        """Return the residuals alone; see :class:`Linear`.
-
-        Parameters
-        ----------
-        point
-            Where.
-        """
+        """Return the residuals alone; see :class:`Linear`."""
         values = self.values(point.x)
         rows = [self._prior(point.x)[0]]
         for each, start in zip(self.windows, point.starts, strict=True):
@@ -253,18 +201,7 @@ class SimulationError:
         return np.concatenate(rows)
 
     def rows(self, point: Point) -> Linear:
-        """Return residuals and derivatives.
-
-        Parameters
-        ----------
-        point
-            Where.
-
-        Raises
-        ------
-        ConvergenceError
-            If a simulation is not finite.
-        """
+        """Return residuals and derivatives."""
         values = self.values(point.x)
         prior, prior_slope = self._prior(point.x)
         residuals, closings = [prior], [np.zeros_like(prior)]

@@ -50,19 +50,7 @@ class Shot(NamedTuple):
 
 
 class Windows:
-    """The windows of one record, ready for evaluation.
-
-    Parameters
-    ----------
-    record
-        Uniform in time.
-    model
-        Continuous.
-    wiring
-        Of the record's signals.
-    count
-        Samples from the beginning of one window to that of the next.
-    """
+    """The windows of one record, ready for evaluation."""
 
     def __init__(self, record: Record, model: FlatModel, wiring: Wiring, count: int) -> None:
         self.record, self.count = record, min(count, len(record.trace) - 1)
@@ -86,15 +74,7 @@ class Windows:
 
     @classmethod
     def only(cls, whole: Windows, number: int) -> Windows:
-        """Return one window of a record alone.
-
-        Parameters
-        ----------
-        whole
-            All windows.
-        number
-            Which, counted from zero.
-        """
+        """Return one window of a record alone."""
         one = object.__new__(cls)
         first, behind = number * whole.count, (number + 1) * whole.count
         n = min(behind + 1, len(whole.record.trace))
@@ -108,10 +88,7 @@ class Windows:
     def measured_start(self, guess: Array) -> Array:
         """Return states at the windows' beginnings as far as they are measured, shape (windows, states).
 
-        Parameters
-        ----------
-        guess
-            The others, shape (windows, states).
+        ``guess``: the others, shape (windows, states).
         """
         start = guess.copy()
         for i, values in self.seen.items():
@@ -148,11 +125,6 @@ class Shooter:
         Integration steps from sample to sample.
     slopes
         Whether derivatives are wanted; without them their arrays have no columns.
-
-    Raises
-    ------
-    UnknownNameError
-        If a parameter has another name in the model.
     """
 
     def __init__(
@@ -186,19 +158,7 @@ class Shooter:
     def shoot(self, windows: Windows, start: Array, values: Mapping[str, float]) -> Shot:
         """Simulate all windows of a record.
 
-        Parameters
-        ----------
-        windows
-            Of the record.
-        start
-            State at the beginning of each window, shape (windows, states).
-        values
-            Free parameters by name, in SI.
-
-        Raises
-        ------
-        ConvergenceError
-            If a number is not finite: the step is too long or the start too far off.
+        ``start``: state at the beginning of each window, shape (windows, states).
         """
         nx, columns, w, m = self.size, self._columns, windows.number, windows.count
         p = ca.DM([values[n] for n in self.free])

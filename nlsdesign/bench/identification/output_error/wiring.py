@@ -36,22 +36,6 @@ def wired(model: FlatModel, measured: Sequence[str], late_by: Mapping[str, str] 
     """Wire measured signals to the inputs and signals of a model that have their names.
 
     An input that is the speed of a measured motion is driven by its smoothed rate.
-
-    Parameters
-    ----------
-    model
-        Continuous.
-    measured
-        Full names.
-    late_by
-        See :class:`Wiring`.
-
-    Raises
-    ------
-    UnknownNameError
-        If the model has no such input, state or signal.
-    MeasurementError
-        If nothing is left to compare.
     """
     names = {v.name for v in model.inputs}
     known = names | {v.name for v in model.states + model.signals}

@@ -13,20 +13,7 @@ from .measurement import Record
 
 
 def resampled(record: Record, rate: float) -> Record:
-    """Return a record resampled to another uniform clock by the rule of :mod:`.clocks`.
-
-    Parameters
-    ----------
-    record
-        Measured.
-    rate
-        In Hz.
-
-    Returns
-    -------
-    Record
-        Its ``source`` lists the changes, its ``resolution`` noise and count of the signals.
-    """
+    """Return a record resampled to another uniform clock by the rule of :mod:`.clocks`."""
     return _merged(record, [record], [0.0], (rate, ()))
 
 
@@ -35,21 +22,8 @@ def aligned(
 ) -> tuple[Record, Lag]:
     """Return a record in which the lag between two of its signals is removed.
 
-    Parameters
-    ----------
-    record
-        Measured. The result no longer contains the lag, for instance the delay of a sensor.
-    delayed, reference
-        Full names of two signals that show the same motion; the first is moved.
-    longest
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`.
-
-    Raises
-    ------
-    UnknownNameError
-        If the record has no such signal.
-    MeasurementError
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`.
+    ``record``: measured. The result no longer contains the lag, for instance the delay of a sensor.
+    ``delayed``, ``reference``: full names of two signals that show the same motion; the first is moved.
     """
     lag = lag_between(_channel(record, delayed), _channel(record, reference), longest=longest)
     parts = [_only(record, [s for s in record.trace.signals if s != delayed]), _only(record, [delayed])]
@@ -61,25 +35,8 @@ def joined(
 ) -> tuple[Record, Lag]:
     """Return two recordings of the same run as one record on one clock.
 
-    Parameters
-    ----------
-    record, other
-        From two recorders with different start times. The clock of the first is kept, and its version of a
-        signal that both have.
-    by
-        A signal of the first and one of the second that show the same motion.
-    rate
-        Of the common clock in Hz.
-    longest
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`.
-
-    Raises
-    ------
-    UnknownNameError
-        If a record has no such signal.
-    MeasurementError
-        As for :func:`~nlsdesign.bench.identification.records.lag.lag_between`, or if the second adds no
-        signal.
+    ``record``, ``other``: from two recorders with different start times. The clock of the first is kept, and
+    its version of a signal that both have.
     """
     lag = lag_between(_channel(other, by[1]), _channel(record, by[0]), longest=longest)
     new = [s for s in other.trace.signals if s not in record.trace.signals]

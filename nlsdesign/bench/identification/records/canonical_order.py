@@ -14,11 +14,6 @@ def in_canonical_order(records: RecordSet) -> RecordSet:
 
     Rounding of sums and choices among equals depend on the order of records. In canonical order results do
     not depend on the names of files.
-
-    Parameters
-    ----------
-    records
-        In any order.
     """
     ordered = tuple(sorted(records.records, key=_content))
     findings, remarks = (

@@ -77,19 +77,7 @@ class Checked:
 
 
 def check_channels(file: str, time: Array, columns: Sequence[Sampled], *, first_row: int = 2) -> Checked:
-    """Check the columns of one clock.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    time
-        In s, shape (n,).
-    columns
-        On this clock.
-    first_row
-        Row of the first number in messages.
-    """
+    """Check the columns of one clock."""
     witnesses = {c.head: Witness(c.values) for c in columns}
     values: dict[str, Array] = {}
     masked: dict[str, Mask] = {}

@@ -57,11 +57,6 @@ class Channel:
         In s, ascending, shape (n,).
     values
         Shape (n,).
-
-    Raises
-    ------
-    MeasurementError
-        If there are too few samples, the lengths differ, a number is not finite, or time does not ascend.
     """
 
     name: str
@@ -96,12 +91,8 @@ class Channel:
     def resolution(self, step: float | None = None, quantum: float = 0.0) -> Resolution:
         """Return noise and count, scaled to a clock.
 
-        Parameters
-        ----------
-        step
-            Of the new clock in s; the channel's own by default.
-        quantum
-            Declared size of one count; 0 to estimate it from the samples.
+        ``step``: of the new clock in s; the channel's own by default. ``quantum``: declared size of one
+        count; 0 to estimate it from the samples.
         """
         share = math.sqrt(self.step / step) if step else 1.0
         return Resolution(share * noise_of(self.values), share * (quantum or quantum_of(self.values)))
@@ -128,24 +119,7 @@ class Resampled(NamedTuple):
 def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
     """Put channels on one uniform clock.
 
-    Parameters
-    ----------
-    channels
-        Each with its own times; at least one.
-    rate
-        In Hz.
-
-    Returns
-    -------
-    Resampled
-        The clock runs from the latest first sample to the earliest last sample of the channels.
-
-    Raises
-    ------
-    ValueRangeError
-        If the rate is not positive.
-    MeasurementError
-        If the channels do not run at the same time, or one has a gap longer than the new step.
+    ``channels``: each with its own times; at least one.
     """
     if not (rate > 0.0 and math.isfinite(rate)):
         raise ValueRangeError(f"rate {rate:g} Hz", "must be positive", next_step="give for instance 500")
@@ -229,13 +203,6 @@ def resolutions(
 ) -> dict[str, Resolution]:
     """Return the resolution of channels on a new clock.
 
-    Parameters
-    ----------
-    channels
-        As sampled.
-    step
-        Of the new clock in s.
-    quanta
-        Declared sizes of a count; 0 where none is declared.
+    ``quanta``: declared sizes of a count; 0 where none is declared.
     """
     return {name: each.resolution(step, quanta.get(name, 0.0)) for name, each in channels.items()}

@@ -51,16 +51,6 @@ def read_csv(file: Path) -> CsvTable:
     Heads stand in the first row that is no comment (``#``, ``%``, ``//``), or in the last comment where
     numbers follow at once. Below them a row of units may stand. With semicolons or tabs between the cells,
     numbers may have decimal commas.
-
-    Parameters
-    ----------
-    file
-        In UTF-8, or UTF-16 with a byte order mark.
-
-    Raises
-    ------
-    MeasurementError
-        Naming file, row and column: for two equal heads, a short or long row, a cell that is no number.
     """
     layout = _Layout.of(file)
     try:

@@ -102,13 +102,6 @@ class Witness:
 
         Then its samples around the group are better described by two parabolas, one before and one behind,
         than by one polynomial of as many coefficients over both.
-
-        Parameters
-        ----------
-        first, behind
-            Of the group.
-        reach
-            Samples on either side that are looked at.
         """
         left = np.arange(max(first - reach, 0), first)
         right = np.arange(behind, min(behind + reach, len(self.values)))
@@ -151,15 +144,7 @@ class Surroundings:
 
 
 def faulty_groups(values: Array, around: Surroundings) -> list[Group]:
-    """Return the groups of samples that are faulty, in order.
-
-    Parameters
-    ----------
-    values
-        Finite, shape (n,).
-    around
-        What else is known.
-    """
+    """Return the groups of samples that are faulty, in order."""
     if len(values) < 2 * _SIDE or np.ptp(values) == 0.0:
         return []
     scatter = _Scatter(values)
@@ -179,13 +164,6 @@ def repaired(values: Array, groups: Sequence[Group]) -> tuple[Array, Mask]:
     A cubic through the good samples on both sides is put in; at an end of the record, and in a group longer
     than :data:`LONGEST`, a straight line between the nearest good samples. What is behind a jump is left as
     it is.
-
-    Parameters
-    ----------
-    values
-        Shape (n,).
-    groups
-        Faulty ones.
     """
     mask = np.zeros(len(values), dtype=bool)
     groups = [g for g in groups if g.kind != "jump"]
@@ -245,15 +223,7 @@ class _Scatter:
         self.edges = np.flatnonzero(size > _ABRUPT * self.tail * scale)
 
     def group(self, first: int, behind: int, *, both: bool = True) -> float:
-        """Return how far a group is off if the samples around it continue each other; 0 if not.
-
-        Parameters
-        ----------
-        first, behind
-            Of the group.
-        both
-            Whether it must be off at both of its ends, or at one.
-        """
+        """Return how far a group is off if the samples around it continue each other; 0 if not."""
         values = self.values
         left = np.arange(max(first - _SIDE, 0), first)
         right = np.arange(behind, min(behind + _SIDE, len(values)))

@@ -16,47 +16,20 @@ _TIME_NAMES = ("t", "time")
 
 
 def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
-    """Return heads that name a time, with their units.
-
-    Parameters
-    ----------
-    heads
-        Of a table.
-    """
+    """Return heads that name a time, with their units."""
     named = [(head, *name_and_unit(head)) for head in heads]
     return [(h, u) for h, n, u in named if u and same_dimension(u, "s") and n.lower() in _TIME_NAMES]
 
 
 def times_without_unit(heads: Sequence[str]) -> list[str]:
-    """Return heads that are called like a time and give no unit of time.
-
-    Parameters
-    ----------
-    heads
-        Of a table.
-    """
+    """Return heads that are called like a time and give no unit of time."""
     names = (*_TIME_NAMES, "timestamp", "seconds", "ms")
     timed = {head for head, _ in times_among(heads)}
     return [head for head in heads if head.lower().strip("[]() ") in names and head not in timed]
 
 
 def heads_with_units(file: str, heads: Sequence[str], units: Mapping[str, str]) -> list[str]:
-    """Return heads with the units that stand beside them in the file.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    heads
-        In the order of the file.
-    units
-        By head.
-
-    Raises
-    ------
-    MeasurementError
-        If a head names another unit.
-    """
+    """Return heads with the units that stand beside them in the file."""
     result = []
     for head in heads:
         name, own = name_and_unit(head)
@@ -76,21 +49,7 @@ def default_mapping(
 ) -> ColumnMap:
     """Return the mapping that follows from the heads of the columns.
 
-    Parameters
-    ----------
-    heads
-        ``name [unit]`` or ``name_unit``.
-    model
-        Its signals, and the readings of its sensors.
-    file
-        For messages.
-    given
-        Where it maps columns, it is returned as it stands; else all but the columns are kept.
-
-    Raises
-    ------
-    MeasurementError
-        If there is no time, or a column could be several signals or none.
+    ``given``: where it maps columns, it is returned as it stands; else all but the columns are kept.
     """
     if given is not None and given.columns:
         return given

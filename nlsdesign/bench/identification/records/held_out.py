@@ -29,10 +29,7 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
     those that are left, so that fits keep every kind of motion: the one nearer to the middle of the range of
     all, so that it is predicted by interpolation, and among equals the one of the smaller motion.
 
-    Parameters
-    ----------
-    traces
-        With the same signals; at least two.
+    ``traces``: with the same signals; at least two.
     """
     marks = _marks(traces)
     left = list(range(len(traces)))
@@ -48,13 +45,7 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
 
 
 def content_digest(trace: Trace) -> str:
-    """Return a digest of time and signals, whatever their order.
-
-    Parameters
-    ----------
-    trace
-        Of a record.
-    """
+    """Return a digest of time and signals, whatever their order."""
     digest = hashlib.sha256(trace.time.tobytes())
     for name in sorted(trace.signals):
         digest.update(trace.signals[name].tobytes())

@@ -53,23 +53,7 @@ class Run:
 
 
 def read_run(name: str, table: RecordTable, mapping: ColumnMap) -> Run:
-    """Check a table and put its columns on one uniform clock.
-
-    Parameters
-    ----------
-    name
-        Of the record.
-    table
-        As read from the file.
-    mapping
-        Meaning of the columns, and the new clock and alignments, if any.
-
-    Raises
-    ------
-    MeasurementError
-        If a column is missing, is not finite, or its clock runs backwards or has a gap; naming file, column
-        and rows.
-    """
+    """Check a table and put its columns on one uniform clock."""
     table, began = _from_zero(table, mapping)
     checked = _checked(table, mapping)
     clean = replace(table, given={**table.given, **checked.values})

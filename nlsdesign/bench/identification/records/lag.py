@@ -62,18 +62,8 @@ def lag_between(delayed: Channel, reference: Channel, *, longest: float | None =
     standard error is that of the least-squares shift, with the long-run variance of its score (Newey and
     West 1987) in place of that of white noise.
 
-    Parameters
-    ----------
-    delayed, reference
-        Both show the same motion; units and offsets may differ, the sign may not.
-    longest
-        Largest lag to either side in s; a quarter of the shorter record by default.
-
-    Raises
-    ------
-    MeasurementError
-        If a channel is constant, the correlation is below 0.7 everywhere, is largest at the end of the range,
-        or is as large at another lag.
+    ``delayed``, ``reference``: both show the same motion; units and offsets may differ, the sign may not.
+    ``longest``: largest lag to either side in s; a quarter of the shorter record by default.
     """
     step = max(delayed.step, reference.step)
     span = min(delayed.time[-1] - delayed.time[0], reference.time[-1] - reference.time[0])

@@ -83,13 +83,7 @@ class Inputs:
 
     @staticmethod
     def of(model: FlatModel) -> Inputs:
-        """Return what commands a model.
-
-        Parameters
-        ----------
-        model
-            Whose signals are measured.
-        """
+        """Return what commands a model."""
         commanded = frozenset(v.name for v in model.inputs) | {c for b in model.bodies for c in b.commands}
         return Inputs(commanded, frozenset(r.signal for r in model.readings if r.measured in commanded))
 
@@ -137,16 +131,8 @@ class ColumnMap:
 def read_mapping(path: Path) -> ColumnMap:
     """Read the mapping of columns to signals.
 
-    Parameters
-    ----------
-    path
-        TOML file. Where it has no table ``columns``, the heads of the records say what they are; where it has
-        no ``time`` either, also which column holds the time, and the name of that column is empty here.
-
-    Raises
-    ------
-    MeasurementError
-        If it is not valid or a column lacks signal or unit.
+    ``path``: TOML file. Where it has no table ``columns``, the heads of the records say what they are; where
+    it has no ``time`` either, also which column holds the time, and the name of that column is empty here.
     """
     try:
         tables = tomllib.loads(text_of(path, MeasurementError, next_step="name a records.toml"))
@@ -311,22 +297,7 @@ def _size(where: str, field: str, given: Any) -> float:
 
 
 def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> None:
-    """Check that every column measures a signal of the model in a unit of its dimension.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    columns
-        Mapped.
-    model
-        Whose signals are measured.
-
-    Raises
-    ------
-    MeasurementError
-        Naming the column, the signal and both units.
-    """
+    """Check that every column measures a signal of the model in a unit of its dimension."""
     everything = {v.name: v for v in model.states + model.inputs + model.signals}
     for column in columns:
         where = f"{file}: column '{column.name}'"

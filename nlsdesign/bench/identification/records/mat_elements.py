@@ -23,18 +23,7 @@ _DEEPEST = 64
 
 
 def check_mat(file: Path) -> None:
-    """Look at every element of a MAT file of version 5; those of version 4 hold no types to look up.
-
-    Parameters
-    ----------
-    file
-        Path.
-
-    Raises
-    ------
-    MeasurementError
-        Where an element is of no known type, is cut off, or is nested more than 64 deep.
-    """
+    """Look at every element of a MAT file of version 5; those of version 4 hold no types to look up."""
     with file.open("rb") as stream:
         head = stream.read(_HEADER)
         if len(head) < _HEADER or 0 in head[:4]:

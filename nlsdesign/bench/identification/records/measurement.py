@@ -350,17 +350,8 @@ def split(
 ) -> tuple[Record, ...]:
     """Return the records with their roles.
 
-    Parameters
-    ----------
-    records
-        In order of name.
-    held_out, selection
-        Globs on names; see :func:`load_records` for what happens without ``held_out``.
-
-    Raises
-    ------
-    MeasurementError
-        If a glob matches nothing, or no record is left for fitting.
+    ``held_out``, ``selection``: globs on names; see :func:`load_records` for what happens without
+    ``held_out``.
     """
     if not held_out and len(records) == 1:
         return _cut_after_two_thirds(records[0])
@@ -390,17 +381,7 @@ def split(
 def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
     """Return the part before a time, for fitting, and the part after it, held out.
 
-    Parameters
-    ----------
-    record
-        To be cut.
-    at
-        Time in s; the sample there belongs to the first part.
-
-    Raises
-    ------
-    MeasurementError
-        If one of the parts would hold less than two samples.
+    ``at``: time in s; the sample there belongs to the first part.
     """
     trace = record.trace
     cut = int(np.searchsorted(trace.time, at, side="right"))
@@ -416,15 +397,7 @@ def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
 
 
 def from_sample(record: Record, first: int) -> Record:
-    """Return a record from one sample on.
-
-    Parameters
-    ----------
-    record
-        To be shortened.
-    first
-        Index of the new first sample.
-    """
+    """Return a record from one sample on."""
     return _part(record, slice(first, None), record.role, f"from {record.trace.time[first]:g} s")
 
 

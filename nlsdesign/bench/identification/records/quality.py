@@ -22,15 +22,7 @@ _LARGEST = 1e100
 
 @dataclass(frozen=True)
 class Finding:
-    """What is odd about data that can be read.
-
-    Parameters
-    ----------
-    place
-        File, column and rows.
-    text
-        What it is.
-    """
+    """What is odd about data that can be read."""
 
     place: str
     text: str
@@ -40,22 +32,7 @@ class Finding:
 
 
 def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2) -> None:
-    """Check that every number is finite, and of a size that can be measured.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    columns
-        Numbers as they stand in the file, by head.
-    first_row
-        Row of the first number: 2 in a text editor, where the heads are row 1.
-
-    Raises
-    ------
-    MeasurementError
-        Naming the column and the first run of rows.
-    """
+    """Check that every number is finite, and of a size that can be measured."""
     for head, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
@@ -76,26 +53,8 @@ def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2
 def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged: float = 0.0) -> str:
     """Check that time ascends without gaps.
 
-    Parameters
-    ----------
-    file, head
-        For messages.
-    time
-        In s, shape (n,).
-    first_row
-        As above.
-    bridged
-        Step in s of a slower clock to which the channel will be resampled; shorter gaps are accepted.
-
-    Returns
-    -------
-    str
-        Empty if the grid is uniform; otherwise the change that makes it uniform.
-
-    Raises
-    ------
-    MeasurementError
-        If time stands still, runs backwards or has a gap.
+    ``bridged``: step in s of a slower clock to which the channel will be resampled; shorter gaps are
+    accepted. Result: empty if the grid is uniform; otherwise the change that makes it uniform.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0.0)
@@ -138,14 +97,6 @@ def _first_run(indices: Indices) -> Indices:
 
 
 def rows_in_words(indices: Indices, first_row: int) -> str:
-    """Return the rows of a run of samples, for messages.
-
-    Parameters
-    ----------
-    indices
-        Ascending, at least one.
-    first_row
-        Row of sample 0.
-    """
+    """Return the rows of a run of samples, for messages."""
     first, last = int(indices[0]) + first_row, int(indices[-1]) + first_row
     return f"row {first}" if first == last else f"rows {first} to {last}"

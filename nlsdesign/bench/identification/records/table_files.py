@@ -55,18 +55,7 @@ class RecordTable:
         return tuple(self.given)
 
     def columns(self, heads: Sequence[str]) -> dict[str, Array]:
-        """Return some columns of equal length.
-
-        Parameters
-        ----------
-        heads
-            Each must exist.
-
-        Raises
-        ------
-        MeasurementError
-            If they differ in length, or are too short.
-        """
+        """Return some columns of equal length."""
         columns = {head: self.given[head] for head in heads}
         lengths = {head: len(values) for head, values in columns.items()}
         if len(set(lengths.values())) > 1:
@@ -83,18 +72,7 @@ class RecordTable:
 
 
 def table_files(folder: Path) -> list[Path]:
-    """Return the files of a folder that may hold tables, in order of name; hidden ones are none of a bench.
-
-    Parameters
-    ----------
-    folder
-        Of records.
-
-    Raises
-    ------
-    MeasurementError
-        If there is none, or two files differ only in the ending.
-    """
+    """Return the files of a folder that may hold tables, in order of name, without hidden ones."""
     if not is_there(folder):
         # A folder without records is no advice, and neither is one whose name is hardly alike.
         near = difflib.get_close_matches(folder.name, _folders_of_records(folder.parent), n=1, cutoff=0.7)
@@ -130,13 +108,7 @@ def _folders_of_records(parent: Path) -> list[str]:
 
 
 def unread_tables(folder: Path) -> list[Path]:
-    """Return the files of a folder that probably hold tables in a form that is not read, in order of name.
-
-    Parameters
-    ----------
-    folder
-        Of records.
-    """
+    """Return the files of a folder that probably hold tables in a form that is not read, in order of name."""
     return sorted(f for f in folder.glob("[!.]*") if f.suffix.lower() in _NOT_READ)
 
 
@@ -146,19 +118,6 @@ def read_table(file: Path) -> RecordTable:
     A CSV file is read by :func:`~.csv_files.read_csv`. In a MAT file every numeric vector is a column,
     fields of a
     structure under ``structure.field``; in an HDF5 file every numeric vector under its path, ``group/name``.
-
-    Parameters
-    ----------
-    file
-        ``.csv``, ``.parquet``, ``.mat``, ``.h5`` or ``.hdf5``.
-
-    Raises
-    ------
-    MeasurementError
-        If the file cannot be read, two columns have one head, a row is too short or too long, a cell is not a
-        number, or an HDF5 file asks for numbers of another file, or for more than a record can hold.
-    MissingLibraryError
-        If the library that reads it is not installed.
     """
     reader = {".csv": _csv, ".parquet": _parquet, ".mat": _mat}.get(file.suffix.lower(), _hdf5)
     try:

@@ -10,42 +10,14 @@ from ....foundation.errors import MeasurementError
 
 
 def table_at(file: str, field: str, given: Any, next_step: str) -> Mapping[str, Any]:
-    """Return a field that must be a table.
-
-    Parameters
-    ----------
-    file, field
-        For messages.
-    given
-        As read.
-    next_step
-        What to write instead.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a table."""
     if not isinstance(given, dict):
         raise MeasurementError(f"{file}: {field}", f"{_shown(given)} is not a table", next_step=next_step)
     return given
 
 
 def text_at(where: str, field: str, given: Any) -> str:
-    """Return a field that must be a text.
-
-    Parameters
-    ----------
-    where, field
-        For messages.
-    given
-        As read.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a text."""
     if not isinstance(given, str):
         raise MeasurementError(
             f"{where}.{field}", f"{_shown(given)} is not a text", next_step=f'write {field} = "..."'
@@ -54,24 +26,7 @@ def text_at(where: str, field: str, given: Any) -> str:
 
 
 def number_at(where: str, field: str, given: Any, next_step: str, between: str = ": ") -> float:
-    """Return a field that must be a finite number.
-
-    Parameters
-    ----------
-    where, field
-        For messages.
-    given
-        As read.
-    next_step
-        What to write instead.
-    between
-        Stands between the two in messages.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a finite number."""
     if isinstance(given, int | float) and not isinstance(given, bool):
         try:
             number = float(given)
@@ -85,20 +40,7 @@ def number_at(where: str, field: str, given: Any, next_step: str, between: str =
 
 
 def globs_at(file: str, field: str, given: Any) -> tuple[str, ...]:
-    """Return a field that must be a list of names of records.
-
-    Parameters
-    ----------
-    file, field
-        For messages.
-    given
-        As read.
-
-    Raises
-    ------
-    MeasurementError
-        If it is none.
-    """
+    """Return a field that must be a list of names of records."""
     if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
         raise MeasurementError(
             f"{file}: {field}",

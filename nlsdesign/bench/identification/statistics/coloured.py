@@ -78,17 +78,7 @@ class Colour(NamedTuple):
 
 
 def variance_behind(parts: Sequence[NoisePart], weights: Array, step: float) -> float:
-    """Return the variance of first-order processes behind a filter.
-
-    Parameters
-    ----------
-    parts
-        Of the noise.
-    weights
-        Of the filter.
-    step
-        Time between samples in s.
-    """
+    """Return the variance of first-order processes behind a filter."""
     if not parts:
         return 0.0
     size = 1 << (2 * len(weights)).bit_length()
@@ -104,15 +94,6 @@ def independent_number(parts: Sequence[NoisePart], rows: int, spacing: float) ->
 
     For the variance of a mean square, n/(1 + 2Σ(1 − k/n)·ρₖ²) (Bartlett 1946), from what the noise is known
     to remember. The autocorrelation of a short sample shows too little of slow noise.
-
-    Parameters
-    ----------
-    parts
-        Of the noise, with shares of its whole variance in place of variances.
-    rows
-        Number of samples.
-    spacing
-        Time between them in s.
     """
     lags = np.arange(1, rows)
     rho = sum((p.variance * np.exp(-spacing * lags / p.time) for p in parts), np.zeros(len(lags)))
@@ -122,13 +103,8 @@ def independent_number(parts: Sequence[NoisePart], rows: int, spacing: float) ->
 def colour_of(stretches: Sequence[Stretch], duration: float = 0.0) -> Colour | None:
     """Return the spectrum of the noise in stretches of a signal; ``None`` if they are too short to show it.
 
-    Parameters
-    ----------
-    stretches
-        Of one signal.
-    duration
-        Of the longest record in s, down to one period in which noise that rises is taken to rise on; zero to
-        end where the stretches end.
+    ``duration``: of the longest record in s, down to one period in which noise that rises is taken to rise
+    on; zero to end where the stretches end.
     """
     bands = _bands([_periodogram(s) for s in stretches if len(s.samples) > 8 * _DEGREE])
     if len(bands) < _LEAST_BANDS:

@@ -36,16 +36,7 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
     few samples for that, and for the second derivative, central differences of eighth order are taken:
     whoever uses the latter filters it with all other terms.
 
-    Parameters
-    ----------
-    signal
-        Shape (n,).
-    step
-        Time between samples in s.
-    order
-        0, 1 or 2.
-    span
-        Time in s over which a rate is taken; zero for that between neighbours.
+    ``span``: time in s over which a rate is taken; zero for that between neighbours.
     """
     if order == 0:
         return signal
@@ -67,16 +58,7 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
 def smoothed(signal: Array, step: float, *, order: int, span: float) -> Array:
     """Return a signal or its derivative by quartics through all samples of a span (Savitzky and Golay 1964).
 
-    Parameters
-    ----------
-    signal
-        Shape (n,).
-    step
-        Time between samples in s.
-    order
-        0, 1 or 2.
-    span
-        Time in s; where it has too few samples nothing is smoothed.
+    ``span``: time in s; where it has too few samples nothing is smoothed.
     """
     points = 2 * round(0.5 * (span / step - 1.0)) + 1
     if not _LEAST_POINTS <= points <= len(signal):
@@ -89,12 +71,7 @@ def smoothed(signal: Array, step: float, *, order: int, span: float) -> Array:
 def difference(order: int, span: float = 0.0) -> Array:
     """Return the weights of a derivative per sample, to be convolved with a signal.
 
-    Parameters
-    ----------
-    order
-        0 to 3.
-    span
-        In samples; only rates are smoothed.
+    ``span``: in samples; only rates are smoothed.
     """
     points = 2 * round(0.5 * (span - 1.0)) + 1 if order == 1 else 0
     if order == 0:
@@ -114,14 +91,7 @@ def without_rounding(signal: Array, step: float, span: float) -> Array:
     place. The speed of a straight line between two samples is rounded to one quantum per step; a body that
     flies freely with that speed after a contact takes a wrong course.
 
-    Parameters
-    ----------
-    signal
-        Shape (n,); returned as it is where so much time has less than five samples.
-    step
-        Time between samples in s.
-    span
-        Time in s over which rates of the motion are taken.
+    ``signal``: shape (n,); returned as it is where so much time has less than five samples.
     """
     points = 2 * round(0.5 * (_ROUNDING_SHARE * span / step - 1.0)) + 1
     if not 5 <= points <= len(signal):
@@ -133,10 +103,7 @@ def without_rounding(signal: Array, step: float, span: float) -> Array:
 def kernel(width: float) -> Array:
     """Return a Gaussian of unit sum over whole samples.
 
-    Parameters
-    ----------
-    width
-        Standard deviation in samples; far below one sample nothing is filtered.
+    ``width``: standard deviation in samples; far below one sample nothing is filtered.
     """
     if width < _NARROW:
         return np.ones(1)
@@ -148,31 +115,13 @@ def kernel(width: float) -> Array:
 
 
 def filter_weights(width: float, order: int, step: float, span: float = 0.0) -> Array:
-    """Return the weights of derivative and filter together, to be convolved with a signal.
-
-    Parameters
-    ----------
-    width
-        Of the Gaussian, in s.
-    order
-        Of the derivative.
-    step
-        Time between samples in s.
-    span
-        Of rates, in s.
-    """
+    """Return the weights of derivative and filter together, to be convolved with a signal."""
     result: Array = np.convolve(kernel(width / step), difference(order, span / step)) / step**order
     return result
 
 
 def noise_gain(width: float, order: int, step: float, span: float = 0.0) -> float:
-    """Return the factor from the standard deviation of white noise to that behind derivative and filter.
-
-    Parameters
-    ----------
-    width, order, step, span
-        As for :func:`filter_weights`.
-    """
+    """Return the factor from the standard deviation of white noise to that behind derivative and filter."""
     return float(np.linalg.norm(filter_weights(width, order, step, span)))
 
 
@@ -222,13 +171,7 @@ class Smoothing:
         return picked
 
     def touched_by(self, mask: Mask) -> Mask:
-        """Tell for each row whether a sample of a mask is among those that it is made of.
-
-        Parameters
-        ----------
-        mask
-            Shape (n,).
-        """
+        """Tell for each row whether a sample of a mask is among those that it is made of."""
         reach, count = len(self.weights) // 2, np.concatenate([[0], np.cumsum(mask)])
         touched: Mask = count[self.places + reach + 1] > count[self.places - reach]
         return touched
@@ -239,47 +182,19 @@ class Smoothing:
 
 
 def smoothing(n: int, width: float, stride: int, *, margin: int = 0) -> Smoothing:
-    """Return the filter of n samples that keeps every ``stride``-th; near the ends nothing is kept.
-
-    Parameters
-    ----------
-    n
-        Number of samples.
-    width
-        Standard deviation of the Gaussian in samples.
-    stride
-        One of so many is kept.
-    margin
-        Samples at either end that are not used at all, as where derivatives are not known.
-    """
+    """Return the filter of n samples that keeps every ``stride``-th; near the ends nothing is kept."""
     weights = kernel(width)
     reach = len(weights) // 2 + margin
     return Smoothing(n, weights, stride, np.arange(reach, n - reach, stride))
 
 
 def every(n: int, stride: int) -> Smoothing:
-    """Return what keeps every ``stride``-th of n samples as it is.
-
-    Parameters
-    ----------
-    n, stride
-        Numbers of samples.
-    """
+    """Return what keeps every ``stride``-th of n samples as it is."""
     return Smoothing(n, np.ones(1), stride, np.arange(0, n, stride))
 
 
 def filtered(signal: Array, weights: Array, stride: int) -> Array:
-    """Return every ``stride``-th sample of a filtered signal, where the filter finds all samples it needs.
-
-    Parameters
-    ----------
-    signal
-        Shape (n,).
-    weights
-        To be convolved with it, of odd number.
-    stride
-        One of so many is kept.
-    """
+    """Return every ``stride``-th sample of a filtered signal, where the filter finds all samples it needs."""
     reach = len(weights) // 2
     places = np.arange(reach, len(signal) - reach, stride)
     return Smoothing(len(signal), weights, stride, places) @ signal

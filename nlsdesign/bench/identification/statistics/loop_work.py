@@ -54,14 +54,7 @@ class Loop(NamedTuple):
 def loop_of(extension: Array, force: Array, step: float, *, noise: float = 0.0) -> Loop | None:
     """Return the loop of a record, or ``None`` if its path does not come back.
 
-    Parameters
-    ----------
-    extension, force
-        Of a piece, force positive against positive extension; shape (n,).
-    step
-        Time between samples in s.
-    noise
-        Standard deviation of the force.
+    ``extension``, ``force``: of a piece, force positive against positive extension; shape (n,).
     """
     span = float(np.ptp(extension))
     back = np.flatnonzero(np.abs(extension - extension[0]) <= _BACK * span)

@@ -79,14 +79,7 @@ class Huber(Loss):
 def huber_rows(residual: Array, slope: Array, limit: float) -> tuple[Array, Array]:
     """Return residuals and slopes scaled so that half the sum of squares is Huber's loss.
 
-    Parameters
-    ----------
-    residual
-        In standard deviations, shape (n,).
-    slope
-        Its derivatives, shape (n, parameters).
-    limit
-        Beyond so many standard deviations the loss is a line.
+    ``slope``: its derivatives, shape (n, parameters).
     """
     size = np.abs(residual)
     far = size > limit
@@ -101,14 +94,7 @@ def bounded_total(residual: Array, slope: Array, bound: float) -> tuple[Array, A
     ρ(c) = c up to the bound, bound·(2 − bound/c) beyond: smooth, and rising ever more slowly. For a whole
     record that a model may predict not at all, which must not decide over those that it predicts.
 
-    Parameters
-    ----------
-    residual
-        Of one record in standard deviations, shape (n,).
-    slope
-        Its derivatives, shape (n, parameters).
-    bound
-        Sum of squares up to which everything counts, above zero.
+    ``slope``: its derivatives, shape (n, parameters).
     """
     total = float(residual @ residual)
     if total <= bound:

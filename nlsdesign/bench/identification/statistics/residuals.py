@@ -45,28 +45,14 @@ def _difference_level(signal: Array, order: int) -> float:
 
 
 def quantum_of(signal: Array) -> float:
-    """Return the size of one count: the smallest step between two values that occur.
-
-    Parameters
-    ----------
-    signal
-        Shape (n,).
-    """
+    """Return the size of one count: the smallest step between two values that occur."""
     steps = np.diff(np.unique(signal))
     steps = steps[steps > 1e-9 * max(1e-300, float(np.ptp(signal)))]
     return float(steps.min()) if len(steps) else 0.0
 
 
 def autocorrelation(residual: Array, lags: int) -> Array:
-    """Return the autocorrelation at lags 0 to ``lags``.
-
-    Parameters
-    ----------
-    residual
-        Shape (n,).
-    lags
-        Largest lag, below n.
-    """
+    """Return the autocorrelation at lags 0 to ``lags``."""
     centred = residual - residual.mean()
     size = 1 << int(np.ceil(np.log2(2 * len(centred))))
     power: Array = np.abs(np.fft.rfft(centred, size)) ** 2
@@ -80,11 +66,6 @@ def effective_size(residual: Array) -> float:
 
     n/(1 + 2Σρₖ²), the size for the variance of a mean square (Bartlett 1946), summed while ρ is above its
     own noise.
-
-    Parameters
-    ----------
-    residual
-        Shape (n,).
     """
     n = len(residual)
     rho = autocorrelation(residual, min(n - 1, max(10, n // 4)))[1:]
@@ -104,17 +85,7 @@ class Whiteness(NamedTuple):
 def whiteness(residual: Array, lags: int = 20) -> Whiteness:
     """Measure how far a residual is from white noise.
 
-    Parameters
-    ----------
-    residual
-        Shape (n,).
-    lags
-        Number of lags.
-
-    Returns
-    -------
-    Whiteness
-        A ratio near 1 is white; its standard deviation is √(2/lags).
+    Result: a ratio near 1 is white; its standard deviation is √(2/lags).
     """
     n = len(residual)
     rho = autocorrelation(residual, lags)[1:]
@@ -133,12 +104,7 @@ class Binned(NamedTuple):
 def binned(residual: Array, over: Array, bins: int = 30) -> Binned:
     """Return the mean residual over an angle, speed, force or time.
 
-    Parameters
-    ----------
-    residual, over
-        Shape (n,).
-    bins
-        Number of bins of equal width; empty ones are left out.
+    ``bins``: number of bins of equal width; empty ones are left out.
     """
     edges = np.linspace(float(over.min()), float(over.max()), bins + 1)
     place = np.clip(np.digitize(over, edges) - 1, 0, bins - 1)
@@ -151,17 +117,7 @@ def binned(residual: Array, over: Array, bins: int = 30) -> Binned:
 
 
 def spectrum(residual: Array, step: float, bins: int = 60) -> Binned:
-    """Return the power of a residual over frequency in Hz.
-
-    Parameters
-    ----------
-    residual
-        Shape (n,).
-    step
-        Time between samples in s.
-    bins
-        Number of bands.
-    """
+    """Return the power of a residual over frequency in Hz."""
     window = np.hanning(len(residual))
     power: Array = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2 / np.sum(window**2)
     return binned(power, np.asarray(np.fft.rfftfreq(len(residual), step), dtype=np.float64), bins)
@@ -172,18 +128,7 @@ def shapes(
 ) -> dict[str, Binned]:
     """Return the residual over every measured signal, over frequency, and over the signals by direction.
 
-    Parameters
-    ----------
-    residual
-        Shape (n,).
-    signals
-        Measured signals by name, shape (n,).
-    speed
-        Rate of the motion, whose sign is the direction; ``None`` if there is none.
-    time
-        Since the beginning of the record that a sample belongs to, in s, shape (n,).
-    step
-        Time between samples in s.
+    ``speed``: rate of the motion, whose sign is the direction; ``None`` if there is none.
     """
     result = {f"over {name}": binned(residual, values) for name, values in signals.items()}
     result["over frequency"] = spectrum(residual, step)

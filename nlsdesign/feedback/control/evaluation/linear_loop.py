@@ -107,20 +107,7 @@ class LinearLoop:
         return result
 
     def response(self, output: str, given: str, frequencies: Sequence[float] | Array) -> Complex:
-        """Return the ratio of an output to an input, shape (n, frequencies).
-
-        Parameters
-        ----------
-        output, given
-            Full names.
-        frequencies
-            In Hz, between zero and half the sampling frequency.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such output or input.
-        """
+        """Return the ratio of an output to an input, shape (n, frequencies)."""
         if output not in self.outputs:
             raise unknown_name("output of the linear loop", output, self.outputs)
         if given not in self.inputs:
@@ -160,29 +147,10 @@ def linear_loop(
 ) -> LinearLoop:
     """Linearise a closed loop at rest at many angles of its spring.
 
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    angles
-        Of the driven body with the load at zero, shape (n,), in rad.
-    opened
-        Inputs by full name at which the loop is cut open: the current of the plant, or an input of observer
-        or controller. What would drive them is an output. The desired torque and the prescribed
-        motions of the plant are inputs always.
-    mode
-        Of the plant's dry friction; sliding by default.
-    tables
-        How looked-up tables take part; with their slopes by default.
-
-    Raises
-    ------
-    UnknownNameError
-        If an opened input does not exist.
-    ConvergenceError
-        If the plant, the observer or the controller does not come to rest.
-    ValueRangeError
-        If there are no angles.
+    ``opened``: inputs by full name at which the loop is cut open: the current of the plant, or an input of
+    observer or controller. What would drive them is an output. The desired torque and the prescribed motions
+    of the plant are inputs always. ``mode``: of the plant's dry friction; sliding by default. ``tables``: how
+    looked-up tables take part; with their slopes by default.
     """
     at = np.atleast_1d(np.asarray(angles, dtype=float))
     if not len(at):
@@ -199,17 +167,7 @@ def linear_loop(
 
 
 def plant_of(system: SampledSystem, angles: Array, mode: LinearMode) -> LinearPlant:
-    """Return the plant of a system, linearised with all signals that are wired.
-
-    Parameters
-    ----------
-    system
-        Gives plant and wiring.
-    angles
-        Of the driven body, shape (n,), in rad.
-    mode
-        Of dry friction.
-    """
+    """Return the plant of a system, linearised with all signals that are wired."""
     start = f"{PLANT}."
     wired = [s.removeprefix(start) for s in system.sources.values() if s.startswith(start)]
     spring = series_spring(system.plant)
@@ -227,23 +185,7 @@ def assembled(
     tables: TableSlope,
     mode: LinearMode,
 ) -> LinearLoop:
-    """Return the whole loop of a linearised plant and the blocks of a system, at rest.
-
-    Parameters
-    ----------
-    system
-        Gives blocks and wiring.
-    plant
-        At n points.
-    angles
-        Of those points, shape (n,).
-    cut
-        Inputs at which the loop is open.
-    tables
-        How looked-up tables take part.
-    mode
-        In which the plant was linearised.
-    """
+    """Return the whole loop of a linearised plant and the blocks of a system, at rest."""
     writer = _Assembler(system, plant, cut, tables)
     writer.rest()
     return writer.loop(angles, mode)

@@ -191,17 +191,6 @@ class LinearPlant:
         """Return exact matrices over one sample.
 
         The first input is held, all others run linearly from sample to sample.
-
-        Parameters
-        ----------
-        step
-            Sample time in s.
-
-        Returns
-        -------
-        tuple of numpy.ndarray
-            Φ, and the effects of the held input, of the others' values at the beginning of the sample and of
-            those at its end.
         """
         n, states, inputs = self.b.shape
         others = inputs - 1
@@ -222,25 +211,7 @@ def linear_plant(
 ) -> LinearPlant:
     """Linearise a plant at rest at many angles of its driven body.
 
-    Parameters
-    ----------
-    plant
-        Continuous; prescribed motions stay at their start values.
-    angles
-        Shape (n,), in rad.
-    driven
-        Name of the input that the controller gives.
-    signals
-        Names of the variables that are wired or wanted.
-    mode
-        Of dry friction.
-
-    Raises
-    ------
-    ConvergenceError
-        If a state does not come to rest.
-    ValueRangeError
-        If a slope is not finite.
+    ``plant``: continuous; prescribed motions stay at their start values.
     """
     motion = measured_motion(plant)
     names = [v.name for v in plant.states]
@@ -340,10 +311,7 @@ class LinearBlock:
     def at(self, state: Array, inputs: Array) -> BlockPoint:
         """Return values and slopes.
 
-        Parameters
-        ----------
-        state, inputs
-            Shapes (n, states) and (n, inputs).
+        ``state``, ``inputs``: shapes (n, states) and (n, inputs).
         """
         model, n = self.model, len(state)
         names, given = [v.name for v in model.states], [v.name for v in model.inputs]

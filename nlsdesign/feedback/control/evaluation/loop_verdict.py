@@ -259,12 +259,7 @@ class LoopJudge:
 def without_harmonics(values: Array, cycles: int) -> Array:
     """Return what is left of a stretch without its mean and the harmonics of its drive.
 
-    Parameters
-    ----------
-    values
-        Shape (n,).
-    cycles
-        Whole cycles of the drive in it; zero takes off the mean and a straight drift only.
+    ``cycles``: whole cycles of the drive in it; zero takes off the mean and a straight drift only.
     """
     if cycles == 0:
         time = np.linspace(-1.0, 1.0, len(values))
@@ -285,13 +280,6 @@ def locked(values: Array, cycles: int) -> tuple[float, int]:
 
     What limits and laws make of a sine falls from odd harmonic to odd harmonic. An oscillation of the loop
     that has fallen into step with a fast drive stands out of that fall.
-
-    Parameters
-    ----------
-    values
-        Shape (n,).
-    cycles
-        Whole cycles of the drive in it.
     """
     size = 2.0 * np.abs(np.fft.rfft(values)[cycles::cycles]) / len(values)
     odd = size[0 : 2 * HARMONICS : 2]
@@ -354,15 +342,6 @@ def sustained(rest: Array, threshold: float, sample_time: float) -> tuple[float,
 
     Between swings the sign changes beyond the threshold on both sides; at least three whole swings have to
     follow each other at an even pace without dying away: a ringing after each passage of a dead zone is none.
-
-    Parameters
-    ----------
-    rest
-        Shape (n,).
-    threshold
-        Of its size.
-    sample_time
-        In s.
     """
     beyond = np.flatnonzero(np.abs(rest) > threshold)
     if len(beyond) < _SWINGS:
@@ -418,12 +397,7 @@ def _carries(stretch: Array, frequency: float) -> bool:
 def tangent_stiffness(plant: FlatModel, angles: Array) -> Array:
     """Return the slope of the spring's torque when the angle jumps from rest, in N·m/rad, shape (n,).
 
-    Parameters
-    ----------
-    plant
-        With a driven body and a series spring; prescribed motions stay at their start values.
-    angles
-        Of the driven body, shape (n,), in rad.
+    ``plant``: with a driven body and a series spring; prescribed motions stay at their start values.
     """
     motion = measured_motion(plant)
     names = [v.name for v in plant.states]

@@ -233,24 +233,7 @@ class LimitCycleOnset:
 
 
 def checked_gains(loop: ClosedLoop, gain: str, between: tuple[float, float]) -> tuple[float, float]:
-    """Return the range of a gain after a look at its name and ends.
-
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    gain
-        Name of a parameter of the controller.
-    between
-        Smallest and largest gain.
-
-    Raises
-    ------
-    UnknownNameError
-        If the controller has no such parameter.
-    ValueRangeError
-        If the range is empty.
-    """
+    """Return the range of a gain after a look at its name and ends."""
     names = [v.name for v in loop.controller.parameters]
     if gain not in names:
         raise unknown_name("parameter of the controller", gain, names)
@@ -344,18 +327,7 @@ def linear_onset(
     Infinite and not a number where it is stable up to the end of the range; zero where it is unstable already
     at its beginning.
 
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    gain
-        Name of a parameter of the controller.
-    between
-        Smallest and largest gain that are looked at.
-    largest
-        Angle of the spring in rad up to which it is looked at, of either sign.
-    mode
-        Of the plant's dry friction; sliding by default.
+    ``mode``: of the plant's dry friction; sliding by default.
     """
     angles = np.linspace(-largest, largest, 21)
 

@@ -68,18 +68,7 @@ class PeriodicDrive:
     cycles: int | None = None
 
     def windows(self, sample_time: float) -> tuple[Indices, Indices, Array]:
-        """Return samples and cycles of the window of each run, and the frequencies that fit them.
-
-        Parameters
-        ----------
-        sample_time
-            In s.
-
-        Raises
-        ------
-        ValueRangeError
-            If a frequency is not between zero and half the sampling frequency.
-        """
+        """Return samples and cycles of the window of each run, and the frequencies that fit them."""
         for f in self.frequencies:
             if not 0.0 <= f < 0.5 / sample_time:
                 raise ValueRangeError(
@@ -118,58 +107,23 @@ class PeriodicRun:
     verdict: LoopVerdict
 
     def __getitem__(self, name: str) -> Array:
-        """Return one signal, shape (n,).
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return one signal, shape (n,)."""
         return self.signals[name]
 
     def fundamental(self, name: str) -> complex:
-        """Return c of the fundamental Re(c·e^(jωt)) of a signal.
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return c of the fundamental Re(c·e^(jωt)) of a signal."""
         turn = np.exp(-2j * math.pi * self.frequency * self.time)
         return complex(2.0 * np.mean(self.signals[name] * turn))
 
     def rms(self, name: str) -> float:
-        """Return the root mean square of a signal.
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return the root mean square of a signal."""
         return float(np.sqrt(np.mean(np.square(self.signals[name]))))
 
 
 def run_periodic(
     loop: ClosedLoop, drive: PeriodicDrive, *, keep: Sequence[str] = (), translate: Translate = as_it_is
 ) -> list[PeriodicRun]:
-    """Run a loop on periodic drives until it repeats itself, or diverges, or time is up.
-
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    drive
-        Which runs.
-    keep
-        Further signals to keep, by full name.
-    translate
-        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
-
-    Raises
-    ------
-    ValueRangeError
-        If a frequency is not between zero and half the sampling frequency.
-    """
+    """Run a loop on periodic drives until it repeats itself, or diverges, or time is up."""
     samples, cycles, used = drive.windows(loop.sample_time)
     order, runs = np.argsort(samples), {}
     setup = _Setup(loop, drive, keep)
@@ -489,23 +443,7 @@ def sine_drive(
     cycles: int | None = None,
     parameters: Mapping[str, Array | float] | None = None,
 ) -> PeriodicDrive:
-    """Return sines of the desired torque as drives of many runs.
-
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    amplitude
-        In N·m, one number or shape (runs,).
-    frequencies
-        In Hz, shape (runs,).
-    offset
-        In N·m.
-    cycles
-        In a window.
-    parameters
-        Of the loop by full name, numbers or shape (runs,).
-    """
+    """Return sines of the desired torque as drives of many runs."""
     plain = PeriodicDrive(
         frequencies=frequencies, drives=lambda _, __: {}, parameters=parameters or {}, cycles=cycles
     )
@@ -524,15 +462,6 @@ def held_drive(
     """Return torques that are approached smoothly and then held, as drives of many runs.
 
     The last twentieth comes as a step: a loop that only dry friction keeps quiet is woken by it.
-
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    torques
-        In N·m, shape (runs,).
-    parameters
-        Of the loop by full name, numbers or shape (runs,).
     """
 
     def drives(time: Array, runs: Indices) -> dict[str, Array | float]:
@@ -704,21 +633,8 @@ def step_response(
 ) -> StepResponse:
     """Return the answer to a step of the desired torque.
 
-    Parameters
-    ----------
-    loop
-        Load fixed, or held by its inputs at zero.
-    end, begin
-        Desired torque after and before the step, in N·m; the loop has half a second to come to rest before.
-    stop
-        Time after the step in s.
-    translate
-        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is no step, it is beyond the current limit, or the run is shorter than 0.1 s.
+    ``end``, ``begin``: desired torque after and before the step, in N·m; the loop has half a second to come
+    to rest before.
     """
     if begin == end or not stop >= 0.1:
         raise ValueRangeError(f"step from {begin:g} to {end:g} N·m in {stop:g} s", "needs a step and 0.1 s")

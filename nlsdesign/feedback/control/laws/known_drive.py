@@ -33,11 +33,6 @@ class KnownDrive:
     ----------
     plant
         Continuous; its motor is driven by a current.
-
-    Raises
-    ------
-    ArrangementError
-        If the plant has no motor that is driven by a current, or its motor does not turn the series spring.
     """
 
     plant: FlatModel
@@ -96,21 +91,12 @@ class KnownDrive:
     def inertia(self, writer: LawWriter) -> Expression:
         """Return J in kg·m²: of all that turns with the motor, seen from it.
 
-        Parameters
-        ----------
-        writer
-            Of the controller; it is given the parameters of the plant that enter.
+        ``writer``: of the controller; it is given the parameters of the plant that enter.
         """
         return self.written(writer, self.named[0][self.body.inertia or ""])
 
     def torque_per_current(self, writer: LawWriter) -> Expression:
-        """Return k in N·m/A, at the shaft whose angle is measured.
-
-        Parameters
-        ----------
-        writer
-            Of the controller.
-        """
+        """Return k in N·m/A, at the shaft whose angle is measured."""
         motor = self.motor
         constant = writer.number(self.plant.variable(motor.torque_constant))
         if motor.gear_ratio is None:
@@ -118,26 +104,14 @@ class KnownDrive:
         return writer.number(self.plant.variable(motor.gear_ratio)) * constant
 
     def spring_turns(self, writer: LawWriter) -> Expression:
-        """Return r, 1.
-
-        Parameters
-        ----------
-        writer
-            Of the controller.
-        """
+        """Return r, 1."""
         known, _ = self.named
         return self.written(
             writer, ca.jacobian(known[series_spring(self.plant).motion], known[self.body.motion])
         )
 
     def current_limit(self, writer: LawWriter) -> Expression:
-        """Return the largest current in A.
-
-        Parameters
-        ----------
-        writer
-            Of the controller.
-        """
+        """Return the largest current in A."""
         return writer.number(self.plant.variable(self.motor.current_limit))
 
     @cached_property
@@ -149,12 +123,7 @@ class KnownDrive:
     def written(self, writer: LawWriter, expression: Expression) -> Expression:
         """Return an expression in the plant's parameters with those of the controller.
 
-        Parameters
-        ----------
-        writer
-            Of the controller; it is given the parameters that enter.
-        expression
-            In the symbols of :attr:`named`.
+        ``writer``: of the controller; it is given the parameters that enter.
         """
         _, s = self.named
         used = [
@@ -169,26 +138,12 @@ class KnownDrive:
 
 
 def all_but(column: Expression, one: Expression) -> Expression:
-    """Return the items of a column without one of them.
-
-    Parameters
-    ----------
-    column
-        Of symbols.
-    one
-        The one to leave out.
-    """
+    """Return the items of a column without one of them."""
     return ca.vertcat(*(each for each in ca.vertsplit(column) if not ca.is_equal(each, one)))
 
 
 def voltage_is_limited(drive: KnownDrive) -> bool:
-    """Tell whether the plant's motor declares a resistance and a largest voltage.
-
-    Parameters
-    ----------
-    drive
-        What is known of the plant.
-    """
+    """Tell whether the plant's motor declares a resistance and a largest voltage."""
     declared = {v.name for v in drive.plant.parameters}
     return {f"{drive.body.name}.resistance", f"{drive.body.name}.voltage_limit"} <= declared
 
@@ -200,14 +155,7 @@ def currents_of_supply(
 
     ``None`` where the motor declares no resistance: then no voltage is limited.
 
-    Parameters
-    ----------
-    drive
-        What is known of the plant.
-    writer
-        Of the controller; it is given the parameters that enter.
-    speed
-        Of the motor in rad/s.
+    ``writer``: of the controller; it is given the parameters that enter.
     """
     if not voltage_is_limited(drive):
         return None
@@ -229,14 +177,7 @@ def declared_friction(
     it. Its change of sign is spread over ±width: f(s)·(1 + ω/s)/2 + f(−s)·(1 − ω/s)/2 with
     s = √(ω² + width²), because a command that passes zero would otherwise make the current jump.
 
-    Parameters
-    ----------
-    drive
-        What is known of the plant.
-    writer
-        Of the controller; it is given the parameters of the plant that enter.
-    width
-        In rad/s.
+    ``writer``: of the controller; it is given the parameters of the plant that enter.
     """
     torque = _speed_torques(drive, writer)
 
@@ -304,16 +245,7 @@ def torque_limit(plant: FlatModel) -> TorqueLimit:
     r·|T| = k·I_max − friction, or the torque of the spring at rest at the end of the contour of its cam,
     whichever is less. A one-sided spring has one direction only, and that one counts.
 
-    Parameters
-    ----------
-    plant
-        Continuous, load fixed or prescribed; friction in its smooth form.
-
-    Raises
-    ------
-    ArrangementError
-        If a load moves freely: nothing holds the far end of the spring. Or if the plant has no motor that is
-        driven by a current and turns a series spring, or sharp dry friction.
+    ``plant``: continuous, load fixed or prescribed; friction in its smooth form.
     """
     drive = KnownDrive(plant)
     loose = [b.name for b in plant.bodies if not b.prescribed and b.name != drive.body.name]

@@ -53,18 +53,7 @@ class LoopNames:
 
 
 def loop_names(plant: FlatModel) -> LoopNames:
-    """Return the names of a plant by which its torque loop is wired, decided from its structure.
-
-    Parameters
-    ----------
-    plant
-        With one series spring and one motor that is driven by a current.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not decide, or the motor is not driven by a current.
-    """
+    """Return the names of a plant by which its torque loop is wired, decided from its structure."""
     body, motor = motor_of(plant)
     if motor.command is None or plant.variable(motor.command).unit != "A":
         raise ArrangementError(
@@ -104,43 +93,16 @@ class LawWriter:
         self._tables: list[tuple[Table, tuple[Expression, ...]]] = []
 
     def input(self, name: str, unit: str, description: str) -> Expression:
-        """Return an input; the same for the same name.
-
-        Parameters
-        ----------
-        name, unit, description
-            Of the input.
-        """
+        """Return an input; the same for the same name."""
         return self._inputs.setdefault(name, (Variable(name, unit, description), ca.SX.sym(name)))[1]
 
     def setting(self, name: str, unit: str, description: str, value: float) -> Expression:
-        """Return a setting of the controller, which is not negative, as the parameter ``controller.NAME``.
-
-        Parameters
-        ----------
-        name
-            Own name.
-        unit, description
-            Of the parameter.
-        value
-            In that unit.
-        """
+        """Return a setting of the controller, which is not negative, as the parameter ``controller.NAME``."""
         full = f"{GAIN}.{name}"
         return self.number(Variable(full, unit, description, value, value or 1.0, 0.0))
 
     def number(self, variable: Variable) -> Expression:
-        """Return a parameter that is declared elsewhere, such as a number of the plant.
-
-        Parameters
-        ----------
-        variable
-            With its value as start.
-
-        Raises
-        ------
-        ArrangementError
-            If another parameter has that name, as where a part of the plant is called ``controller``.
-        """
+        """Return a parameter that is declared elsewhere, such as a number of the plant."""
         known, symbol = self._parameters.setdefault(variable.name, (variable, ca.SX.sym(variable.name)))
         if known != variable:
             raise ArrangementError(
@@ -150,18 +112,7 @@ class LawWriter:
         return symbol
 
     def state(self, name: str, unit: str, description: str) -> Expression:
-        """Return a state that starts at zero.
-
-        Parameters
-        ----------
-        name, unit, description
-            Of the state.
-
-        Raises
-        ------
-        ArrangementError
-            If two parts have a state of the same name.
-        """
+        """Return a state that starts at zero."""
         if name in self._states:
             raise ArrangementError(f"state '{name}' of a controller", "is declared by two of its parts")
         self._states[name] = (Variable(name, unit, description), ca.SX.sym(name))
@@ -170,79 +121,34 @@ class LawWriter:
     def begin(self, name: str, value: Expression, *, resumes: bool = False) -> None:
         """Say what a state is before the first sample, where that is not zero.
 
-        Parameters
-        ----------
-        name
-            Of the state.
-        value
-            In terms of inputs, parameters and what other states begin with.
-        resumes
-            Whether it is that after a gap in the readings too; other states go on as they were.
+        ``resumes``: whether it is that after a gap in the readings too; other states go on as they were.
         """
         self._beginning[name] = value
         if resumes:
             self._resuming[name] = value
 
     def follow(self, name: str, value: Expression) -> None:
-        """Say what a state is one sample later.
-
-        Parameters
-        ----------
-        name
-            Of the state.
-        value
-            Its next value.
-        """
+        """Say what a state is one sample later."""
         self._following[name] = value
 
     def signal(self, name: str, unit: str, description: str, value: Expression) -> Expression:
-        """Give a name to an expression, and return it.
-
-        Parameters
-        ----------
-        name, unit, description
-            Of the signal.
-        value
-            What it is.
-        """
+        """Give a name to an expression, and return it."""
         self._signals[name] = (Variable(name, unit, description), value)
         return value
 
     def look_up(self, table: Table) -> tuple[Expression, ...]:
-        """Return the columns of a table over one of the inputs or states.
-
-        Parameters
-        ----------
-        table
-            Its argument has to be declared.
-        """
+        """Return the columns of a table over one of the inputs or states."""
         columns = tuple(ca.SX.sym(v.name) for v in table.columns)
         self._tables.append((table, columns))
         return columns
 
     def low_pass(self, old: Expression, new: Expression, bandwidth: Expression) -> Expression:
-        """Return a low-pass of first order one sample on, exact for an input that is held.
-
-        Parameters
-        ----------
-        old, new
-            Value before, and what comes in.
-        bandwidth
-            Cut-off frequency in Hz.
-        """
+        """Return a low-pass of first order one sample on, exact for an input that is held."""
         keep = ca.exp(-2.0 * math.pi * bandwidth * self.sample_time)
         return keep * old + (1 - keep) * new
 
     def model(self, name: str, description: str, output: tuple[Variable, Expression]) -> FlatModel:
-        """Return the controller.
-
-        Parameters
-        ----------
-        name, description
-            Of the model.
-        output
-            Its one output.
-        """
+        """Return the controller."""
         x, u, p = (
             ca.vertcat(*(symbol for _, symbol in group.values()))
             for group in (self._states, self._inputs, self._parameters)
@@ -283,13 +189,7 @@ class LawWriter:
 
 
 def limited(value: Expression, limit: Expression) -> Expression:
-    """Return a value within ±limit.
-
-    Parameters
-    ----------
-    value, limit
-        Of the same unit.
-    """
+    """Return a value within ±limit."""
     return ca.fmin(ca.fmax(value, -limit), limit)
 
 

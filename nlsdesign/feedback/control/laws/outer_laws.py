@@ -195,16 +195,7 @@ class PidTorque(TorqueLaw):
 def held_speed(writer: LawWriter, asked: Expression, limit: float, acceleration: float | None) -> Expression:
     """Return a speed command within its limit, and within that of its change where there is one.
 
-    Parameters
-    ----------
-    writer
-        Of the controller.
-    asked
-        In rad/s.
-    limit
-        In rad/s.
-    acceleration
-        In rad/s²; ``None`` for none.
+    ``acceleration``: in rad/s²; ``None`` for none.
     """
     most = writer.setting("speed_limit", "rad/s", "torque loop: largest speed command", limit)
     speed = limited(asked, most)
@@ -223,15 +214,7 @@ def held_speed(writer: LawWriter, asked: Expression, limit: float, acceleration:
 def check_settings(part: object) -> None:
     """Check that the numbers of a part of a controller are finite and not negative.
 
-    Parameters
-    ----------
-    part
-        A dataclass; what is no number passes.
-
-    Raises
-    ------
-    ValueRangeError
-        If one is not.
+    ``part``: a dataclass; what is no number passes.
     """
     for name, value in vars(part).items():
         if isinstance(value, int | float) and not (math.isfinite(value) and value >= 0.0):
@@ -451,18 +434,6 @@ def stiffness_table(drive: KnownDrive) -> Table:
     Over the contour of the cam, or ±90° where there is none; held at the ends, as the lever arm is. All inner
     states of the spring are relaxed. The argument is the angle of the motor where that alone tells the angle
     of the spring, else the angle of the spring, which is then an input of its own.
-
-    Parameters
-    ----------
-    drive
-        Its plant is swept, with what is prescribed held at its start.
-
-    Raises
-    ------
-    ArrangementError
-        If a load moves freely: then the spring has no torque at rest.
-    ConvergenceError
-        If the plant does not come to rest.
     """
     plant, body = drive.plant, drive.body
     _check_held(plant, body.name)

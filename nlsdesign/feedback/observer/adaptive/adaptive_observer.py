@@ -59,15 +59,7 @@ LOW_PASS = "followed"
 
 
 def filter_model(filter_: FilterEquations, directions: UncertainDirections) -> FlatModel:
-    """Return the observer as a discrete flat model.
-
-    Parameters
-    ----------
-    filter_
-        Its equations.
-    directions
-        What its slow states mean.
-    """
+    """Return the observer as a discrete flat model."""
     writer = _Variables(filter_, directions)
     return FlatModel(
         name=f"{filter_.plant.name}_observer",
@@ -300,20 +292,7 @@ def design_adaptive_observer(
 
 
 def encoder_quantum(model: FlatModel, measured: str) -> float:
-    """Return the angle of one count of the encoder that shows a motion, in rad.
-
-    Parameters
-    ----------
-    model
-        Flat model with its sensors.
-    measured
-        State that the encoder shows.
-
-    Raises
-    ------
-    ArrangementError
-        If no encoder of that motion is declared.
-    """
+    """Return the angle of one count of the encoder that shows a motion, in rad."""
     for reading in model.readings:
         if reading.measured == measured:
             for sensor in reading.sensors:
@@ -326,15 +305,7 @@ def encoder_quantum(model: FlatModel, measured: str) -> float:
 
 
 def safe_inputs(model: FlatModel, prior: Prior) -> dict[str, float]:
-    """Return the size of each limited input up to which the drive surely gives it: two deviations inside.
-
-    Parameters
-    ----------
-    model
-        Flat model with its motors.
-    prior
-        What is known of the limits.
-    """
+    """Return the size of each limited input up to which the drive surely gives it: two deviations inside."""
     safe = {}
     for body in model.bodies:
         motor = body.motor

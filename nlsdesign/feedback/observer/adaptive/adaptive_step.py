@@ -69,13 +69,7 @@ class AdaptiveStep:
         ]
 
     def entries(self, angles: Array) -> list[Entry]:
-        """Return all entries at many angles: nominal ``kind[i][j]``, slopes ``kind.d[i][j]``.
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-        """
+        """Return all entries at many angles: nominal ``kind[i][j]``, slopes ``kind.d[i][j]``."""
         time, inner = self.nominal.sample_time, self.inner
         own = self.matrices(angles)
         named = {e.key: e for e in self.nominal.entries(angles) if e.key.partition("[")[0] in KINDS}
@@ -101,19 +95,7 @@ class AdaptiveStep:
         return entries
 
     def matrices(self, angles: Array) -> dict[str, Array]:
-        """Return the matrices of the step with the declared numbers.
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-
-        Returns
-        -------
-        dict
-            ``estimate`` (N, 1, n + 1), ``next`` (N, n, n + 1 + inputs), ``prior`` (N, n, 1), ``coupling``
-            (N, n, inner) and ``shift`` (N, n, 1).
-        """
+        """Return the matrices of the step with the declared numbers."""
         return _matrices(_Side(self.nominal.plant, 1.0), self.nominal.sample_time, angles, self.inner)
 
     @property
@@ -122,13 +104,7 @@ class AdaptiveStep:
         return len(self.nominal.plant.states) - 2
 
     def driven(self, u: ca.SX) -> tuple[ca.SX, list[ca.SX]]:
-        """Return what the inputs add to the rates, and its slope along each direction.
-
-        Parameters
-        ----------
-        u
-            Inputs, shape (m,).
-        """
+        """Return what the inputs add to the rates, and its slope along each direction."""
         return ca.SX(self.nominal.plant.driven(u)), [
             (
                 up.relative_inertia * ca.SX(up.plant.driven(u))
@@ -139,13 +115,7 @@ class AdaptiveStep:
         ]
 
     def friction(self, speed: ca.SX) -> tuple[ca.SX, list[ca.SX]] | None:
-        """Return the rate that friction gives a speed, and its slope along each direction; or ``None``.
-
-        Parameters
-        ----------
-        speed
-            In rad/s.
-        """
+        """Return the rate that friction gives a speed, and its slope along each direction; or ``None``."""
         own = self.nominal.plant.friction
         if own is None:
             return None
@@ -210,19 +180,7 @@ def _matrices(side: _Side, time: float, angles: Array, inner: int) -> dict[str, 
 def adaptive_step(
     form: AngleForm, nominal: ObserverStep, directions: UncertainDirections, declared: dict[str, float]
 ) -> AdaptiveStep:
-    """Return the step with its neighbours along the directions.
-
-    Parameters
-    ----------
-    form
-        Of the model as declared.
-    nominal
-        Step with the declared numbers.
-    directions
-        Of the uncertain numbers.
-    declared
-        Declared values by name.
-    """
+    """Return the step with its neighbours along the directions."""
     count, inertia = len(directions.effect), spring_inertia(form)
     sides: list[list[_Side]] = []
     for sign in (1.0, -1.0):
@@ -260,13 +218,7 @@ class HeldObserver:
     step: AdaptiveStep
 
     def start(self, angle: float) -> dict[str, float]:
-        """Return the start values at rest at an angle.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return the start values at rest at an angle."""
         plant, at = self.step.nominal.plant, np.array([angle])
         matrices = self.step.matrices(at)
         memory = plant.rest(at)[0] - matrices["shift"][0, :, 0] - matrices["prior"][0, :, 0]
@@ -275,15 +227,7 @@ class HeldObserver:
 
 
 def held_observer(step: AdaptiveStep, compact: Compact) -> HeldObserver:
-    """Return the part of an adaptive observer on which its torque rests, for a table.
-
-    Parameters
-    ----------
-    step
-        Of the adaptive observer.
-    compact
-        Its table.
-    """
+    """Return the part of an adaptive observer on which its torque rests, for a table."""
     plant, inner, time = step.nominal.plant, step.inner, step.nominal.sample_time
     slow = len(step.raised)
     w = ca.SX.sym("w", len(compact.columns))

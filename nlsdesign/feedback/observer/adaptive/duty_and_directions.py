@@ -47,11 +47,6 @@ class Duty:
         Amplitude in N·m; by default half of the torque at rest at the end of the cam's contour.
     frequencies
         In Hz.
-
-    Raises
-    ------
-    ValueRangeError
-        If torque or a frequency is not positive, or there is no frequency.
     """
 
     torque: float | None = None
@@ -99,22 +94,7 @@ class OperatingPoints:
 
 
 def operating_points(form: AngleForm, duty: Duty) -> OperatingPoints:
-    """Return states and inputs along a duty.
-
-    Parameters
-    ----------
-    form
-        Of the model as declared.
-    duty
-        What the actuator does.
-
-    Raises
-    ------
-    ArrangementError
-        If the torque of the spring does not move the measured body.
-    ValueRangeError
-        If the spring does not reach the torque within the range of angles.
-    """
+    """Return states and inputs along a duty."""
     amplitude, torque = _amplitude(form, duty)
     phase = 2.0 * np.pi * (np.arange(POINTS) + 0.5) / POINTS
     pulsations = tuple(2.0 * math.pi * f for f in duty.frequencies)
@@ -135,18 +115,7 @@ def operating_points(form: AngleForm, duty: Duty) -> OperatingPoints:
 
 
 def spring_inertia(form: AngleForm) -> float:
-    """Return the inertia that the torque of the spring accelerates, from the model at rest, in kg·m².
-
-    Parameters
-    ----------
-    form
-        Of a model.
-
-    Raises
-    ------
-    ArrangementError
-        If the torque of the spring does not move the measured body.
-    """
+    """Return the inertia that the torque of the spring accelerates, from the model at rest, in kg·m²."""
     x = form.rest_in_model_order(form.layout.angles)
     rate, wanted = evaluate_rows(form.rates_and_estimate, x, np.tile(form.u, (len(x), 1)), form.p)
     largest = int(np.argmax(np.abs(wanted[:, 0])))
@@ -179,15 +148,7 @@ def _amplitude(form: AngleForm, duty: Duty) -> tuple[float, float]:
 def push(form: AngleForm) -> tuple[float, int | None]:
     """Return what the first input that moves the body adds to its acceleration per unit, and its place.
 
-    Parameters
-    ----------
-    form
-        Of a model.
-
-    Returns
-    -------
-    tuple
-        Slope, and place among the inputs of the model; ``None`` where no input moves the body.
+    Result: slope, and place among the inputs of the model; ``None`` where no input moves the body.
     """
     driven, rows = form.driven()
     if form.speed not in rows:
@@ -304,26 +265,12 @@ class UncertainDirections:
     left_out: float
 
     def values(self, nominal: Mapping[str, float], at: Array) -> dict[str, float]:
-        """Return the numbers at a point.
-
-        Parameters
-        ----------
-        nominal
-            Declared values by name.
-        at
-            Coordinates along the directions, shape (directions,).
-        """
+        """Return the numbers at a point."""
         factors = np.exp(self.slopes @ at)
         return {name: nominal[name] * float(f) for name, f in zip(self.names, factors, strict=True)}
 
     def in_words(self, direction: int) -> str:
-        """Return the numbers that change most along a direction, per standard deviation.
-
-        Parameters
-        ----------
-        direction
-            Counted from zero.
-        """
+        """Return the numbers that change most along a direction, per standard deviation."""
         column = self.slopes[:, direction]
         order = np.argsort(-np.abs(column))
         largest = [int(i) for i in order if abs(column[i]) >= 0.3 * abs(column[order[0]])][:4]
@@ -334,26 +281,7 @@ class UncertainDirections:
 def uncertain_directions(
     form: AngleForm, prior: Prior, duty: Duty, *, resolution: float, most: int
 ) -> UncertainDirections:
-    """Return the directions that move more torque than a resolution, the largest first.
-
-    Parameters
-    ----------
-    form
-        Of the model as declared.
-    prior
-        What is known of the numbers.
-    duty
-        The motion over which torques are compared.
-    resolution
-        Torque in its unit below which a direction is left out.
-    most
-        Largest number of directions.
-
-    Raises
-    ------
-    ArrangementError
-        If no number of the model is uncertain enough to matter.
-    """
+    """Return the directions that move more torque than a resolution, the largest first."""
     known = prior.only([name for name in prior.names if name in form.model.values])
     count = 0
     if np.any(known.deviations):

@@ -48,21 +48,7 @@ class EstimatorBound:
 
 @dataclass(frozen=True)
 class SensedTorque:
-    """What is estimated from what.
-
-    Parameters
-    ----------
-    estimate
-        Output or signal that is wanted.
-    measured
-        State that is measured.
-    quantum
-        Of its encoder.
-    sample_time
-        In s.
-    substeps
-        Runge–Kutta steps per sample.
-    """
+    """What is estimated from what."""
 
     estimate: str
     measured: str
@@ -160,14 +146,6 @@ def _variational(model: FlatModel, prior: Prior, sensed: SensedTorque) -> tuple[
 
 
 def rms_over(bounds: list[EstimatorBound], first: float, last: float) -> float:
-    """Return the root mean square of the bound over a stretch of several runs.
-
-    Parameters
-    ----------
-    bounds
-        Of the runs.
-    first, last
-        Stretch in s.
-    """
+    """Return the root mean square of the bound over a stretch of several runs."""
     squares = [b.deviation[(b.time >= first) & (b.time < last)] ** 2 for b in bounds]
     return math.sqrt(float(np.mean(np.concatenate(squares))))

@@ -107,17 +107,7 @@ class FilterEquations:
         return ca.SX(entry.factor) if entry.column is None else entry.factor * self.w[entry.column]
 
     def matrix(self, kind: str, rows: int, columns: int, slow: Expression) -> Expression:
-        """Return a matrix of the step at the slow states.
-
-        Parameters
-        ----------
-        kind
-            Of :meth:`AdaptiveStep.matrices`.
-        rows, columns
-            Its shape.
-        slow
-            Slow states.
-        """
+        """Return a matrix of the step at the slow states."""
         total = ca.SX(rows, columns)
         for i in range(rows):
             for j in range(columns):
@@ -143,15 +133,7 @@ class FilterEquations:
     # --- the two halves of a sample ---------------------------------------------------------------------
 
     def expected_states(self, memory: Expression, slow: Expression) -> Expression:
-        """Return the states expected at a sample: what the angle adds at its end, then friction.
-
-        Parameters
-        ----------
-        memory
-            What the estimates carry on.
-        slow
-            Slow states.
-        """
+        """Return the states expected at a sample: what the angle adds at its end, then friction."""
         state = memory + self.matrix("prior", self.n, 1, slow)
         inner = self.step.inner
         if inner:
@@ -409,13 +391,7 @@ def _speed_deviation(angle: float, acceleration: float, time: float) -> float:
 
 
 def pairs(size: int) -> list[tuple[int, int]]:
-    """Return the places of the upper triangle of a matrix, row by row.
-
-    Parameters
-    ----------
-    size
-        Number of rows.
-    """
+    """Return the places of the upper triangle of a matrix, row by row."""
     return [(i, j) for i in range(size) for j in range(i, size)]
 
 
@@ -433,13 +409,7 @@ def _unpacked(packed: Expression, size: int) -> Expression:
 
 
 def expected_inputs(filter_: FilterEquations) -> ca.Function:
-    """Return (x, u, p, w) -> what is expected of each input: of the angle what the filter predicts.
-
-    Parameters
-    ----------
-    filter_
-        Its equations.
-    """
+    """Return (x, u, p, w) -> what is expected of each input: of the angle what the filter predicts."""
     memory, slow, _, arguments = _symbols(filter_)
     predicted = ca.SX(arguments[1])
     predicted[0] = filter_.expected_states(memory, slow)[filter_.angle]
@@ -450,11 +420,6 @@ def first_states(filter_: FilterEquations) -> ca.Function:
     """Return (x, u, p, w) -> the states of a machine that rests at its first reading, and after a gap.
 
     What has been learned stays: after a gap only the angle follows the reading.
-
-    Parameters
-    ----------
-    filter_
-        Its equations.
     """
     memory, slow, state, arguments = _symbols(filter_)
     n, count, inner = filter_.n, filter_.slow, filter_.step.inner

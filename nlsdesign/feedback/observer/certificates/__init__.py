@@ -5,47 +5,29 @@ It never trusts the solver: what is written is checked in exact or interval arit
 """
 
 from .certificate import Certificate, certify, declared_assumptions
-from .certificate_file import Proof, certificate_text, read_certificate, write_certificate
+from .certificate_file import Proof, read_certificate, write_certificate
 from .co_design import CertifiedGain
 from .continuous import ContinuousCertificate, certify_continuous
-from .error_system import ErrorSystem, error_system
-from .held_estimate import (
-    HeldEstimateBound,
-    HeldEstimateCertificate,
-    certify_held_estimate,
-    clamped_estimate_bound,
-    held_estimate_bound,
-)
-from .polytope import ErrorPolytope, error_polytope
-from .torque_bound import Assumptions, TorqueErrorBound, torque_bound
-from .verification import Check, CodeToCompare, Verification, certified_design, verify
+from .held_estimate import HeldEstimateCertificate, certify_held_estimate, clamped_estimate_bound
+from .torque_bound import Assumptions
+from .verification import CodeToCompare, Verification, certified_design, verify
 
 __all__ = [
     "Assumptions",
     "Certificate",
     "CertifiedGain",
-    "Check",
     "CodeToCompare",
     "ContinuousCertificate",
-    "ErrorPolytope",
-    "ErrorSystem",
-    "HeldEstimateBound",
     "HeldEstimateCertificate",
     "Proof",
-    "TorqueErrorBound",
     "Verification",
-    "certificate_text",
     "certified_design",
     "certify",
     "certify_continuous",
     "certify_held_estimate",
     "clamped_estimate_bound",
     "declared_assumptions",
-    "error_polytope",
-    "error_system",
-    "held_estimate_bound",
     "read_certificate",
-    "torque_bound",
     "verify",
     "write_certificate",
 ]

@@ -231,14 +231,7 @@ def declared_assumptions(model: FlatModel, design: ObserverDesign) -> Assumption
 def contracts(polytope: ErrorPolytope, lyapunov: Array, decay: float) -> bool:
     """Return whether √(eᵀPe) falls with e^(−decay·T) at every corner, decided in fractions.
 
-    Parameters
-    ----------
-    polytope
-        All that one sample can do to the error.
-    lyapunov
-        P, shape (n, n).
-    decay
-        In 1/s.
+    ``lyapunov``: P, shape (n, n).
     """
     p = exact(lyapunov)
     if not is_positive_definite(p):
@@ -254,12 +247,7 @@ def contracts(polytope: ErrorPolytope, lyapunov: Array, decay: float) -> bool:
 def within_condition(lyapunov: Array, condition: float) -> bool:
     """Return whether 1 ⪯ P ⪯ condition, decided in fractions up to a millionth.
 
-    Parameters
-    ----------
-    lyapunov
-        P, shape (n, n).
-    condition
-        Largest eigenvalue over the smallest.
+    ``lyapunov``: P, shape (n, n).
     """
     p, one = exact(lyapunov), identity(len(lyapunov))
     margin = Fraction(1, 10**6)
@@ -269,18 +257,7 @@ def within_condition(lyapunov: Array, condition: float) -> bool:
 
 
 def hashes_of_code(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each C source and header in a folder, by name.
-
-    Parameters
-    ----------
-    folder
-        Folder of the C files.
-
-    Raises
-    ------
-    MeasurementError
-        If there are none, or one cannot be read.
-    """
+    """Return the SHA-256 of each C source and header in a folder, by name."""
     try:
         files = sorted(f for f in folder.iterdir() if f.suffix in (".c", ".h"))
         result = {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}

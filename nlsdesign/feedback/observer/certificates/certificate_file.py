@@ -32,13 +32,7 @@ Proof: TypeAlias = Certificate | ContinuousCertificate | HeldEstimateCertificate
 
 
 def certificate_text(certificate: Proof) -> str:
-    """Return the JSON text of a certificate.
-
-    Parameters
-    ----------
-    certificate
-        What is proved.
-    """
+    """Return the JSON text of a certificate."""
     content: dict[str, Any]
     if isinstance(certificate, Certificate):
         content = _content(certificate)

@@ -44,15 +44,7 @@ class Inequality:
 
 
 def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
-    """Return the unknowns of least cost under matrix inequalities; ``None`` where there are none.
-
-    Parameters
-    ----------
-    cost
-        Shape (unknowns,).
-    inequalities
-        All have to hold.
-    """
+    """Return the unknowns of least cost under matrix inequalities; ``None`` where there are none."""
     rows, sides, cones = [], [], []
     for each in inequalities:
         n = len(each.constant)
@@ -137,14 +129,7 @@ class GainProblem:
     ) -> GainAndLyapunov | None:
         """Return the gain that lets the least of a wrong measurement into V; ``None`` where there is none.
 
-        Parameters
-        ----------
-        decay
-            Of the whole error, in 1/s.
-        moving_decay
-            Of angle and speed alone, while the inner states are right, in 1/s.
-        corrected
-            Rows of the gain that may differ from zero; P joins no other state with these.
+        ``corrected``: rows of the gain that may differ from zero; P joins no other state with these.
         """
         n, r = self.corners.shape[1], len(self.output_matrix)
         pairs = [(i, j) for j in range(n) for i in range(j + 1) if (i in corrected) == (j in corrected)]
@@ -183,10 +168,7 @@ class GainProblem:
 def noise_inequality(p: Array, y: Array) -> Inequality:
     """Return [[s·1, Yᵀ], [Y, P]] ⪰ 0, that is MᵀPM ⪯ s, with s the last unknown.
 
-    Parameters
-    ----------
-    p, y
-        P and Y = P·M by unknown, shapes (unknowns, n, n) and (unknowns, n, r).
+    ``p``, ``y``: P and Y = P·M by unknown, shapes (unknowns, n, n) and (unknowns, n, r).
     """
     count, n, r = y.shape
     factors = np.zeros((count, r + n, r + n))
@@ -207,12 +189,7 @@ def _contraction(p: Array, moved: Array, keep: float) -> Inequality:
 def contraction(lyapunov: Array, errors: Array) -> float:
     """Return the largest factor by which √(eᵀPe) can change in one sample.
 
-    Parameters
-    ----------
-    lyapunov
-        P, shape (n, n), positive definite.
-    errors
-        Shape (corners, n, n).
+    ``lyapunov``: P, shape (n, n), positive definite. ``errors``: shape (corners, n, n).
     """
     root = np.linalg.cholesky(lyapunov).T
     return float(np.max(np.linalg.norm(root @ errors @ np.linalg.inv(root), ord=2, axis=(1, 2))))
@@ -221,14 +198,7 @@ def contraction(lyapunov: Array, errors: Array) -> float:
 def lyapunov_function(errors: Array, keep: float, condition: float) -> Array | None:
     """Return P of condition at most so much with eᵀPe falling by ``keep`` at every corner, or ``None``.
 
-    Parameters
-    ----------
-    errors
-        Shape (corners, n, n), in scaled states.
-    keep
-        ρ², what is left of V after one sample.
-    condition
-        Largest condition of P.
+    ``errors``: shape (corners, n, n), in scaled states.
     """
     n = errors.shape[1]
     pairs = [(i, j) for j in range(n) for i in range(j + 1)]
@@ -250,12 +220,7 @@ def lyapunov_function(errors: Array, keep: float, condition: float) -> Array | N
 def fastest(at_decay: Callable[[float], Sought | None], highest: float) -> tuple[float, Sought] | None:
     """Return the largest decay, within a thousandth, at which something is found, and what; by bisection.
 
-    Parameters
-    ----------
-    at_decay
-        Takes a decay in 1/s and returns what is sought, or ``None``.
-    highest
-        Where the search begins; nothing faster is tried.
+    ``highest``: where the search begins; nothing faster is tried.
     """
     best, at, low, high = at_decay(highest), highest, 0.0, highest
     if best is not None:
@@ -390,19 +355,7 @@ class CertifiedGain:
 def gain_problem(
     plant: AngleScheduledPlant, sample_time: float, angles: Array, *, condition: float
 ) -> GainProblem:
-    """Return the corners of the exact step over a range of angles.
-
-    Parameters
-    ----------
-    plant
-        In the form that an observer is designed on.
-    sample_time
-        T in s.
-    angles
-        Shape (N,).
-    condition
-        Largest condition of P.
-    """
+    """Return the corners of the exact step over a range of angles."""
     scale = np.array(scaling(plant))
     transition = linear(plant.at(angles).a, sample_time)[0]
     transition = transition * scale[None, None, :] / scale[None, :, None]

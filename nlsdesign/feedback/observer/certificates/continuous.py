@@ -226,14 +226,7 @@ def _falls(
 def decays(system: ErrorSystem, solution: GainAndLyapunov, decay: float) -> bool:
     """Return whether √(eᵀPe) falls with e^(−decay·t) at every corner, decided in fractions.
 
-    Parameters
-    ----------
-    system
-        All matrices A.
-    solution
-        L in SI, shape (n, r), and P in scaled states, shape (n, n).
-    decay
-        In 1/s.
+    ``solution``: L in SI, shape (n, r), and P in scaled states, shape (n, n).
     """
     p, rate = exact(solution.lyapunov), Fraction(decay)
     if not is_positive_definite(p):
@@ -247,13 +240,7 @@ def decays(system: ErrorSystem, solution: GainAndLyapunov, decay: float) -> bool
 
 
 def covers(claimed: ErrorSystem, again: ErrorSystem) -> bool:
-    """Return whether the ranges of a certificate hold those that were computed again.
-
-    Parameters
-    ----------
-    claimed, again
-        Of the certificate, and anew.
-    """
+    """Return whether the ranges of a certificate hold those that were computed again."""
     low, high, least, most = (np.array(v) for v in (claimed.lower, claimed.upper, again.lower, again.upper))
     spare = 1e-7 * np.maximum(np.abs(least), np.abs(most))
     alike = (again.states, again.moving, again.seen, again.angles) == (

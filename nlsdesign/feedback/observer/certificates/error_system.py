@@ -69,10 +69,7 @@ class ErrorSystem:
     def exact_corners(self, gain: tuple[tuple[float, ...], ...]) -> Iterator[Matrix]:
         """Yield every corner of A − L·C in scaled states, in fractions.
 
-        Parameters
-        ----------
-        gain
-            L, shape (n, r).
+        ``gain``: L, shape (n, r).
         """
         n = len(self.states)
         size = [Fraction(s) for s in self.sizes]
@@ -97,26 +94,7 @@ def error_system(
     measured: str,
     angles: tuple[float, float],
 ) -> ErrorSystem:
-    """Return the error of an observer in continuous time, with verified ranges of its entries.
-
-    Parameters
-    ----------
-    model
-        Continuous, load fixed.
-    form
-        Which states the observer carries: the minimal ones, or those of the paper.
-    estimate, measured
-        Torque and angle.
-    angles
-        Range of the angle in rad.
-
-    Raises
-    ------
-    ArrangementError
-        If the error is not linear with coefficients that depend on the angle alone, but for friction.
-    ConvergenceError
-        If an entry has no bound.
-    """
+    """Return the error of an observer in continuous time, with verified ranges of its entries."""
     reference = np.linspace(*angles, 65)
     plant = form.plant(model, estimate=estimate, angle=measured, angles=reference)
     theta, speed, slopes = _slopes(model, form, plant)
@@ -201,13 +179,8 @@ def _slopes(
 def hull(ranges: Callable[[Bounds], tuple[Array, Array, Mask]], edges: Array) -> tuple[Array, Array]:
     """Return bounds of many functions over a range, from cells that are halved where they are too wide.
 
-    Parameters
-    ----------
-    ranges
-        Takes cells and returns lower and upper bounds, shape (cells, functions), and which cells reach over
-        the edge of a piece; of these what is narrower than 1e-7 rad is left out.
-    edges
-        Of the first cells, ascending.
+    ``ranges``: takes cells and returns lower and upper bounds, shape (cells, functions), and which cells
+    reach over the edge of a piece; of these what is narrower than 1e-7 rad is left out.
     """
     cells: Bounds = (edges[:-1], edges[1:])
     points = ranges((edges, edges))

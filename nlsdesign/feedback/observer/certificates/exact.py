@@ -15,10 +15,7 @@ Matrix: TypeAlias = list[list[Fraction]]
 def exact(values: Array | Sequence[Sequence[float]]) -> Matrix:
     """Return a matrix of floating-point numbers as the fractions that they are.
 
-    Parameters
-    ----------
-    values
-        Shape (n, m).
+    ``values``: shape (n, m).
     """
     return [[Fraction(float(v)) for v in row] for row in values]
 
@@ -26,10 +23,7 @@ def exact(values: Array | Sequence[Sequence[float]]) -> Matrix:
 def times(a: Matrix, b: Matrix) -> Matrix:
     """Return a product.
 
-    Parameters
-    ----------
-    a, b
-        Shapes (n, k) and (k, m).
+    ``a``, ``b``: shapes (n, k) and (k, m).
     """
     columns = list(zip(*b, strict=True))
     return [[sum((x * y for x, y in zip(row, c, strict=True)), Fraction(0)) for c in columns] for row in a]
@@ -38,45 +32,25 @@ def times(a: Matrix, b: Matrix) -> Matrix:
 def transposed(a: Matrix) -> Matrix:
     """Return the transpose.
 
-    Parameters
-    ----------
-    a
-        Shape (n, m).
+    ``a``: shape (n, m).
     """
     return [list(column) for column in zip(*a, strict=True)]
 
 
 def combined(a: Matrix, b: Matrix, *, first: Fraction, second: Fraction) -> Matrix:
-    """Return first·a + second·b.
-
-    Parameters
-    ----------
-    a, b
-        Of the same shape.
-    first, second
-        Factors.
-    """
+    """Return first·a + second·b."""
     return [[first * x + second * y for x, y in zip(r, s, strict=True)] for r, s in zip(a, b, strict=True)]
 
 
 def identity(n: int) -> Matrix:
-    """Return the identity.
-
-    Parameters
-    ----------
-    n
-        Number of rows.
-    """
+    """Return the identity."""
     return [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
 
 
 def is_positive_definite(a: Matrix) -> bool:
     """Return whether a symmetric matrix is positive definite, by LDLᵀ in fractions: all pivots positive.
 
-    Parameters
-    ----------
-    a
-        Shape (n, n); one that is not symmetric is not positive definite.
+    ``a``: shape (n, n); one that is not symmetric is not positive definite.
     """
     n, left = len(a), [list(row) for row in a]
     if any(a[i][j] != a[j][i] for i in range(n) for j in range(i)):
@@ -93,11 +67,6 @@ def is_positive_definite(a: Matrix) -> bool:
 def exponential_below(x: Fraction) -> Fraction:
     """Return a number not larger than e^(−x), for x ≥ 0, within 1e-25 of its size or so.
 
-    Parameters
-    ----------
-    x
-        Not negative.
-
     Notes
     -----
     e^(−y) with y = x/m ≤ 1/2 is an alternating series with falling terms, so a sum that ends with a negative
@@ -112,11 +81,5 @@ def exponential_below(x: Fraction) -> Fraction:
 
 
 def corners(low: Sequence[float], high: Sequence[float]) -> list[tuple[float, ...]]:
-    """Return the corners of a box; an edge without length gives one corner, not two.
-
-    Parameters
-    ----------
-    low, high
-        Shape (n,).
-    """
+    """Return the corners of a box; an edge without length gives one corner, not two."""
     return list(product(*[(a, b) if a != b else (a,) for a, b in zip(low, high, strict=True)]))

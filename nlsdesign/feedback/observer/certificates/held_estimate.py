@@ -160,24 +160,8 @@ def held_estimate_bound(
 ) -> HeldEstimateBound:
     """Return the largest distance of an adaptive observer's estimate from the torque of its deck.
 
-    Parameters
-    ----------
-    model
-        Continuous; the deck's actuator, with the numbers of the deck.
-    design
-        Its adaptive observer.
-    assumptions
-        Ranges; without spreads, since the bound is from the torque of the deck.
-
-    Raises
-    ------
-    ArrangementError
-        If inner states are coupled, or the torque depends on more than angle and inner states.
-    ValueRangeError
-        If the assumptions have spreads or reach beyond the table, or the slow states may be so large that an
-        inner state is not held: with the largest limit at which it is.
-    UnknownNameError
-        If a parameter with a range does not exist.
+    ``model``: continuous; the deck's actuator, with the numbers of the deck. ``assumptions``: ranges; without
+    spreads, since the bound is from the torque of the deck.
     """
     if any(v > 0.0 for v in assumptions.spreads.values()):
         raise ValueRangeError(
@@ -350,15 +334,7 @@ class _Table:
 
 
 def held_assumptions(model: FlatModel, design: LearningDesign) -> Assumptions:
-    """Return the whole table, and half a count of the encoder that the deck declares.
-
-    Parameters
-    ----------
-    model
-        Its readings say how the angle is measured.
-    design
-        The adaptive observer.
-    """
+    """Return the whole table, and half a count of the encoder that the deck declares."""
     return declared_assumptions(model, _nominal(design))
 
 

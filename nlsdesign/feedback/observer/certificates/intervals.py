@@ -62,21 +62,7 @@ class Enclosure:
 
 
 def enclose(function: ca.Function, boxes: Sequence[Sequence[tuple[ArrayLike, ArrayLike]]]) -> Enclosure:
-    """Return ranges of a function over boxes.
-
-    Parameters
-    ----------
-    function
-        Of symbols SX.
-    boxes
-        For each input of the function, for each of its elements, lower and upper bounds: numbers, or arrays
-        of shape (boxes,).
-
-    Raises
-    ------
-    ArrangementError
-        If the function uses an operation that has no verified range here.
-    """
+    """Return ranges of a function over boxes."""
     given = [
         [(np.asarray(low, dtype=float), np.asarray(high, dtype=float)) for low, high in group]
         for group in boxes
@@ -130,23 +116,11 @@ class _Shares:
         self.count = 0
 
     def is_share(self, kind: int, of: Sequence[int]) -> bool:
-        """Return whether an operation is such a quotient; it lies between zero and one.
-
-        Parameters
-        ----------
-        kind, of
-            Operation and the places of its operands.
-        """
+        """Return whether an operation is such a quotient; it lies between zero and one."""
         return kind == ca.OP_DIV and self.truths.get(of[0], -1) in self.sums.get(of[1], ())
 
     def follow(self, kind: int, to: int, of: Sequence[int]) -> None:
-        """Take note of what an operation writes where.
-
-        Parameters
-        ----------
-        kind, to, of
-            Operation, the place of its result and those of its operands.
-        """
+        """Take note of what an operation writes where."""
         summed = kind == ca.OP_ADD and all(i in self.truths for i in of)
         pair = (self.truths[of[0]], self.truths[of[1]]) if summed else None
         self.truths.pop(to, None)
@@ -192,13 +166,7 @@ def _negate(a: Bounds) -> Bounds:
 
 
 def multiply(a: Bounds, b: Bounds) -> Bounds:
-    """Return the range of a product.
-
-    Parameters
-    ----------
-    a, b
-        Lower and upper bounds.
-    """
+    """Return the range of a product."""
     products = np.array(np.broadcast_arrays(a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]))
     zero = (a[0] == 0.0) | (a[1] == 0.0) | (b[0] == 0.0) | (b[1] == 0.0)
     low, high = np.min(products, axis=0), np.max(products, axis=0)

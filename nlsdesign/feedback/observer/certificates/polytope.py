@@ -111,13 +111,7 @@ class ErrorPolytope:
 
 
 def error_polytope(design: ObserverDesign) -> ErrorPolytope:
-    """Return what one sample of a finished observer can do to its error.
-
-    Parameters
-    ----------
-    design
-        The observer with its table.
-    """
+    """Return what one sample of a finished observer can do to its error."""
     plant, compact = design.step.plant, design.compact
     n, seen = len(plant.states), tuple(int(np.argmax(row)) for row in plant.output_matrix)
 
@@ -140,15 +134,7 @@ def error_polytope(design: ObserverDesign) -> ErrorPolytope:
 
 
 def scaling(plant: AngleScheduledPlant, frequency: float = 30.0) -> tuple[float, ...]:
-    """Return the sizes over which states are written: typical ones, but the speed at least that of a swing.
-
-    Parameters
-    ----------
-    plant
-        In the form that an observer is designed on.
-    frequency
-        Of the swing over the whole range of the angle, in Hz: about how fast angle and speed are corrected.
-    """
+    """Return the sizes over which states are written: typical ones, the speed at least that of a swing."""
     angle, speed = plant.moving
     sizes = [float(s) for s in plant.sizes]
     sizes[speed] = max(sizes[speed], 2.0 * math.pi * frequency * sizes[angle])
@@ -160,13 +146,6 @@ def friction_slopes(plant: AngleScheduledPlant, sample_time: float) -> tuple[flo
 
     Any two speeds of one observer leave friction as q times their difference, with q between these. Friction
     that rises with the speed gives 0 ≤ q ≤ 1 but for rounding: it never drives two estimates apart.
-
-    Parameters
-    ----------
-    plant
-        With or without dry friction.
-    sample_time
-        T in s.
     """
     if plant.friction is None:
         return (1.0, 1.0)

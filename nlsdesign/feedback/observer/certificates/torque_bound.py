@@ -66,16 +66,7 @@ class SpringView:
     ) -> tuple[Range, ...]:
         """Return verified ranges of one of the functions over cells of the angle.
 
-        Parameters
-        ----------
-        function
-            One of the functions above.
-        cells
-            Lower and upper angles, shape (cells,).
-        z
-            Bounds of the inner states in each cell, shape (cells, inner, 2); zero if it is left out.
-        whole
-            Over the whole range of the parameters instead of at their nominal values.
+        ``z``: bounds of the inner states in each cell, shape (cells, inner, 2); zero if it is left out.
         """
         spread = self.spread if whole else np.zeros_like(self.spread)
         held = np.zeros((1, len(self.inner), 2)) if z is None else z
@@ -87,13 +78,7 @@ class SpringView:
         return enclose(function, boxes).outputs
 
     def cells(self, edges: Array) -> Bounds:
-        """Return cells of the angle, divided where a piece of a contour ends; without the narrowest ones.
-
-        Parameters
-        ----------
-        edges
-            Ascending, shape (n,).
-        """
+        """Return cells of the angle, divided where a piece of a contour ends; without the narrowest ones."""
         low, high = edges[:-1], edges[1:]
         kept_low, kept_high = [], []
         empty = [(0.0, 0.0)] * len(self.inner)
@@ -114,25 +99,7 @@ class SpringView:
 def spring_view(
     model: FlatModel, inner: tuple[str, ...], *, estimate: str, angle: str, spreads: dict[str, float]
 ) -> SpringView:
-    """Return the spring of a model as a certificate sees it.
-
-    Parameters
-    ----------
-    model
-        Continuous.
-    inner
-        Inner states, in the order of the observer.
-    estimate, angle
-        Torque and measured state.
-    spreads
-        Relative half range of each uncertain parameter by name.
-
-    Raises
-    ------
-    ArrangementError
-        If an inner state is led by anything but the angle, or is coupled to another one, or its rate of
-        forgetting is not one number; or the torque depends on more than angle and inner states.
-    """
+    """Return the spring of a model as a certificate sees it."""
     model = without_idle_states(with_outputs(model, [estimate, angle]), [estimate, angle])
     s, names = model.symbols(), [v.name for v in model.states]
     theta = s.state[names.index(angle)]
@@ -311,23 +278,7 @@ class TorqueErrorBound:
 def torque_bound(model: FlatModel, design: ObserverDesign, assumptions: Assumptions) -> TorqueErrorBound:
     """Return a bound on the torque error that holds for every motion and every current.
 
-    Parameters
-    ----------
-    model
-        Continuous; the deck's actuator.
-    design
-        Its observer, in the minimal form.
-    assumptions
-        Ranges.
-
-    Raises
-    ------
-    ArrangementError
-        If a correction enters the inner states, or the torque depends on more than angle and inner states.
-    ValueRangeError
-        If the angles reach beyond the table.
-    UnknownNameError
-        If a parameter with a range does not exist.
+    ``model``: continuous; the deck's actuator.
     """
     return _Bounding(model, design, assumptions).bound()
 

@@ -30,17 +30,7 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was looked at.
-
-    Parameters
-    ----------
-    name
-        What.
-    holds
-        ``None`` where it could not be looked at.
-    detail
-        What was again.
-    """
+    """One thing that was looked at."""
 
     name: str
     holds: bool | None

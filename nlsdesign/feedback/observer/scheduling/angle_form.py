@@ -190,13 +190,7 @@ class AngleForm:
         self._sum = self._summed()
 
     def with_values(self, values: Mapping[str, float]) -> AngleForm:
-        """Return the same form of the model with other numbers.
-
-        Parameters
-        ----------
-        values
-            In SI by name.
-        """
+        """Return the same form of the model with other numbers."""
         other = copy.copy(self)
         other.model = self.model.with_values(values)
         other.p = other.model.start(other.model.parameters)
@@ -205,24 +199,12 @@ class AngleForm:
         return other
 
     def rest(self, angles: Array) -> Array:
-        """Return rest states in the order of the observer, shape (N, n).
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-        """
+        """Return rest states in the order of the observer, shape (N, n)."""
         ordered: Array = self.rest_in_model_order(angles)[:, self.order]
         return ordered
 
     def at(self, angles: Array) -> Coefficients:
-        """Return the coefficients at many angles.
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-        """
+        """Return the coefficients at many angles."""
         rest, n, k, count = self.rest_in_model_order(angles), self.n, self.inner, len(angles)
         rate, jacobian, wanted, row, led = evaluate_rows(self._slopes, rest, self.u, self.p)
         # Slopes in the speed are those of the moving actuator: dry friction has none there.
@@ -271,20 +253,7 @@ class AngleForm:
     def check_additive(
         self, driven: ca.Function, rows: Sequence[int], friction: ca.Function | None, sizes: Array
     ) -> None:
-        """Raise unless the rates have the form, at random angles, speeds and inputs and rested inner states.
-
-        Parameters
-        ----------
-        driven, rows, friction
-            As :meth:`driven` and :meth:`friction` gave them.
-        sizes
-            Typical sizes of the states, shape (n,).
-
-        Raises
-        ------
-        ArrangementError
-            With the name of the state whose rate does not have the form.
-        """
+        """Raise unless the rates have the form at random angles, speeds and inputs, inner states at rest."""
         draw, angles = np.random.default_rng(2), self.layout.angles
         at = draw.uniform(angles[0], angles[-1], 40)
         speeds = self.layout.speed_size * draw.normal(size=40)
@@ -337,13 +306,7 @@ class AngleForm:
     # --- inside ---------------------------------------------------------------------------------------
 
     def rest_in_model_order(self, angles: Array) -> Array:
-        """Return rest states in the order of the model, shape (N, n).
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-        """
+        """Return rest states in the order of the model, shape (N, n)."""
         if self._rested is None or not np.array_equal(self._rested[0], angles):
             self._rested = angles.copy(), self._rest(self.model, angles)
         return self._rested[1].copy()
@@ -443,18 +406,7 @@ class Minimal:
 
 
 def minimal_form(model: FlatModel, *, estimate: str, angle: str, angles: Array) -> tuple[AngleForm, Array]:
-    """Return the model in its own states, reduced to those that matter, and the typical sizes of the states.
-
-    Parameters
-    ----------
-    model, estimate, angle, angles
-        As for :meth:`StateForm.plant`.
-
-    Raises
-    ------
-    UnknownNameError
-        If the angle is no state of the model.
-    """
+    """Return the model in its own states, reduced to those that matter, and their typical sizes."""
     if angle not in {v.name for v in model.states}:
         raise unknown_name("state", angle, (v.name for v in model.states))
     model = without_idle_states(model, [estimate, angle])
@@ -524,26 +476,7 @@ class PaperForm:
 def finished(
     form: AngleForm, sizes: Array, measured: tuple[str, ...], bandwidth: float = float("inf")
 ) -> AngleScheduledPlant:
-    """Return the plant of a form, checked.
-
-    Parameters
-    ----------
-    form
-        The model in the form of an angle-scheduled plant.
-    sizes
-        Typical sizes of its states, shape (n,).
-    measured
-        States that are measured besides the angle.
-    bandwidth
-        Cut-off frequency of the filter on their rate in Hz.
-
-    Raises
-    ------
-    ArrangementError
-        If the equations do not have the form.
-    ValueRangeError
-        If the estimate is far from linear in the inner states.
-    """
+    """Return the plant of a form, checked."""
     (driven, rows), friction = form.driven(), form.friction()
     form.check_additive(driven, rows, friction, sizes)
     deviation, model = form.affine_error(), form.model

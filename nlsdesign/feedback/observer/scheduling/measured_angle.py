@@ -26,15 +26,7 @@ SURELY = 2.0
 
 
 def measured_angle(plant: AngleScheduledPlant, angles: Array) -> Variable:
-    """Return the input of the measured angle.
-
-    Parameters
-    ----------
-    plant
-        As the observer sees it.
-    angles
-        Grid of its table, shape (n,).
-    """
+    """Return the input of the measured angle."""
     v, size = plant.states[plant.moving[0]], float(plant.sizes[plant.moving[0]])
     text = (
         f"measured {v.name}; the table reaches from {angles[0]:.4g} to {angles[-1]:.4g} rad and holds its "
@@ -52,21 +44,7 @@ def with_plausible_inputs(
     it does not, the angle may lie beyond the table by its whole width, move at twice the typical speed, and
     stay as long as it likes. The current lies within the limit of the motor.
 
-    Parameters
-    ----------
-    observer
-        Discrete; its first input is the angle.
-    model
-        Continuous, with its sensors and motors.
-    plant
-        As the observer sees it.
-    angles
-        Grid of its table, shape (n,).
-
-    Raises
-    ------
-    ValueRangeError
-        If the declared rate or stale time is less than what one sample allows.
+    ``observer``: discrete; its first input is the angle.
     """
     angle, *others = observer.inputs
     time = float(observer.sample_time or 0.0)
@@ -130,17 +108,6 @@ def noticeable_change(plant: AngleScheduledPlant, drive: str, angles: Array, res
 
     Dry friction holds twice its torque, and the spring what a motion below the resolution needs; a change of
     the drive by more than twice both together moves the reading.
-
-    Parameters
-    ----------
-    plant
-        As the observer sees it.
-    drive
-        Name of the input.
-    angles
-        Shape (n,).
-    resolution
-        Of the reading, in rad.
     """
     place = [v.name for v in plant.inputs].index(drive)
     start = np.array([v.start for v in plant.inputs])
@@ -182,18 +149,7 @@ class StepWriter(Protocol):
 
 
 class FirstReading:
-    """Begin and expectation of a scheduled observer.
-
-    Parameters
-    ----------
-    writer
-        Of its step.
-    memory, others
-        Its states: what the estimates carry on, then previous values and filtered rates of what else is
-        measured.
-    angle
-        The measured angle.
-    """
+    """Begin and expectation of a scheduled observer."""
 
     def __init__(
         self,
@@ -239,12 +195,7 @@ def at_rest(carried: Sequence[Sequence[Expression]], offset: Sequence[Expression
 
     A state that never decays, such as a permanent set, has no rest of its own and begins at zero.
 
-    Parameters
-    ----------
-    carried
-        A, shape (n, n).
-    offset
-        g, shape (n,).
+    ``carried``: A, shape (n, n).
     """
     count = len(offset)
     lasting = [i for i in range(count) if not _decays(carried[i][i])]

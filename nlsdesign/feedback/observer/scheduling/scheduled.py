@@ -166,20 +166,7 @@ def design_observer_with_details(
 
 
 def check_sampling(model: FlatModel, sample_time: float) -> None:
-    """Refuse a model or a sample time that no observer can be designed for.
-
-    Parameters
-    ----------
-    model
-        Continuous.
-    sample_time
-        In s.
-
-    Raises
-    ------
-    ValueRangeError
-        If the sample time is not between 0 and 1 s, or the model is discrete.
-    """
+    """Refuse a model or a sample time that no observer can be designed for."""
     if not 0.0 < sample_time < 1.0:
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
     if model.sample_time is not None:
@@ -189,10 +176,7 @@ def check_sampling(model: FlatModel, sample_time: float) -> None:
 def whole_contour(model: FlatModel) -> GridByTorqueError:
     """Return a grid that reaches to the ends of the cam's contour, or ±90° where there is none.
 
-    Parameters
-    ----------
-    model
-        Its cams say where a contour ends; beyond it there is no lever arm.
+    ``model``: its cams say where a contour ends; beyond it there is no lever arm.
     """
     cams = [cam for spring in model.springs for cam in spring.cams]
     end = min((model.values[cam.last_angle] for cam in cams if cam.last_angle), default=math.pi / 2.0)
@@ -385,17 +369,7 @@ class ErrorStability:
 
 
 def error_matrices(observer: FlatModel, angles: Array, speed: float = 0.0) -> Array:
-    """Return the error matrix of an observer at many angles, shape (N, n, n).
-
-    Parameters
-    ----------
-    observer
-        As :func:`~nlsdesign.feedback.observer.scheduling.scheduled.design_observer` gave it.
-    angles
-        Measured angles in rad, shape (N,).
-    speed
-        Estimated speed in rad/s, which matters where dry friction is part of the observer.
-    """
+    """Return the error matrix of an observer at many angles, shape (N, n, n)."""
     (inner, moving), (body,) = _memory(observer), observer.bodies
     memory = [*inner, *moving]
     s = observer.symbols()
@@ -430,22 +404,7 @@ def _memory(observer: FlatModel) -> tuple[list[int], list[int]]:
 def check_stability(
     observer: FlatModel, *, finer: int = 10, speeds: tuple[float, ...] = (0.0, 1.0)
 ) -> ErrorStability:
-    """Check, and where the structure allows prove, that the estimation error vanishes.
-
-    Parameters
-    ----------
-    observer
-        As :func:`~nlsdesign.feedback.observer.scheduling.scheduled.design_observer` gave it.
-    finer
-        How many times finer than its table the angles are.
-    speeds
-        Estimated speeds in rad/s at which the matrices are taken.
-
-    Raises
-    ------
-    ValueRangeError
-        If the model has no table over an angle.
-    """
+    """Check, and where the structure allows prove, that the estimation error vanishes."""
     tables, bodies = observer.tables, observer.bodies
     if len(tables) != 1 or [body.motion for body in bodies] != [tables[0].argument]:
         raise ValueRangeError(

@@ -33,12 +33,7 @@ from .table import Entry
 def held(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
     """Return Φ and Γ of x⁺ = Φx + Γu for an input that is held over the sample.
 
-    Parameters
-    ----------
-    a, b
-        Shapes (..., n, n) and (..., n, m); ẋ = A x + B u.
-    sample_time
-        T in s.
+    ``a``, ``b``: shapes (..., n, n) and (..., n, m); ẋ = A x + B u.
     """
     n, m = b.shape[-2:]
     block = np.zeros((*a.shape[:-2], n + m, n + m))
@@ -51,13 +46,6 @@ def linear(a: Array, sample_time: float) -> tuple[Array, Array, Array]:
     """Return Φ, Γ₀ and Γ₁ of x⁺ = Φx + Γ₀g₀ + Γ₁g₁ for a drive that runs linearly from g₀ to g₁.
 
     ẋ = A x + g(t). Source: Van Loan 1978.
-
-    Parameters
-    ----------
-    a
-        Shape (..., n, n).
-    sample_time
-        T in s.
     """
     n = a.shape[-1]
     block = np.zeros((*a.shape[:-2], 3 * n, 3 * n))
@@ -158,17 +146,7 @@ class FittedGain(Protocol):
     """What chooses the correction for all angles together, from the whole plant."""
 
     def fitted(self, plant: AngleScheduledPlant, sample_time: float, angles: Array) -> GainRule:
-        """Return the rule for each angle.
-
-        Parameters
-        ----------
-        plant
-            In the form that an observer is designed on.
-        sample_time
-            T in s.
-        angles
-            Angles that stand for the range, shape (N,).
-        """
+        """Return the rule for each angle."""
         ...
 
 
@@ -445,19 +423,7 @@ class ObserverStep:
     reference: Array
 
     def matrices(self, angles: Array) -> dict[str, Array]:
-        """Return the matrices of the step at many angles.
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-
-        Returns
-        -------
-        dict
-            ``prior`` (N, n, 1), ``correction`` (N, n, r), ``next`` (N, n, n + 1 + k + 1), ``estimate``
-            (N, 1, n + 1), ``shift`` (N, n, 1) and ``measured`` (N, r − 1, 1).
-        """
+        """Return the matrices of the step at many angles."""
         plant, c = self.plant, self.plant.at(angles)
         transition, _, _ = linear(c.a, self.sample_time)
         correction = [self._correction(*row) for row in zip(angles, c.a, transition, strict=True)]
@@ -511,13 +477,7 @@ class ObserverStep:
         }  # fmt: skip
 
     def entries(self, angles: Array) -> list[Entry]:
-        """Return all entries at many angles, with the key ``<matrix>[i][j]``.
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-        """
+        """Return all entries at many angles, with the key ``<matrix>[i][j]``."""
         matrices, entries = self.matrices(angles), []
         # The estimate first: where entries share a column, it is one that the estimate needs exactly.
         for kind in ("estimate", "next", "prior", "correction", "shift", "measured"):
@@ -586,22 +546,7 @@ def _per(unit: str, other: str) -> str:
 
 
 def without_correction(plant: AngleScheduledPlant, sample_time: float, angles: Array) -> dict[str, Array]:
-    """Return the matrices of the step at many angles that no gain decides.
-
-    Parameters
-    ----------
-    plant
-        In the form of an angle-scheduled plant.
-    sample_time
-        In s.
-    angles
-        Shape (N,).
-
-    Returns
-    -------
-    dict
-        As :meth:`ObserverStep.matrices`, without ``correction``.
-    """
+    """Return the matrices of the step at many angles that no gain decides."""
     c, n, count = plant.at(angles), len(plant.states), len(angles)
     transition, begin, end = linear(c.a, sample_time)
     if plant.measured:

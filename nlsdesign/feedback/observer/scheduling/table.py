@@ -125,37 +125,19 @@ class Compact:
     torque_error: TableTorqueError | None = None
 
     def size(self, bytes_per_number: int) -> int:
-        """Return the flash that values and breakpoints take, in bytes.
-
-        Parameters
-        ----------
-        bytes_per_number
-            4 for ``float``, 8 for ``double``.
-        """
+        """Return the flash that values and breakpoints take, in bytes."""
         if not self.columns:
             return 0
         return bytes_per_number * (self.values.size + (0 if self.uniform else len(self.angles)))
 
     def cost(self, unit: str) -> str:
-        """Return what the table costs in torque, as the end of a sentence; empty where it was not measured.
-
-        Parameters
-        ----------
-        unit
-            Of the estimate.
-        """
+        """Return what the table costs in torque, as the end of a sentence; empty if not measured."""
         if self.torque_error is None:
             return ""
         return f", which move the torque by at most {self.torque_error.largest:.2g} {typeset_unit(unit)}"
 
     def table(self, argument: str) -> Table | None:
-        """Return the table of a flat model; ``None`` where every entry is a literal.
-
-        Parameters
-        ----------
-        argument
-            Name of the angle.
-        """
+        """Return the table of a flat model; ``None`` where every entry is a literal."""
         if not self.columns:
             return None
         columns = tuple(
@@ -177,13 +159,7 @@ class ObserverWithTable(Protocol):
         ...
 
     def start(self, angle: float) -> dict[str, float]:
-        """Return the start values at rest at an angle.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return the start values at rest at an angle."""
         ...
 
 
@@ -223,18 +199,7 @@ class Grid(ABC):
 
 
 def check_range(lower: float, upper: float) -> None:
-    """Refuse a range that is not finite or not ascending.
-
-    Parameters
-    ----------
-    lower, upper
-        In rad.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is neither.
-    """
+    """Refuse a range that is not finite or not ascending."""
     if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
         raise ValueRangeError(f"range {lower:g} to {upper:g} rad", "must be finite and ascending")
 
@@ -341,23 +306,7 @@ def compacted(
 ) -> Compact:
     """Return the table of entries known on a fine grid, of which every so many points are kept.
 
-    Parameters
-    ----------
-    angles
-        Fine grid, uniform, shape (m·every + 1,).
-    fine
-        Entries on it.
-    every
-        Distance of the grid points kept.
-    tolerance
-        Of a sum; a share of it may be spent on literals and shared columns.
-    angle_error
-        As in :class:`GridByTolerance`.
-
-    Raises
-    ------
-    ConvergenceError
-        If an entry is not finite at some angle.
+    ``tolerance``: of a sum; a share of it may be spent on literals and shared columns.
     """
     columns: list[Entry] = []
     places: dict[str, ColumnPlace] = {}
@@ -383,14 +332,7 @@ def compacted(
 def place_of(entry: Entry, columns: list[Entry], allowed: float) -> ColumnPlace:
     """Return where an entry goes; it is added to the columns where it needs one of its own.
 
-    Parameters
-    ----------
-    entry
-        On the same angles as the columns.
-    columns
-        So far; may grow.
-    allowed
-        What a literal or a shared column may be off, in the unit of the entry.
+    ``columns``: so far; may grow.
     """
     low, high = float(np.min(entry.values)), float(np.max(entry.values))
     if (high - low) / 2.0 <= allowed:
@@ -455,22 +397,7 @@ class FineEntries:
 
     @staticmethod
     def of(entries: Entries, lower: float, upper: float, resolution: float) -> FineEntries:
-        """Return entries on a grid that is divided until they run straight within its cells.
-
-        Parameters
-        ----------
-        entries
-            Takes angles of shape (N,) and returns the entries there.
-        lower, upper
-            Range in rad.
-        resolution
-            In rad.
-
-        Raises
-        ------
-        ConvergenceError
-            If an entry is not finite at some angle.
-        """
+        """Return entries on a grid that is divided until they run straight within its cells."""
         angles = np.linspace(lower, upper, FIRST_CELLS + 1)
         known = _finite(entries(angles))
         values, weights = np.array([e.values for e in known]), np.array([[e.weight] for e in known])
@@ -495,13 +422,7 @@ class FineEntries:
         return np.array([e.values for e in self.entries])
 
     def placed(self, allowed: Array) -> PlacedEntries:
-        """Return where entries are read if each may be off by so much: as literals, alone or shared.
-
-        Parameters
-        ----------
-        allowed
-            By entry, in its unit, shape (entries,).
-        """
+        """Return where entries are read if each may be off by so much: as literals, alone or shared."""
         columns: list[Entry] = []
         places: dict[str, ColumnPlace] = {}
         for entry, off in zip(self.entries, allowed, strict=True):
@@ -515,19 +436,7 @@ class FineEntries:
 
 @dataclass(frozen=True, eq=False)
 class PlacedEntries:
-    """Entries that know where they will be read, but not on which grid.
-
-    Parameters
-    ----------
-    fine
-        The entries.
-    columns
-        Those that became columns.
-    places
-        By key.
-    allowed
-        What each entry may be off, in its unit, shape (entries,).
-    """
+    """Entries that know where they will be read, but not on which grid."""
 
     fine: FineEntries
     columns: tuple[Entry, ...]
@@ -603,14 +512,7 @@ class PlacedEntries:
 def linearly(grid: Array, values: Array, at: Array) -> Array:
     """Return columns at many angles, linear between grid points and held at the ends, shape (columns, N).
 
-    Parameters
-    ----------
-    grid
-        Ascending, shape (n,).
-    values
-        Shape (n, columns).
-    at
-        Angles, shape (N,).
+    ``values``: shape (n, columns).
     """
     held = np.clip(at, grid[0], grid[-1])
     left = np.clip(np.searchsorted(grid, held, side="right") - 1, 0, len(grid) - 2)

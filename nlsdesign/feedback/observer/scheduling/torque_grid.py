@@ -87,12 +87,7 @@ class TableTrial:
     def error(self, table: Compact, *, only: str | None = None) -> TableTorqueError:
         """Return the torque error that a table causes.
 
-        Parameters
-        ----------
-        table
-            Of the same entries.
-        only
-            Sum whose entries are read from it while the others are exact; all by default.
+        ``only``: sum whose entries are read from it while the others are exact; all by default.
         """
         columns = linearly(table.angles, table.values, self._seen)
         read = self._exactly.copy()
@@ -414,11 +409,5 @@ class _Search:
 
 
 def largest_of(table: Compact) -> float:
-    """Return the largest torque error of a table; infinite where it was not measured.
-
-    Parameters
-    ----------
-    table
-        Any.
-    """
+    """Return the largest torque error of a table; infinite where it was not measured."""
     return table.torque_error.largest if table.torque_error is not None else np.inf

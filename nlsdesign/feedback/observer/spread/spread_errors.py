@@ -236,15 +236,7 @@ def observer_errors(
 
 
 def relevant(prior: Prior, bench: ObserverBench) -> Prior:
-    """Return what is known of the numbers that the bench notices at all.
-
-    Parameters
-    ----------
-    prior
-        Of all numbers.
-    bench
-        The bench.
-    """
+    """Return what is known of the numbers that the bench notices at all."""
     model = bench.model
     s = model.symbols()
     everything = ca.vertcat(s.derivative, s.output, s.signal)

@@ -14,7 +14,6 @@ import pytest
 
 from nlsdesign.bench.calibration import (
     CalibrationTest,
-    Estimate,
     FreeRunTest,
     HungWeightTest,
     Instruments,
@@ -28,6 +27,7 @@ from nlsdesign.bench.calibration import (
 )
 from nlsdesign.bench.calibration.bench_response import BenchCourse, bench_response
 from nlsdesign.bench.calibration.bench_rows import RecordedRun, SampleNoise, rows_of, windows
+from nlsdesign.bench.calibration.estimate import Estimate
 from nlsdesign.components import Assembly, CoulombFriction
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from nlsdesign.bench.discrepancy.screening.causality import LaggingForces, lagging_forces
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import TRANSLATION, Driven, ForceSensor, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.simulation import Trace

@@ -10,7 +10,6 @@ from nlsdesign.bench.discrepancy.effects import (
     ALL,
     Candidate,
     Effect,
-    EffectFunction,
     Unknown,
     angle_sensor_eccentricity,
     backlash,
@@ -21,8 +20,8 @@ from nlsdesign.bench.discrepancy.effects import (
     permanent_set,
     self_heating,
     stress_softening,
-    wrapped,
 )
+from nlsdesign.bench.discrepancy.effects.effect import EffectFunction, wrapped
 from nlsdesign.bench.discrepancy.effects.places import stretched
 from nlsdesign.bench.discrepancy.selection.comparison import moved_numbers
 from nlsdesign.bench.discrepancy.tearing import blocks_of

@@ -22,8 +22,9 @@ from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.criteria import Criteria
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis, excesses
 from nlsdesign.bench.discrepancy.selection.measures import DECLARED
-from nlsdesign.bench.identification import Fit, Parameter
+from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.estimation.least_squares import Fit
 from nlsdesign.components import Assembly, Fixed, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.quantity import Quantity

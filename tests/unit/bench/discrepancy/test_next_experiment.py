@@ -19,9 +19,10 @@ from nlsdesign.bench.discrepancy.planning.separation import BlockResponse, Ready
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification import Column, Record, RecordSet, load_records
+from nlsdesign.bench.identification import Record, RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import ROTATION, Assembly, Dashpot, GearedMotor, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.arrays import Array

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import predict
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import TRANSLATION, Driven, ForceSensor, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import UnknownNameError

@@ -43,7 +43,7 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import Variable
 from nlsdesign.presentation import report
-from nlsdesign.presentation.figures import alternative_text
+from nlsdesign.presentation.figures.style import alternative_text
 
 
 def piece() -> Any:

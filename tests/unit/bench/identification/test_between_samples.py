@@ -11,11 +11,12 @@ import pytest
 
 from nlsdesign.bench.discrepancy.prediction import band_errors, predict
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import evidence
 from nlsdesign.bench.identification.equation_error.between_samples import on_clock, refined
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification import RecordSet, cut_in_time
+from nlsdesign.bench.identification import RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.records.measurement import Record
+from nlsdesign.bench.identification.records.measurement import Record, cut_in_time
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten

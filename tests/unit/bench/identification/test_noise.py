@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification import Column, Record, RecordSet
+from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Floor
 from nlsdesign.bench.identification.equation_error.noise import Noise, estimate_noise
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.statistics.coloured import NoisePart, independent_number
 from nlsdesign.bench.identification.statistics.residuals import effective_size
 from nlsdesign.components.assembly.deck_writer import declare

@@ -12,11 +12,12 @@ import pytest
 from nlsdesign.bench.discrepancy import ALL, diagnose, write_verdict
 from nlsdesign.bench.discrepancy.effects import backlash
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification import Column, Record, RecordSet, load_records
+from nlsdesign.bench.identification import Record, RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.estimation.least_squares import declared_parameter, fit
 from nlsdesign.bench.identification.records.canonical_order import in_canonical_order
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.quality import Finding
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare

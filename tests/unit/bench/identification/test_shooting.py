@@ -9,21 +9,20 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from nlsdesign.bench.identification import (
-    Fit,
     Huber,
     Record,
     Shots,
-    SimulationError,
     Weights,
-    fit_by_cma,
     fit_by_simulation,
     free_parameter,
     predict_in_windows,
-    profile_of,
-    wired,
 )
+from nlsdesign.bench.identification.estimation.least_squares import Fit
 from nlsdesign.bench.identification.estimation.parameters import Parameter
-from nlsdesign.bench.identification.output_error.simulation_error import Point
+from nlsdesign.bench.identification.estimation.profile import profile_of
+from nlsdesign.bench.identification.output_error.cma_es import fit_by_cma
+from nlsdesign.bench.identification.output_error.simulation_error import Point, SimulationError
+from nlsdesign.bench.identification.output_error.wiring import wired
 from nlsdesign.components import Dashpot, Mass, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError

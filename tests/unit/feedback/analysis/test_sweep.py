@@ -10,8 +10,10 @@ import pytest
 
 from nlsdesign.components import Dashpot, Mass, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.feedback.analysis import Chart, PointView, RestPoint, Stability, over_angle
+from nlsdesign.feedback.analysis import Chart, Stability, over_angle
 from nlsdesign.feedback.analysis.rest import rate_state, rest_states, typical_sizes
+from nlsdesign.feedback.analysis.rest_points import RestPoint
+from nlsdesign.feedback.analysis.sweep import PointView
 from nlsdesign.foundation.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.paper_form import paper_form

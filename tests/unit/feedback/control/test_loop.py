@@ -9,13 +9,13 @@ from nlsdesign.components import Driven
 from nlsdesign.feedback.control import (
     ClosedLoop,
     TorqueGains,
-    linear_loop,
     loop_margins,
     sine_response,
     torque_controller,
     tracking,
     zero_torque,
 )
+from nlsdesign.feedback.control.evaluation.linear_loop import linear_loop
 from nlsdesign.feedback.observer import FixedGrid, design_observer_with_details, observe
 from nlsdesign.foundation.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten

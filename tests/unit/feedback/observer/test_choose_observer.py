@@ -13,7 +13,6 @@ from nlsdesign.export import natively
 from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
-    Duty,
     ObserverDesign,
     PaperForm,
     SpreadErrors,
@@ -25,6 +24,7 @@ from nlsdesign.feedback.observer import (
     observer_bench,
     observer_errors,
 )
+from nlsdesign.feedback.observer.adaptive.duty_and_directions import Duty
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity

@@ -31,12 +31,11 @@ from nlsdesign.feedback.observer import (
     ObserverDesign,
     PaperForm,
     PolePlacement,
-    check_stability,
     design_observer,
     design_observer_with_details,
     observe,
 )
-from nlsdesign.feedback.observer.scheduling.scheduled import whole_contour
+from nlsdesign.feedback.observer.scheduling.scheduled import check_stability, whole_contour
 from nlsdesign.foundation.errors import (
     ArrangementError,
     ConvergenceError,

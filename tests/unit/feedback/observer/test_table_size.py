@@ -17,11 +17,10 @@ from nlsdesign.feedback.observer import (
     GridByTolerance,
     GridByTorqueError,
     ObserverDesign,
-    check_stability,
     design_adaptive_observer,
     design_observer_with_details,
 )
-from nlsdesign.feedback.observer.scheduling.scheduled import whole_contour
+from nlsdesign.feedback.observer.scheduling.scheduled import check_stability, whole_contour
 from nlsdesign.feedback.observer.scheduling.table import Entry, FineEntries, linearly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ConvergenceError, ValueRangeError
