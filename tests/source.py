@@ -6,7 +6,7 @@ import ast
 import bisect
 import builtins
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ MOST_LINES_IN_FILE = 400
 MOST_LINES_IN_FUNCTION = 50
 MOST_ARGUMENTS = 7
 MOST_METHODS = 12
+SECTIONS = ("Parameters", "Returns", "Yields", "Raises", "Warns", "Attributes")
 
 
 @dataclass(frozen=True)
@@ -171,11 +172,12 @@ def headings(document: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in found}
 
 
-def mismatched(file: Path, exceptions: Mapping[str, str]) -> Iterator[str]:
+def mismatched(file: Path, exceptions: Mapping[str, str], exported: Container[str]) -> Iterator[str]:
     """Docstrings of public definitions that disagree with the code about parameters or exceptions.
 
-    Parameters are compared where a docstring has the section: the same names in the same order. ``Raises``
-    must list every class that the body itself raises, and only classes that exist.
+    An exported function documents its parameters, the same names in the same order; classes and methods,
+    many of which do what their base says, are compared where they have the section. What is exported lists
+    below ``Raises`` every class that the body itself raises, and only classes that exist.
 
     Parameters
     ----------
@@ -183,15 +185,21 @@ def mismatched(file: Path, exceptions: Mapping[str, str]) -> Iterator[str]:
         Module.
     exceptions
         What may be raised: name of a class, or of a function that returns an exception, and the class.
+    exported
+        Functions and classes of the module that users are offered.
     """
     for definition in public_definitions(parse(file)):
         text = ast.get_docstring(definition.node)
         if not text or _speaks_for_another(definition.node) or _is_command(definition.node):
             continue
         where = f"line {definition.line}: {definition.name}"
+        offered = definition.name.partition(".")[0] in exported
         written, actual = documented(text, "Parameters"), signature(definition.node)
-        if written and written != actual:
+        asked = definition.name in exported and isinstance(definition.node, Function)
+        if written != actual and (written or asked):
             yield f"{where} documents the parameters {written}, the signature has {actual}"
+        if not offered:
+            continue
         listed, raised = documented(text, "Raises"), raises(definition.node, exceptions)
         for name in raised:
             if name not in listed:
@@ -199,6 +207,31 @@ def mismatched(file: Path, exceptions: Mapping[str, str]) -> Iterator[str]:
         for name in listed:
             if name not in exceptions.values():
                 yield f"{where} lists {name}, which is no exception"
+
+
+def overdocumented(file: Path, exported: Container[str]) -> Iterator[str]:
+    """Docstrings with sections that only what is exported has; of any class the fields may be documented."""
+    for name, node in definitions(parse(file)):
+        first, *inner = name.split(".")
+        if (first in exported and not any(map(is_private, inner))) or _is_command(node):
+            continue
+        found = re.findall(
+            rf"^({'|'.join(SECTIONS)})\n-+$", ast.get_docstring(node) or "", flags=re.MULTILINE
+        )
+        for section in found:
+            if section not in ("Parameters", "Attributes") or not isinstance(node, ast.ClassDef):
+                yield f"line {node.lineno}: {name} is not exported and has a section {section}"
+
+
+def definitions(tree: ast.AST, within: str = "") -> Iterator[tuple[str, Function | ast.ClassDef]]:
+    """All functions and classes with their dotted names; those inside a function stand below ``_``."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, Function | ast.ClassDef):
+            yield within + node.name, node
+            inside = "" if isinstance(node, ast.ClassDef) else "_."
+            yield from definitions(node, f"{within}{node.name}.{inside}")
+        else:
+            yield from definitions(node, within)
 
 
 def documented(text: str, section: str) -> list[str]:

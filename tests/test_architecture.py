@@ -79,7 +79,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"reporting"}, {"diagnose"},
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
-    "feedback.observer": ({"scheduling"}, {"certificates", "adaptive"}, {"spread"}),
+    "feedback.observer": ({"scheduling"}, {"adaptive"}, {"certificates"}, {"spread"}),
     "feedback.control": ({"laws"}, {"closed_loop"}, {"evaluation"}, {"tuning"}),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "target", "modelica"}, {"ssp"}),
 }  # fmt: skip

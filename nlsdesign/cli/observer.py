@@ -82,7 +82,7 @@ def observer(
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
-    from .observer_certificate import prove, with_statement, write_proved
+    from .observer_certificate import prove
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
     drawn = context.get_parameter_source("draws") is not click.core.ParameterSource.DEFAULT
@@ -102,11 +102,11 @@ def observer(
     if options["with_errors"]:
         with steps.step("errors over the spread"):
             errors = spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
-    model = chosen.model if proved is None else with_statement(certified_design(proved, plant).model, proved)
+    model = chosen.model if proved is None else proved.stated(certified_design(proved, plant).model)
     source = export_c(model, out, real=real, name="observer")
     files = [source.header, source.source, source.selftest]
     if proved is not None:
-        files.insert(0, write_proved(proved, out, source))
+        files.insert(0, proved.write_beside(source.header, source.source))
     statement = () if proved is None else proved.statement
     remarks = range_remarks(declared, measured=options["measured"])
     warn(remarks)

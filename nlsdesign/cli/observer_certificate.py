@@ -16,15 +16,13 @@ from .output import examples, json_option, show_json
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..export import CSource
-    from ..feedback.observer import AdaptiveDesign, Certificate, HeldEstimateCertificate
-    from ..feedback.observer.certificates import Proof
-    from ..feedback.observer.certificates.verification import WritesCode
+    from ..feedback.observer import Certificate, Contraction
     from ..foundation.deck import Deck
     from ..model import FlatModel
     from .observer_kinds import DesignedObserver
 
 CERTIFICATE = "certificate.json"
+"""File that is announced; the library is not loaded for it."""
 
 
 def range_options(command: Any) -> Any:
@@ -71,7 +69,9 @@ class ToProve:
     ranges: Mapping[str, Any] = field(default_factory=dict)
 
 
-def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve) -> Certificate:
+def prove(
+    plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve
+) -> Certificate[Contraction]:
     """Prove what can be proved of an observer."""
     from ..feedback.observer import ObserverDesign, certify, declared_assumptions
 
@@ -84,51 +84,6 @@ def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProv
     assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=wanted.real, **wanted.ranges)
     text = deck.path.read_text(encoding="utf-8-sig")
     return certify(plant, design, assumptions=assumed, decay=wanted.decay, deck=(deck.name, text))
-
-
-def with_statement(observer: FlatModel, proved: Proof) -> FlatModel:
-    """Return an observer whose description, and so the head of its C code, ends with what is proved."""
-    words = " ".join(proved.statement)
-    return replace(observer, description=f"{observer.description}; certified, see {CERTIFICATE}: {words}")
-
-
-def write_proved(proved: Certificate | HeldEstimateCertificate, out: Path, source: CSource) -> Path:
-    """Write the certificate beside the C code, with the hashes of both files."""
-    from ..feedback.observer import write_certificate
-
-    return write_certificate(replace(proved, code=_hashes(source.header, source.source)), out / CERTIFICATE)
-
-
-def _hashes(*files: Path) -> dict[str, str]:
-    from ..feedback.observer.certificates.certificate import hashes_of_code
-
-    (folder,) = {file.parent for file in files}
-    result = hashes_of_code(folder)
-    return {file.name: result[file.name] for file in files}
-
-
-def written_anew(proved: Proof) -> WritesCode:
-    """Return what writes the C code of a certificate as the commands do, with its sentences in the head."""
-    from ..export import export_c
-
-    def write(observer: FlatModel, folder: Path, /, *, real: str, name: str) -> object:
-        return export_c(with_statement(observer, proved), folder, real=real, name=name)
-
-    return write
-
-
-def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | None:
-    """Return the adaptive observer of a certificate, designed again from its deck; ``None`` for any other."""
-    from ..feedback.observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
-
-    if model is None or not isinstance(proved, HeldEstimateCertificate):
-        return None
-    numbers = dict(proved.settings)
-    trust = Trust(most=int(numbers.pop("most")), **numbers)
-    return design_adaptive_observer(
-        model.with_values(dict(proved.parameters)), estimate=proved.estimate, measured=proved.measured,
-        sample_time=proved.sample_time, settings=AdaptiveSettings(trust=trust),
-    )  # fmt: skip
 
 
 @click.command(
@@ -150,6 +105,7 @@ def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | 
 def verify_certificate(certificate: Path, deck_name: str | None, code: Path | None, as_json: bool) -> None:
     """Check a certificate again, without the solver; exit status 1 where it does not hold."""
     from ..components.assembly.deck_writer import declare
+    from ..export import export_c
     from ..feedback.observer import CodeToCompare, read_certificate, verify
     from ..foundation.deck import load_deck, read_deck
     from ..model import flatten
@@ -160,8 +116,7 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     model = flatten(declare(read_deck(text, Path(f"{name}.toml")))) if text else None
     result = verify(
         proved, untouched=untouched, model=model, deck=given,
-        code=None if code is None else CodeToCompare(code, written_anew(proved)),
-        design=learning_design(proved, model),
+        code=None if code is None else CodeToCompare(code, export_c),
     )  # fmt: skip
     if as_json:
         checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in result.checks]

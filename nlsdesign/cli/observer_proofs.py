@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .observer_certificate import CERTIFICATE, given_ranges, range_options, with_statement, write_proved
+from .observer_certificate import CERTIFICATE, given_ranges, range_options
 from .output import DECK_HELP, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import c_names, out_option
 from .units import Number
@@ -75,7 +75,7 @@ def certify_continuous_gain(
     )  # fmt: skip
     proved = replace(proved, deck=text)
     path = write_certificate(proved, out / CERTIFICATE)
-    gains = dict(zip(proved.system.states, proved.gain, strict=True))
+    gains = dict(zip(proved.proof.system.states, proved.proof.gain, strict=True))
     rows = [f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}" for name, row in gains.items()]
     show_written(as_json, (*proved.statement, *rows), [path], gains=gains)
 
@@ -121,6 +121,6 @@ def certify_adaptive_estimate(
     )  # fmt: skip
     assumed = replace(held_assumptions(plant, design), real=real, **given_ranges(options))
     proved = certify_held_estimate(plant, design, assumptions=assumed, settings=asdict(trust), deck=text)
-    source = export_c(with_statement(design.model, proved), out, real=real, name="observer")
-    path = write_proved(proved, out, source)
+    source = export_c(proved.stated(design.model), out, real=real, name="observer")
+    path = proved.write_beside(source.header, source.source)
     show_written(as_json, proved.statement, [path, source.header, source.source, source.selftest])

@@ -21,7 +21,7 @@ from nlsdesign.feedback.observer import (
     Assumptions,
     CascadeGain,
     FixedGrid,
-    HeldEstimateCertificate,
+    HeldEstimate,
     Trust,
     certify_held_estimate,
     design_adaptive_observer,
@@ -139,11 +139,13 @@ def test_a_file_is_checked_again_with_the_observer(tmp_path: Path) -> None:
     proved = certify_held_estimate(model, design, assumptions=ranges, settings=asdict(design.trust))
     path = write_certificate(proved, tmp_path / "certificate.json")
     again, untouched = read_certificate(path)
-    assert isinstance(again, HeldEstimateCertificate)
+    assert isinstance(again.proof, HeldEstimate)
     assert untouched
     assert verify(again, untouched=untouched, model=model, design=design).holds
-    assert [c.holds for c in verify(again, model=model).checks] == [True, None]
-    forged = replace(proved, bound=replace(proved.bound, learned=0.9 * proved.bound.learned))
+    assert [c.holds for c in verify(again).checks] == [True, None]
+    assert [c.holds for c in verify(again, model=model).checks] == [True, True], "designed again"
+    smaller = replace(proved.proof.bound, learned=0.9 * proved.proof.bound.learned)
+    forged = replace(proved, proof=replace(proved.proof, bound=smaller))
     read, untouched = read_certificate(write_certificate(forged, path))
     found = verify(read, untouched=untouched, model=model, design=design)
     assert untouched

@@ -1,24 +1,26 @@
 """What is proved of an observer: gains and Lyapunov functions from matrix inequalities, files of proof.
 
-``spread`` and the rooms above may import it; it builds on ``scheduling``.
+``spread`` and the rooms above may import it; it builds on ``scheduling`` and ``adaptive``.
 It never trusts the solver: what is written is checked in exact or interval arithmetic.
 """
 
-from .certificate import Certificate, certify, declared_assumptions
-from .certificate_file import Proof, read_certificate, write_certificate
+from .certificate import CERTIFICATE, Certificate, Proof, write_certificate
 from .co_design import CertifiedGain
-from .continuous import ContinuousCertificate, certify_continuous
-from .held_estimate import HeldEstimateCertificate, certify_held_estimate, clamped_estimate_bound
+from .continuous import ContinuousContraction, certify_continuous
+from .contraction import Contraction, certify, declared_assumptions
+from .held_estimate import HeldEstimate, certify_held_estimate, clamped_estimate_bound
 from .torque_bound import Assumptions
-from .verification import CodeToCompare, Verification, certified_design, verify
+from .verification import CodeToCompare, Verification, certified_design, read_certificate, verify
 
 __all__ = [
+    "CERTIFICATE",
     "Assumptions",
     "Certificate",
     "CertifiedGain",
     "CodeToCompare",
-    "ContinuousCertificate",
-    "HeldEstimateCertificate",
+    "ContinuousContraction",
+    "Contraction",
+    "HeldEstimate",
     "Proof",
     "Verification",
     "certified_design",

@@ -1,43 +1,53 @@
-"""A certificate: what is proved of one observer, under which assumptions, with all numbers of the proof."""
+"""A certificate: what is proved of one observer, with all numbers of the proof, as a JSON file.
+
+A stranger can read the file and check it again. It begins alike for every proof; only the numbers differ.
+"""
 
 from __future__ import annotations
 
 import hashlib
-import math
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from fractions import Fraction
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
-import numpy as np
-
-from ....foundation.arrays import Array
-from ....foundation.errors import ArrangementError, ConvergenceError, MeasurementError, ValueRangeError
-from ....foundation.prefixes import shared_prefix, without_power
+from ....foundation.errors import MeasurementError
+from ....foundation.writing import write_text
 from ....model import FlatModel
-from ..scheduling.scheduled import ObserverDesign
-from ..scheduling.step import ConstantGain
-from .co_design import fastest, lyapunov_function
-from .exact import (
-    Matrix,
-    combined,
-    exact,
-    exponential_below,
-    identity,
-    is_positive_definite,
-    times,
-    transposed,
-)
-from .polytope import ErrorPolytope, error_polytope
-from .torque_bound import Assumptions, TorqueErrorBound, torque_bound
 
-LITERALS = 1e-5
-"""Part of the contraction kept for numbers that the C code rounds: four roundings of a float in each entry of
-three by three, 7e-7 together, times the ten that the norm of P can make of it at condition 100."""
+FORMAT = "nlsdesign observer certificate 1"
+CERTIFICATE = "certificate.json"
+"""Name of the file beside the C code."""
+
+
+class Proof(Protocol):
+    """What is proved, with its numbers."""
+
+    form: ClassVar[str]
+    """Format of its file."""
+    sampled: ClassVar[bool]
+    """Whether the proof is one of an observer that runs as C code."""
+
+    @property
+    def statement(self) -> tuple[str, ...]:
+        """Sentences on what is proved, and what is not."""
+        ...
+
+    def observer(self) -> dict[str, Any]:
+        """Return what a file says of the observer beside the names of its torque and angle."""
+        ...
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the proof as JSON holds them."""
+        ...
+
+
+ProofT = TypeVar("ProofT", bound=Proof, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Generic[ProofT]):
     """What is proved of one observer.
 
     Parameters
@@ -48,212 +58,95 @@ class Certificate:
         Values of the model by name.
     estimate, measured
         Torque and angle by name.
-    gain
-        M, one row per state.
-    polytope
-        All that one sample can do to the error.
-    lyapunov
-        P in scaled states, shape (n, n).
-    decay
-        In 1/s: √(eᵀPe) falls at least with e^(−decay·t).
-    condition
-        Bound on the condition of P.
-    assumptions
-        Of the bound on the torque.
-    torque
-        The bound, or why there is none.
+    proof
+        What is proved, with its numbers.
     code
-        SHA-256 of the C files by name.
+        SHA-256 of the C files by name; empty where none were written.
     """
 
     deck: tuple[str, str]
     parameters: Mapping[str, float]
     estimate: str
     measured: str
-    gain: ConstantGain
-    polytope: ErrorPolytope
-    lyapunov: Array
-    decay: float
-    condition: float
-    assumptions: Assumptions
-    torque: TorqueErrorBound | str
-    code: Mapping[str, str]
+    proof: ProofT
+    code: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def statement(self) -> tuple[str, ...]:
         """Return in sentences what is proved, and what is not."""
-        low, high = self.polytope.friction
-        friction = (
-            "the plant has no dry friction"
-            if (low, high) == (1.0, 1.0)
-            else "dry friction included, as a sector: of a difference of speed it leaves "
-            f"between {low:g} and {high:g} times"
-        )
-        first = (
-            f"Two runs of this observer on the same signals approach each other at least with "
-            f"e^(-{self.decay:.6g} t), in the norm of P (condition at most {self.condition:g}), for every "
-            f"sequence of measured angles and every current, in exact arithmetic; {friction}."
-        )
-        if isinstance(self.torque, str):
-            return first, f"No bound on the torque error is certified: {self.torque}."
-        a, t = self.assumptions, self.torque
-        factor, unit = shared_prefix([t.total, *t.causes.values()], "N*m")
-        total = f"{without_power(factor * t.total, 4)} {unit}"
-        causes = ", ".join(f"{name} {without_power(factor * value)}" for name, value in t.causes.items())
-        second = (
-            "Once a wrong start is forgotten, the estimated torque is at the instants of sampling within "
-            f"{total} of that of the deck's model ({causes} {unit}), for every current "
-            f"and friction, every motion from {a.angles[0]:.4g} to {a.angles[1]:.4g} rad with at most "
-            f"{a.speed:g} rad/s, an angle measured to {a.angle_error:.3g} rad, and "
-            f"{sum(v > 0.0 for v in a.spreads.values())} parameters of the spring anywhere in their ranges, "
-            f"computed in {a.real}."
-        )
-        third = "Not covered: effects that the deck does not declare, and late or lost samples."
-        return first, second, third
+        return self.proof.statement
+
+    def stated(self, observer: FlatModel) -> FlatModel:
+        """Return an observer whose description, and so the head of its C code, ends with what is proved.
+
+        Parameters
+        ----------
+        observer
+            As designed.
+        """
+        text = f"{observer.description}; certified, see {CERTIFICATE}: {' '.join(self.statement)}"
+        return replace(observer, description=text)
+
+    def write_beside(self, *files: Path) -> Path:
+        """Write the certificate beside C files, with their hashes.
+
+        Parameters
+        ----------
+        files
+            Sources and headers, in one folder.
+
+        Raises
+        ------
+        MeasurementError
+            If one cannot be read.
+        ExportError
+            If the certificate cannot be written.
+        """
+        (folder,) = {file.parent for file in files}
+        hashes = hashes_of_code(folder)
+        named = replace(self, code={file.name: hashes[file.name] for file in files})
+        return write_certificate(named, folder / CERTIFICATE)
 
 
-def certify(
-    model: FlatModel,
-    design: ObserverDesign,
-    *,
-    assumptions: Assumptions | None = None,
-    decay: float | None = None,
-    condition: float = 100.0,
-    deck: tuple[str, str] = ("", ""),
-    code: Path | None = None,
-) -> Certificate:
-    """Prove what can be proved of an observer.
+def certificate_text(certificate: Certificate[Proof]) -> str:
+    """Return the JSON text of a certificate."""
+    name, text = certificate.deck
+    content: dict[str, Any] = {
+        "format": certificate.proof.form,
+        "statement": list(certificate.statement),
+        "deck": {"name": name, "sha256": hashlib.sha256(text.encode()).hexdigest(), "text": text},
+        "parameters": dict(certificate.parameters),
+        "observer": {
+            "estimate": certificate.estimate,
+            "measured": certificate.measured,
+            **certificate.proof.observer(),
+        },
+        **certificate.proof.numbers(),
+    }
+    if certificate.proof.sampled:
+        content["code"] = dict(certificate.code)
+    sorted_text = json.dumps(content, sort_keys=True, ensure_ascii=True, separators=(",", ":"))
+    content["checksum"] = hashlib.sha256(sorted_text.encode()).hexdigest()
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def write_certificate(certificate: Certificate[Proof], path: str | Path) -> Path:
+    """Write a certificate as JSON.
 
     Parameters
     ----------
-    model
-        Continuous; what the observer was designed on.
-    design
-        The observer; its gain may be any that is the same at every angle.
-    assumptions
-        Of the bound on the torque; :func:`declared_assumptions` by default.
-    decay
-        To be proved, in 1/s; 98 % of the fastest that can be by default.
-    condition
-        Largest condition of P.
-    deck
-        Name and text.
-    code
-        Folder of the C files of the observer.
+    certificate
+        What is proved.
+    path
+        Name of the file.
 
     Raises
     ------
-    ConvergenceError
-        If no Lyapunov function is found: nothing is proved then, and nothing refuted.
-    ValueRangeError
-        If the decay that is asked for is faster than can be proved, with the fastest that can; or the gain
-        differs from angle to angle.
+    ExportError
+        If the file cannot be written.
     """
-    polytope = error_polytope(design)
-    if any(e.column is not None for row in polytope.correction for e in row):
-        raise ValueRangeError(
-            "gain of the observer", "differs from angle to angle; a certificate is for one constant gain",
-            next_step="take CertifiedGain or CascadeGain",
-        )  # fmt: skip
-    errors = polytope.corners()
-    if not np.all(np.isfinite(errors)):
-        raise ConvergenceError("certificate", "the slope of dry friction has no bound over the speeds")
-
-    decay, lyapunov = _proved(polytope, errors, decay, condition)
-    assumed = assumptions or declared_assumptions(model, design)
-    try:
-        torque: TorqueErrorBound | str = torque_bound(model, design, assumed)
-    except ArrangementError as error:
-        torque = f"{error.thing} {error.rule}"  # the contraction holds without it; the file says why
-    plant = design.step.plant
-    return Certificate(
-        deck=deck, parameters=model.values, estimate=plant.estimate.name, measured=plant.angle,
-        gain=ConstantGain(tuple(tuple(e.factor for e in row) for row in polytope.correction)),
-        polytope=polytope, lyapunov=lyapunov, decay=decay, condition=condition, assumptions=assumed,
-        torque=torque, code={} if code is None else hashes_of_code(code),
-    )  # fmt: skip
-
-
-def _proved(
-    polytope: ErrorPolytope, errors: Array, decay: float | None, condition: float
-) -> tuple[float, Array]:
-    """Return a decay and P, proposed by the solver, rounded, and decided in fractions."""
-    time = polytope.sample_time
-
-    def proposed(rate: float) -> Array | None:
-        p = lyapunov_function(errors, math.exp(-2.0 * rate * time), condition / 1.001)
-        if p is None:
-            return None
-        rounded = np.array([[float(f"{v:.10g}") for v in row] for row in p])
-        return rounded if contracts(polytope, rounded, rate) else None
-
-    if decay is not None:
-        lyapunov = proposed(decay)
-        if lyapunov is not None:
-            return decay, lyapunov
-    best = fastest(proposed, 20.0 / time)
-    if best is None:
-        raise ConvergenceError(
-            "certificate", f"no quadratic Lyapunov function of condition {condition:g} was found",
-            next_step="design the observer with CertifiedGain, or allow a larger condition",
-        )  # fmt: skip
-    if decay is not None:
-        raise ValueRangeError(
-            f"decay {decay:g} 1/s", f"cannot be proved; the fastest that can is {best[0]:.4g} 1/s",
-            next_step=f"ask for at most {0.98 * best[0]:.3g} 1/s",
-        )  # fmt: skip
-    slower = float(f"{0.98 * best[0]:.6g}")
-    lyapunov = proposed(slower)
-    return best if lyapunov is None else (slower, lyapunov)
-
-
-def declared_assumptions(model: FlatModel, design: ObserverDesign) -> Assumptions:
-    """Return the whole table, half a count of the encoder, and no deviation of any parameter.
-
-    Parameters
-    ----------
-    model
-        Its readings say how the angle is measured.
-    design
-        The observer.
-    """
-    grid, plant = design.compact.angles, design.step.plant
-    named = [
-        model.values[f"{sensor}.quantum"]
-        for reading in model.readings
-        if reading.measured == plant.angle
-        for sensor in reading.sensors
-        if f"{sensor}.quantum" in model.values
-    ]
-    return Assumptions((float(grid[0]), float(grid[-1])), angle_error=max(named, default=0.0) / 2.0)
-
-
-def contracts(polytope: ErrorPolytope, lyapunov: Array, decay: float) -> bool:
-    """Return whether √(eᵀPe) falls with e^(−decay·T) at every corner, decided in fractions.
-
-    ``lyapunov``: P, shape (n, n).
-    """
-    p = exact(lyapunov)
-    if not is_positive_definite(p):
-        return False
-    keep = exponential_below(Fraction(decay) * Fraction(polytope.sample_time)) * (1 - Fraction(LITERALS))
-    for error in polytope.exact_corners():
-        left = times(transposed(error), times(p, error))
-        if not is_positive_definite(combined(p, left, first=keep * keep, second=Fraction(-1))):
-            return False
-    return True
-
-
-def within_condition(lyapunov: Array, condition: float) -> bool:
-    """Return whether 1 ⪯ P ⪯ condition, decided in fractions up to a millionth.
-
-    ``lyapunov``: P, shape (n, n).
-    """
-    p, one = exact(lyapunov), identity(len(lyapunov))
-    margin = Fraction(1, 10**6)
-    above: Matrix = combined(p, one, first=Fraction(1), second=-(1 - margin))
-    below: Matrix = combined(one, p, first=Fraction(condition) * (1 - margin), second=Fraction(-1))
-    return is_positive_definite(above) and is_positive_definite(below)
+    write_text(Path(path), certificate_text(certificate))
+    return Path(path)
 
 
 def hashes_of_code(folder: Path) -> dict[str, str]:

@@ -8,18 +8,21 @@ Source: Boyd et al. 1994, sec. 5.1.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from fractions import Fraction
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
 from ....model import FlatModel
+from ....model.paper_form import PaperFormNames
 from ....model.roles import measured_motion, spring_torque
 from ..scheduling.angle_form import Minimal, PaperForm
 from ..scheduling.scheduled import whole_contour
+from .certificate import FORMAT, Certificate
 from .co_design import MARGIN, GainAndLyapunov, Inequality, fastest, minimised, noise_inequality
 from .error_system import ErrorSystem, error_system
 from .exact import combined, exact, is_positive_definite, times, transposed
@@ -29,18 +32,12 @@ BANDWIDTH = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class ContinuousCertificate:
-    """What is proved of one observer in continuous time.
+class ContinuousContraction:
+    """The error of an observer in continuous time decays, with one gain for every angle.
 
     Parameters
     ----------
-    deck
-        Name and text of the deck; empty where the model came from elsewhere.
-    parameters
-        Values of the model by name.
-    estimate, measured
-        Torque and angle by name.
-    form
+    states
         Which states the observer carries.
     gain
         L, one row per state, one number per measured output.
@@ -54,11 +51,10 @@ class ContinuousCertificate:
         Bound on the condition of P.
     """
 
-    deck: tuple[str, str]
-    parameters: Mapping[str, float]
-    estimate: str
-    measured: str
-    form: Minimal | PaperForm
+    form: ClassVar[str] = f"{FORMAT}, continuous time"
+    sampled: ClassVar[bool] = False
+
+    states: Minimal | PaperForm
     gain: tuple[tuple[float, ...], ...]
     system: ErrorSystem
     lyapunov: Array
@@ -80,6 +76,56 @@ class ContinuousCertificate:
             "with this decay. A controller samples: nothing is said of that here.",
         )
 
+    def observer(self) -> dict[str, Any]:
+        """Return what a file says of the observer beside the names of its torque and angle."""
+        form: dict[str, Any] = {"states": "minimal"}
+        if isinstance(self.states, PaperForm):
+            form = {"states": "published", "names": asdict(self.states.names)}
+        return {"form": form, "gain": [list(row) for row in self.gain]}
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the proof as JSON holds them."""
+        return {
+            "system": asdict(self.system),
+            "lyapunov": self.lyapunov.tolist(),
+            "decay": self.decay,
+            "condition": self.condition,
+        }
+
+    @classmethod
+    def read(cls, content: dict[str, Any]) -> ContinuousContraction:
+        """Return the proof that a file holds.
+
+        Parameters
+        ----------
+        content
+            Of the file.
+
+        Raises
+        ------
+        ValueError
+            If the states are not known, or a matrix does not have one row per state.
+        """
+        form, e = content["observer"]["form"], content["system"]
+        states: Minimal | PaperForm = Minimal()
+        if form["states"] == "published":
+            states = PaperForm(PaperFormNames(**form["names"]))
+        elif form["states"] != "minimal":
+            raise ValueError(f"form '{form['states']}' is not known")
+        low, high, gain = (
+            tuple(tuple(float(v) for v in row) for row in matrix)
+            for matrix in (e["lower"], e["upper"], content["observer"]["gain"])
+        )
+        system = ErrorSystem(
+            tuple(e["states"]), tuple(e["sizes"]), (e["moving"][0], e["moving"][1]), tuple(e["seen"]),
+            (e["angles"][0], e["angles"][1]), low, high,
+        )  # fmt: skip
+        n, lyapunov = len(system.states), np.array(content["lyapunov"], dtype=float)
+        square = all(len(m) == n and all(len(row) == n for row in m) for m in (low, high, lyapunov.tolist()))
+        if not square or [len(row) for row in gain] != [len(system.seen)] * n or min(system.sizes) <= 0.0:
+            raise ValueError("matrices do not have one row per state")
+        return cls(states, gain, system, lyapunov, float(content["decay"]), float(content["condition"]))
+
 
 def certify_continuous(
     model: FlatModel,
@@ -90,7 +136,7 @@ def certify_continuous(
     decay: float | None = None,
     condition: float = 100.0,
     angles: tuple[float, float] | None = None,
-) -> ContinuousCertificate:
+) -> Certificate[ContinuousContraction]:
     """Design one gain in continuous time together with the proof that every error vanishes.
 
     Parameters
@@ -131,11 +177,9 @@ def certify_continuous(
     form = form or Minimal()
     system = error_system(model, form, estimate=estimate, measured=measured, angles=over)
     solution, reached = _designed(system, decay, condition)
-    return ContinuousCertificate(
-        deck=("", ""), parameters=model.values, estimate=estimate, measured=measured, form=form,
-        gain=tuple(tuple(row) for row in solution.gain.tolist()), system=system, lyapunov=solution.lyapunov,
-        decay=reached, condition=condition,
-    )  # fmt: skip
+    gain = tuple(tuple(row) for row in solution.gain.tolist())
+    proof = ContinuousContraction(form, gain, system, solution.lyapunov, reached, condition)
+    return Certificate(("", ""), model.values, estimate, measured, proof)
 
 
 def _designed(system: ErrorSystem, decay: float | None, condition: float) -> tuple[GainAndLyapunov, float]:

@@ -12,8 +12,8 @@ depends on the limit, since a linear φ(s) may reach 1. That is decided here, on
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,10 +21,12 @@ from numpy.typing import ArrayLike
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....model import FlatModel
+from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
+from ..adaptive.duty_and_directions import AdaptiveSettings, Trust
 from ..scheduling.scheduled import ObserverDesign
-from ..scheduling.step import ObserverStep
-from ..scheduling.table import ColumnPlace, Compact
-from .certificate import declared_assumptions
+from ..scheduling.table import ColumnPlace
+from .certificate import FORMAT, Certificate, Proof
+from .contraction import assumptions_of, declared_assumptions, numbers_of
 from .exact import corners
 from .torque_bound import OPERATIONS, ROUNDING, SLACK, Assumptions, torque_bound
 
@@ -76,58 +78,6 @@ LARGEST = 100.0
 NARROWINGS = 5
 
 
-class LearningStep(Protocol):
-    """Step of an observer that learns."""
-
-    @property
-    def nominal(self) -> ObserverStep:
-        """With the declared numbers."""
-        ...
-
-    @property
-    def inner(self) -> int:
-        """Number of inner states."""
-        ...
-
-
-class Holding(Protocol):
-    """Settings that hold the slow states."""
-
-    @property
-    def limit(self) -> float:
-        """Largest size of a slow state, in deviations."""
-        ...
-
-    @property
-    def drift_time(self) -> float:
-        """Time in s in which a slow state fades."""
-        ...
-
-
-class LearningDesign(Protocol):
-    """An adaptive observer: inner states without correction, slow states within a limit."""
-
-    @property
-    def model(self) -> FlatModel:
-        """The observer."""
-        ...
-
-    @property
-    def step(self) -> LearningStep:
-        """Its step."""
-        ...
-
-    @property
-    def compact(self) -> Compact:
-        """Its table."""
-        ...
-
-    @property
-    def trust(self) -> Holding:
-        """Its settings."""
-        ...
-
-
 @dataclass(frozen=True)
 class HeldEstimateBound:
     """Largest distance of an adaptive observer's estimate from the deck's torque, in N·m.
@@ -156,7 +106,7 @@ class HeldEstimateBound:
 
 
 def held_estimate_bound(
-    model: FlatModel, design: LearningDesign, assumptions: Assumptions
+    model: FlatModel, design: AdaptiveDesign, assumptions: Assumptions
 ) -> HeldEstimateBound:
     """Return the largest distance of an adaptive observer's estimate from the torque of its deck.
 
@@ -190,7 +140,7 @@ def held_estimate_bound(
     )  # fmt: skip
 
 
-def _nominal(design: LearningDesign) -> ObserverDesign:
+def _nominal(design: AdaptiveDesign) -> ObserverDesign:
     """Return the observer with all slow states at zero, as far as its inner states and estimate go."""
     step = design.step.nominal
     rows = {f"correction[{i}][0]": ColumnPlace(0.0) for i in range(len(step.plant.names))}
@@ -201,7 +151,7 @@ def _nominal(design: LearningDesign) -> ObserverDesign:
 class _Table:
     """The table of an adaptive observer at its grid points; between them all of it is linear."""
 
-    def __init__(self, design: LearningDesign, rounding: float) -> None:
+    def __init__(self, design: AdaptiveDesign, rounding: float) -> None:
         # A slow state has faded by this share where the end of a sample is added.
         self.faded = -np.expm1(-design.step.nominal.sample_time / design.trust.drift_time)
         self.compact, plant = design.compact, design.step.nominal.plant
@@ -333,23 +283,17 @@ class _Table:
         return worst
 
 
-def held_assumptions(model: FlatModel, design: LearningDesign) -> Assumptions:
+def held_assumptions(model: FlatModel, design: AdaptiveDesign) -> Assumptions:
     """Return the whole table, and half a count of the encoder that the deck declares."""
     return declared_assumptions(model, _nominal(design))
 
 
 @dataclass(frozen=True, eq=False)
-class HeldEstimateCertificate:
-    """What is proved of an adaptive observer.
+class HeldEstimate:
+    """The estimate of an adaptive observer stays near the torque of its deck.
 
     Parameters
     ----------
-    deck
-        Name and text of the deck; empty where the model came from elsewhere.
-    parameters
-        Values of the model by name.
-    estimate, measured
-        Torque and angle by name.
     sample_time
         In s.
     settings
@@ -358,19 +302,15 @@ class HeldEstimateCertificate:
         Of the bound.
     bound
         The bound.
-    code
-        SHA-256 of the C files by name.
     """
 
-    deck: tuple[str, str]
-    parameters: Mapping[str, float]
-    estimate: str
-    measured: str
+    form: ClassVar[str] = f"{FORMAT}, held estimate"
+    sampled: ClassVar[bool] = True
+
     sample_time: float
     settings: Mapping[str, float]
     assumptions: Assumptions
     bound: HeldEstimateBound
-    code: Mapping[str, str]
 
     @property
     def statement(self) -> tuple[str, ...]:
@@ -387,16 +327,49 @@ class HeldEstimateCertificate:
             "and no convergence is claimed.",
         )
 
+    def observer(self) -> dict[str, Any]:
+        """Return what a file says of the observer beside the names of its torque and angle."""
+        return {"sample_time": self.sample_time, "settings": dict(self.settings)}
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the numbers of the proof as JSON holds them."""
+        bound = {"total": self.bound.total, **asdict(self.bound)}
+        return {"assumptions": numbers_of(self.assumptions), "bound": bound}
+
+    @classmethod
+    def read(cls, content: dict[str, Any]) -> HeldEstimate:
+        """Return the proof that a file holds.
+
+        Parameters
+        ----------
+        content
+            Of the file.
+        """
+        o, b = content["observer"], content["bound"]
+        boxes = {name: (float(box[0]), float(box[1])) for name, box in b["boxes"].items()}
+        bound = HeldEstimateBound(float(b["learned"]), float(b["cascade"]), float(b["limit"]), boxes)
+        return cls(float(o["sample_time"]), o["settings"], assumptions_of(content["assumptions"]), bound)
+
+
+def designed_again(certificate: Certificate[Proof], proof: HeldEstimate, model: FlatModel) -> AdaptiveDesign:
+    """Return the adaptive observer of a certificate, designed from its deck with its settings."""
+    numbers = dict(proof.settings)
+    trust = Trust(most=int(numbers.pop("most")), **numbers)
+    return design_adaptive_observer(
+        model.with_values(dict(certificate.parameters)), estimate=certificate.estimate,
+        measured=certificate.measured, sample_time=proof.sample_time, settings=AdaptiveSettings(trust=trust),
+    )  # fmt: skip
+
 
 def certify_held_estimate(
     model: FlatModel,
-    design: LearningDesign,
+    design: AdaptiveDesign,
     *,
     assumptions: Assumptions,
     settings: Mapping[str, float],
     deck: tuple[str, str] = ("", ""),
     code: Mapping[str, str] | None = None,
-) -> HeldEstimateCertificate:
+) -> Certificate[HeldEstimate]:
     """Certify that the estimate of an adaptive observer stays near the torque of its deck.
 
     Parameters
@@ -422,8 +395,7 @@ def certify_held_estimate(
         If the structure of the rubber allows none.
     """
     plant = design.step.nominal.plant
-    return HeldEstimateCertificate(
-        deck=deck, parameters=model.values, estimate=plant.estimate.name, measured=plant.angle,
-        sample_time=design.step.nominal.sample_time, settings=dict(settings), assumptions=assumptions,
-        bound=held_estimate_bound(model, design, assumptions), code={} if code is None else dict(code),
-    )  # fmt: skip
+    bound = held_estimate_bound(model, design, assumptions)
+    proof = HeldEstimate(design.step.nominal.sample_time, dict(settings), assumptions, bound)
+    code = {} if code is None else dict(code)
+    return Certificate(deck, model.values, plant.estimate.name, plant.angle, proof, code)

@@ -62,7 +62,7 @@ def test_ranges_are_those_that_are_given(run: Run, tmp_path: Path) -> None:
     words = ("--angles", "-20 deg", "10 deg", "--speed", "3 rad/s", "--angle-error", "0.1 mrad")
     assert run(*WORDS, *words, "--out", str(tmp_path))[0] == 0
     proved, _ = read_certificate(tmp_path / "certificate.json")
-    assumed = proved.assumptions  # type: ignore[union-attr]
+    assumed = proved.proof.assumptions  # type: ignore[union-attr]
     assert assumed.angles == pytest.approx((math.radians(-20.0), math.radians(10.0)))
     assert (assumed.speed, assumed.angle_error) == pytest.approx((3.0, 1e-4))
     status, out, err = run(*WORDS, "--angles", "0 deg", "200 deg", "--out", str(tmp_path / "o"))
@@ -104,7 +104,7 @@ def test_compiled_float_contracts_as_certified(tmp_path: Path, deck: str) -> Non
     model = flatten(declare(load_deck(deck)))
     design = design_observer_with_details(model, gain=CertifiedGain())
     proved = certify(model, design, assumptions=Assumptions((0.3, 0.32), real="float"))
-    polytope, draw = proved.polytope, np.random.default_rng(2)
+    polytope, draw = proved.proof.polytope, np.random.default_rng(2)
     size, end = np.array(polytope.sizes), 1.2 * float(design.compact.angles[-1])
     names = [v.name for v in design.model.states]
     begun = [
@@ -127,13 +127,13 @@ def test_compiled_float_contracts_as_certified(tmp_path: Path, deck: str) -> Non
         both = [step(u) for step in runs]
         assert {status for _, status in both} <= {0, OUT_OF_TABLE}
         apart = (both[0][0][shown] - both[1][0][shown]) / size
-        energy = math.sqrt(float(apart @ proved.lyapunov @ apart))
+        energy = math.sqrt(float(apart @ proved.proof.lyapunov @ apart))
         # Rounding: 6e-8 of states ten times their size, in the norm of a P of condition 100.
         if before > 1e-2:
             worst, seen = max(worst, (energy - 1e-5) / before), seen + 1
         before = energy
     assert seen > 20
-    limit = math.exp(-proved.decay * polytope.sample_time)
+    limit = math.exp(-proved.proof.decay * polytope.sample_time)
     assert worst <= limit
     assert worst > limit**6, "not far from what is proved"
 
