@@ -75,7 +75,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
     ),
     "bench.discrepancy": (
-        {"tearing"}, {"prediction"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"},
+        {"tearing"}, {"block_prediction"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"},
         {"reporting"}, {"diagnose"},
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),

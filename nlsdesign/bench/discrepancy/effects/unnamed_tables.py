@@ -35,7 +35,7 @@ from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.filters import derivative
-from ..prediction import shown_values
+from ..block_prediction import shown_values
 from ..tearing import blocks_of
 from .effect import Candidate, Unknown, wrapped
 from .friction import tied

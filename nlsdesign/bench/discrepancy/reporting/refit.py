@@ -29,7 +29,7 @@ from ...identification.records.canonical_order import in_canonical_order
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.statistics.metrics import rmse
-from ..prediction import shown_values
+from ..block_prediction import shown_values
 from ..screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from ..screening.wrong_numbers import out_of_reach
 from ..selection.comparison import Comparison

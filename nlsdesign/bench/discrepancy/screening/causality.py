@@ -18,7 +18,7 @@ from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.loop_work import Loop, loop_of
-from ..prediction import shown_values
+from ..block_prediction import shown_values
 
 _QUICK_OVER_SLOW = 3.0
 _SPANS = 50

@@ -28,9 +28,9 @@ from ...identification.equation_error.filter_choice import rate_span
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
+from ..block_prediction import shown_values
 from ..effects.places import efforts_of_ties
 from ..effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on
-from ..prediction import shown_values
 from ..selection.comparison import Comparison, Judged
 from ..selection.hypothesis import Hypothesis
 from ..tearing import blocks_of

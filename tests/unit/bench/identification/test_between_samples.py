@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.prediction import band_errors, predict
+from nlsdesign.bench.discrepancy.block_prediction import band_errors, predict
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import evidence
