@@ -20,8 +20,8 @@ from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.equation_error.filter_choice import rate_span
+from nlsdesign.bench.identification.filters import derivative
 from nlsdesign.bench.identification.records.measurement import Record
-from nlsdesign.bench.identification.statistics.filters import derivative
 from nlsdesign.components import Assembly
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.model import flatten

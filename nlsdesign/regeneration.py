@@ -20,7 +20,7 @@ import numpy as np
 
 from .bench.discrepancy.block_prediction import shown_values
 from .bench.identification import Record, RecordSet
-from .bench.identification.estimation.least_squares import Fit
+from .bench.identification.least_squares import Fit
 from .export import export_c, export_fmu
 from .feedback.observer import (
     AdaptiveDesign,

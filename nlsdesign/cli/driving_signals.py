@@ -183,8 +183,7 @@ def read_input_file(file: Path, model: FlatModel) -> tuple[Any, dict[str, Any]]:
     """
     import numpy as np
 
-    from ..bench.identification.records.csv_files import read_csv
-    from ..bench.identification.records.heads import heads_with_units, times_among
+    from ..bench.identification.records.csv_files import heads_with_units, read_csv, times_among
 
     try:
         table = read_csv(file)

@@ -11,7 +11,6 @@ import click
 
 from ..foundation.errors import NlsError
 from .controller import controller_of
-from .observer_kinds import observer_of
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -61,10 +60,13 @@ def export_machine(
     """
     from ..export import export_c, export_fmu
     from ..feedback.control import joined
+    from ..feedback.observer import designed_observer
 
     @cache
     def observing() -> FlatModel:
-        return observer or observer_of(plant, sample_time, spring=spring, measured=measured)
+        if observer is not None:
+            return observer
+        return designed_observer(plant, sample_time=sample_time, spring=spring, measured=measured).model
 
     @cache
     def controlling() -> FlatModel:

@@ -13,11 +13,10 @@ import click
 from ..foundation.errors import ExportError, ValueRangeError
 from ..foundation.prefixes import prefixed
 from ..foundation.quantity import typeset_unit
-from .observer_kinds import DesignedObserver, designed_observer
 from .units import Bytes, Number
 
 if TYPE_CHECKING:
-    from ..feedback.observer import GridByTorqueError
+    from ..feedback.observer import DesignedObserver, GridByTorqueError
     from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
     from ..model import FlatModel
 
@@ -91,6 +90,7 @@ def sized_observer(
 
     ``part_of``: makes what is exported of the observer; by default that is the observer alone.
     """
+    from ..feedback.observer import designed_observer
     from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
 
     each = 4 if real == "float" else 8
@@ -161,8 +161,8 @@ def _sized(designed: DesignedObserver, exported: FlatModel, real: str, *, needed
 def _measured(exported: FlatModel, real: str, *, needed: bool) -> int | None:
     """Return the flash of code and tables in bytes."""
     from ..export import export_c
-    from ..export.target.cross_build import controller_sizes
-    from ..export.target.processors import CORTEX_M4F
+    from ..export.compilation.processors import CORTEX_M4F
+    from ..export.compilation.target_build import controller_sizes
 
     with tempfile.TemporaryDirectory() as folder:
         source = export_c(exported, Path(folder), real=real, name="part")

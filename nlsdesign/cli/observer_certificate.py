@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from ..foundation.errors import ArrangementError
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json
 from .units import Number
-
-if TYPE_CHECKING:
-    from ..feedback.observer import Certificate, Contraction
-    from ..foundation.deck import Deck
-    from ..model import FlatModel
-    from .observer_kinds import DesignedObserver
 
 CERTIFICATE = "certificate.json"
 """File that is announced; the library is not loaded for it."""
@@ -45,45 +37,6 @@ def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the ranges that were given."""
     named = {name: options[name] for name in ("angles", "speed", "angle_error")}
     return {name: value for name, value in named.items() if value is not None}
-
-
-@dataclass(frozen=True)
-class ToProve:
-    """What is to be proved of an observer.
-
-    Parameters
-    ----------
-    decay
-        Of one certified gain in 1/s; the default gain is certified without it.
-    with_spread
-        Whether parameters may be anywhere within their spread.
-    real
-        ``"double"`` or ``"float"``.
-    ranges
-        Angles, speed and error of the angle by name, where they are not those that the deck declares.
-    """
-
-    decay: float | None
-    with_spread: bool
-    real: str
-    ranges: Mapping[str, Any] = field(default_factory=dict)
-
-
-def prove(
-    plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve
-) -> Certificate[Contraction]:
-    """Prove what can be proved of an observer."""
-    from ..feedback.observer import ObserverDesign, certify, declared_assumptions
-
-    design = chosen.design
-    if not isinstance(design, ObserverDesign):
-        raise ArrangementError(
-            f"observer of kind '{chosen.kind}'", "cannot be certified", next_step="take --kind certified"
-        )
-    spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if wanted.with_spread else {}
-    assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=wanted.real, **wanted.ranges)
-    text = deck.path.read_text(encoding="utf-8-sig")
-    return certify(plant, design, assumptions=assumed, decay=wanted.decay, deck=(deck.name, text))
 
 
 @click.command(

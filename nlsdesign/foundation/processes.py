@@ -159,13 +159,13 @@ def signals_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def ready_as_helper() -> None:
+def ready_as_helper(at_death_of_parent: signal.Signals = signal.SIGTERM) -> None:
     """Let the parent handle interruptions, and end at once when it asks for it or ends itself."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGTERM)
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, at_death_of_parent)
 
 
 def _call(number: int) -> Any:

@@ -12,7 +12,7 @@ from models import cam_rubber_actuator
 from nlsdesign.bench.discrepancy import diagnose
 from nlsdesign.bench.discrepancy.screening.causality import lagging_forces
 from nlsdesign.bench.identification import RecordSet, load_records
-from nlsdesign.bench.identification.statistics.loop_work import loop_of
+from nlsdesign.bench.identification.residuals import loop_of
 from nlsdesign.components import TRANSLATION, Assembly, Driven, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import load_deck

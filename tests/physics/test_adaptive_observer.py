@@ -10,7 +10,7 @@ from scipy.stats import truncnorm
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.analysis.rest import rest_states
 from nlsdesign.feedback.observer import (
     AdaptiveDesign,

@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from models import cam_rubber_actuator
 from nlsdesign.export import export_c, export_fmu
 from nlsdesign.export.c.guarded_step import GuardedModel
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import compile_library
-from nlsdesign.export.compilation.running_c import CompiledStep
 from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck

@@ -22,7 +22,7 @@ from models import one_sided_cable_drive
 from nlsdesign.components import VoltageDrivenMotor
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.export import export_c, export_fmu
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.analysis import Observability, Stability, over_angle
 from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.model import flatten

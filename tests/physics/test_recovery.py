@@ -31,11 +31,11 @@ from nlsdesign.export.c.guarded_step import (
     GuardedModel,
     index_bit,
 )
-from nlsdesign.export.compilation.cross_compiler import compile_program
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.control import TorqueGains, joined
 from nlsdesign.feedback.observer import design_adaptive_observer, design_observer_with_details
 from nlsdesign.foundation.errors import NlsError
+from tests.compiling import compile_program
 from tests.unguarded import unguarded
 
 DECK = "austin2015_figure_consistent"

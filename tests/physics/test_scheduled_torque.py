@@ -13,7 +13,7 @@ import nlsdesign as nls
 from nlsdesign.components import ROTATION, Driven, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.export import export_c, natively
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.control import (
     ClosedLoop,
     DisturbanceObserver,

@@ -19,7 +19,7 @@ import pytest
 
 import nlsdesign as nls
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.control import joined
 from nlsdesign.feedback.observer import design_observer_with_details
 from tests.unguarded import unguarded

@@ -12,8 +12,8 @@ import pytest
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.estimation.least_squares import Fit, fit
-from nlsdesign.bench.identification.estimation.parameters import declared_parameter
+from nlsdesign.bench.identification.least_squares import Fit, fit
+from nlsdesign.bench.identification.parameters import declared_parameter
 from nlsdesign.cli.studies import claims, run_study
 from nlsdesign.components import (
     Assembly,

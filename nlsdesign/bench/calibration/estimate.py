@@ -18,11 +18,10 @@ from ...foundation.quantity import three_digits, with_unit
 from ...model import flatten
 from ...simulation import Prior, declared_prior
 from ..identification import RecordSet, load_record
-from ..identification.estimation.covariance import Piece, inverse_information, robust_covariance
-from ..identification.estimation.levenberg_marquardt import Minimum, minimise
+from ..identification.covariance import Piece, inverse_information, robust_covariance
+from ..identification.least_squares import Minimum, huber_rows, minimise
 from ..identification.records.quality import Finding
 from ..identification.records.table_files import table_files
-from ..identification.statistics.losses import huber_rows
 from .bench_rows import BenchRows
 from .bench_test import WEIGHT, CalibrationTest
 from .unknowns import BenchEvidence, Unknowns, recorded_bench

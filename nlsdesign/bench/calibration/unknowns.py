@@ -16,7 +16,7 @@ from ...model.roles import driven_body
 from ...simulation import Prior, declared_prior
 from ..discrepancy.block_prediction import shown_values
 from ..identification import Record
-from ..identification.estimation.covariance import Piece
+from ..identification.covariance import Piece
 from .bench_response import BALANCE, BenchCourse, BenchResponse, bench_response, shared_factors
 from .bench_rows import BenchRows, RecordedRun, SampleNoise, rate_of, rows_of, window_length
 from .bench_test import WEIGHT, CalibrationTest, HungWeightTest

@@ -24,7 +24,7 @@ from ...foundation.writing import make_folder, write_text
 from ...model import flatten
 from ...model.derived_deck import derived
 from ..identification.equation_error.evidence import Bench
-from ..identification.estimation.least_squares import Fit
+from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from .effects import Candidate
 from .effects import catalogue as known_effects

@@ -25,10 +25,10 @@ from ...components.assembly.named_parts import Assembly
 from ...foundation.errors import ConvergenceError
 from ...model import flatten
 from ..identification.equation_error.evidence import Bench, Evidence
-from ..identification.estimation.least_squares import Fit, fit, predicted_cost
-from ..identification.estimation.parameters import Parameter
-from ..identification.statistics.filters import derivative
-from ..identification.statistics.metrics import rmse
+from ..identification.filters import derivative
+from ..identification.least_squares import Fit, fit, predicted_cost
+from ..identification.parameters import Parameter
+from ..identification.residuals import rmse
 from .tearing import blocks_of
 
 Key: TypeAlias = tuple[str, str]

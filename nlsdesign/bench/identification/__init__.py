@@ -1,13 +1,22 @@
-"""Measured records, noise, fits and their metrics."""
+"""Measured records, their noise, and fits of a model's numbers to them.
 
-from .estimation.parameters import Parameter, declared_parameter, free_parameter
-from .output_error.multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
-from .output_error.prediction import Prediction, predict_in_windows
-from .output_error.simulation_error import Shots, Weights
+``records`` reads files; ``equation_error`` drives pieces of a model with what was measured; ``least_squares``
+fits their numbers, and ``multiple_shooting`` those of a whole simulation. ``discrepancy``, ``calibration``
+and the rooms above may import it. It never changes the structure of a model.
+"""
+
+from .least_squares import Huber, Loss, Squares
+from .multiple_shooting import (
+    Prediction,
+    SimulatedFit,
+    coloured_sigma,
+    fit_by_simulation,
+    predict_in_windows,
+)
+from .parameters import Parameter, declared_parameter, free_parameter
 from .records.measurement import ColumnMap, Record, RecordSet, load_record, load_records
-from .statistics.losses import Huber, Loss, Squares
-from .statistics.metrics import Agreement, agreement, rmse
-from .statistics.residuals import noise_of
+from .residuals import Agreement, agreement, noise_of, rmse
+from .simulation_error import Shots, Weights
 
 __all__ = [
     "Agreement",

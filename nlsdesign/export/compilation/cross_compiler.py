@@ -172,11 +172,3 @@ def _windows(folder: Path) -> list[str | Path]:
     home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent
     headers = home / "lib" / "libc" / "include" / "any-windows-any"
     return ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]
-
-
-def compile_program(sources: Sequence[Path], target: Path, *, flags: Sequence[str] = STRICT) -> Path:
-    """Compile C files to a program for this machine."""
-    where = PLATFORMS[host_platform()]
-    arguments: list[str | Path] = ["-target", where.target, *BASELINE, "-O2", "-ffp-contract=off", *flags]
-    run_compiler([*arguments, *sources, "-lm", "-o", target], about=f"{sources[0].name} for {where.name}")
-    return target

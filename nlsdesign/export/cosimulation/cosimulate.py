@@ -30,8 +30,7 @@ from ...foundation.errors import ConvergenceError, ExportError, ValueRangeError,
 from ...simulation.signals import Sine
 from ...simulation.trace import Trace
 from .coupling import Stepping
-from .fmu_archive import unpack
-from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description
+from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description, unpack
 from .fmu_instance import FmuInstance
 from .isolation import IsolatedWork, Watch
 from .master import Master

@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...foundation.arrays import Array
-from .communication_points import rows_of, sample_times
-from .feeds import Curve, CurveFeed, Feed, GivenFeed, HeldFeed, LateFeed
+from .coupling import Curve, CurveFeed, Feed, GivenFeed, HeldFeed, LateFeed
 from .fmu_instance import FmuInstance
-from .run_plan import Link, Plan
+from .run_plan import Link, Plan, rows_of, sample_times
 from .wires import split_name
 
 

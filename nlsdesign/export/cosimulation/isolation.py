@@ -8,14 +8,12 @@ fork, the work is done in this process.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import faulthandler
 import json
 import mmap
 import os
 import select
 import signal
-import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -29,16 +27,14 @@ import numpy as np
 from ...foundation import errors
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError, NlsError
-from ...foundation.processes import signals_held
+from ...foundation.processes import ready_as_helper, signals_held
 from ...foundation.progress import Progress
-from .foreign_text import fit_to_show
+from .fmu_description import fit_to_show
 
 _LOOK = 0.05
 """Seconds between two looks at the process."""
 _GRACE = 1.0
 """Seconds for a process that has closed its end of the pipe to end by itself."""
-_DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of Linux."""
 OUTPUT_FILE = "output.txt"
 """What the libraries print, in the folder of the work."""
 
@@ -293,11 +289,7 @@ def _made_ready(folder: Path) -> None:
     """Make the new process one that can crash quietly and leaves interruptions to its owner."""
     with contextlib.suppress(OSError):  # its owner did so already
         os.setpgid(0, 0)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+    ready_as_helper(signal.SIGKILL)
     faulthandler.disable()
     import resource
 

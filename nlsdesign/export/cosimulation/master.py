@@ -16,7 +16,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError
-from .feeds import Curve
+from .coupling import Curve
 from .fmu_instance import FmuInstance
 from .instance_inputs import ConnectedInputs, InstanceInputs, due_by_row
 from .isolation import Watch

@@ -28,6 +28,7 @@ from .evaluation.responses import (
     tracking,
     zero_torque,
 )
+from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, evaluate_loop
 from .laws.known_drive import check_torque, largest_torque, only_side
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
 from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
@@ -48,9 +49,11 @@ __all__ = [
     "GivenRate",
     "LimitCycleOnset",
     "LoopChoice",
+    "LoopEvaluation",
     "LoopJudge",
     "LoopLimits",
     "LoopMargins",
+    "LoopRange",
     "LoopSpread",
     "LoopVerdict",
     "OutputImpedance",
@@ -72,6 +75,7 @@ __all__ = [
     "check_torque",
     "coupled_stability",
     "encoder_loop",
+    "evaluate_loop",
     "held_torque",
     "joined",
     "largest_gain",

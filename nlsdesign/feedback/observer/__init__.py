@@ -28,9 +28,16 @@ from .scheduling.scheduled import ErrorStability, ObserverDesign, design_observe
 from .scheduling.step import CascadeGain, ConstantGain, GainRule, PolePlacement, SteadyStateKalman
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
 from .scheduling.torque_grid import GridByTorqueError
-from .spread.choice import ObserverOfChoice, choose_observer, design_observer, least_torque_error
+from .spread.choice import (
+    DesignedObserver,
+    ObserverOfChoice,
+    choose_observer,
+    design_observer,
+    designed_observer,
+    least_torque_error,
+)
 from .spread.observer_bench import ObserverBench, observer_bench
-from .spread.spread_errors import SpreadErrors, observer_errors
+from .spread.spread_errors import SpreadErrors, errors_beside, observer_errors
 
 __all__ = [
     "AdaptiveDesign",
@@ -43,6 +50,7 @@ __all__ = [
     "ConstantGain",
     "ContinuousContraction",
     "Contraction",
+    "DesignedObserver",
     "ErrorStability",
     "EstimatorBound",
     "FixedGrid",
@@ -72,6 +80,8 @@ __all__ = [
     "design_adaptive_observer",
     "design_observer",
     "design_observer_with_details",
+    "designed_observer",
+    "errors_beside",
     "estimator_bound",
     "least_torque_error",
     "observe",

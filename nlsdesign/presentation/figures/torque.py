@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...bench.identification.statistics.metrics import Agreement
+from ...bench.identification.residuals import Agreement
 from ...design import Target
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError

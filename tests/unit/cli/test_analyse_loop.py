@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from nlsdesign.cli.analyse_loop import _loops, loop
-from nlsdesign.cli.loop_findings import stretches
 from nlsdesign.feedback.control import LoopVerdict, only_side, sine_response
+from nlsdesign.feedback.control.evaluation.whole_evaluation import stretches
 
 FINGER = str(Path(__file__).parents[3] / "models" / "templates" / "one-sided-finger.toml")
 

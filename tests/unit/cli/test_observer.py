@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli.observer_kinds import KINDS, designed_observer
+from nlsdesign.cli.observer_kinds import KINDS
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
-from nlsdesign.feedback.observer import choose_observer
+from nlsdesign.feedback.observer import choose_observer, designed_observer
+from nlsdesign.feedback.observer.spread import choice
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from tests.command_line import Run, run
@@ -59,6 +60,10 @@ def test_every_kind_is_written(run: Run, tmp_path: Path, kind: str) -> None:
         assert found["statement"][0] in head
         folder = str(tmp_path / "o")
         assert run("observer", "verify", f"{folder}/certificate.json", "--c", folder)[0] == 0
+
+
+def test_the_option_offers_the_kinds_that_can_be_designed() -> None:
+    assert KINDS == choice.KINDS
 
 
 def test_kinds_differ_in_their_gains() -> None:

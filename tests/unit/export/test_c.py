@@ -28,13 +28,14 @@ from nlsdesign.export.c.guarded_step import (
     GuardedModel,
     index_bit,
 )
-from nlsdesign.export.compilation.cross_compiler import STRICT, compile_program, run_compiler
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
 from nlsdesign.feedback.observer import design_adaptive_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel, Table, Variable
+from tests.compiling import compile_program
 from tests.hand_built import controller, observer, plant
 
 MODELS = {"observer": observer(), "controller": controller()}

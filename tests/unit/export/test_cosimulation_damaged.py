@@ -19,7 +19,7 @@ import pytest
 
 from nlsdesign.export import Stepping, cosimulate, export_fmu
 from nlsdesign.export.compilation.cross_compiler import compile_library
-from nlsdesign.export.cosimulation import fmu_archive
+from nlsdesign.export.cosimulation import fmu_description as fmu_archive
 from nlsdesign.export.fmi.fmu import fmi_headers
 from nlsdesign.foundation.errors import ConvergenceError, ExportError, NlsError
 from tests.child_processes import children

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +26,8 @@ from nlsdesign.export import (
     cosimulate,
     export_fmu,
 )
-from nlsdesign.export.cosimulation.communication_points import communication_points
+from nlsdesign.export.cosimulation.isolation import Watch
+from nlsdesign.export.cosimulation.run_plan import communication_points
 from nlsdesign.foundation.errors import (
     ConvergenceError,
     ExportError,
@@ -303,16 +305,29 @@ def test_roll_back_needs_fmus_that_can(tmp_path: Path, fmus: dict[str, Path]) ->
     np.testing.assert_allclose(run["meter.shown"], run.time, atol=1e-12)
 
 
-def test_a_long_run_says_how_far_it_is(fmus: dict[str, Path]) -> None:
-    notes: list[str] = []
+def test_a_run_says_how_far_it_is(fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The run waits at each row until that row has been told, so that no speed decides what is told."""
+    told, tell = os.pipe()
+    at_row = Watch.at_row
+
+    def waiting_at_row(watch: Watch, row: int) -> None:
+        at_row(watch, row)
+        watch(watch.cells[0], watch.cells[1])
+        heard = b""
+        while f"{0.1 * row:.3f} of".encode() not in heard:
+            heard += os.read(told, 4096)
 
     class Noted:
-        def note(self, text: str) -> None:
-            notes.append(text)
+        def __init__(self) -> None:
+            self.texts: list[str] = []
 
-    stepping = Stepping(2e-5, progress=Noted())
+        def note(self, text: str) -> None:
+            self.texts.append(text)
+            os.write(tell, text.encode())
+
+    monkeypatch.setattr(Watch, "at_row", waiting_at_row)
+    noted = Noted()
+    stepping = Stepping(0.1, progress=noted, patience=60.0)
     cosimulate(fmus=chosen(fmus, "clock"), wires={}, inputs={}, stop=0.6, step=stepping)
-    times = [float(text.split()[0]) for text in notes]
-    assert all(text.endswith(" of 0.6 s") for text in notes)
-    assert times == sorted(times)
-    assert len(set(times)) > 2
+    rows = [text for text, _ in itertools.groupby(noted.texts)]
+    assert rows[:7] == [f"{0.1 * row:.3f} of 0.6 s" for row in range(7)]

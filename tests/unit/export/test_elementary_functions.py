@@ -14,7 +14,8 @@ import pytest
 
 from nlsdesign.export.c.c_text import Real
 from nlsdesign.export.c.elementary import elementary_functions, own_functions
-from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library, compile_program
+from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library
+from tests.compiling import compile_program
 from tests.selection import quick_only
 
 REALS = (Real.FLOAT, Real.DOUBLE)

@@ -9,7 +9,7 @@ import pytest
 
 from nlsdesign.export import export_fmu
 from nlsdesign.export.compilation import cross_compiler
-from nlsdesign.export.fmi import compiled_binaries
+from nlsdesign.export.fmi import fmu as compiled_binaries
 from nlsdesign.foundation.errors import ExportError, UnknownNameError
 from tests.hand_built import controller
 

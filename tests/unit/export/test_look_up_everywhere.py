@@ -10,8 +10,8 @@ import pytest
 
 from nlsdesign.export.c.c_text import Real
 from nlsdesign.export.c.table_lookup import c_tables, look_up
-from nlsdesign.export.compilation.cross_compiler import compile_program
 from nlsdesign.model.flat import Table, Variable
+from tests.compiling import compile_program
 from tests.unit.export.test_c import looked_up
 
 COLUMNS = (Variable("a", "1", "Looked up"),)

@@ -14,8 +14,14 @@ import pytest
 from nlsdesign.components import CoulombFriction, Inertia, assembly, smoothed, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_modelica
-from nlsdesign.export.modelica.modelica_model import modelica_text
-from nlsdesign.export.modelica.modelica_text import class_name, literal, modelica_unit, quoted_names, string
+from nlsdesign.export.modelica.modelica_model import (
+    class_name,
+    literal,
+    modelica_text,
+    modelica_unit,
+    quoted_names,
+    string,
+)
 from nlsdesign.foundation.deck import deck_names, load_deck
 from nlsdesign.foundation.errors import ExportError, NlsError
 from nlsdesign.foundation.quantity import parse_unit

@@ -14,7 +14,7 @@ from nlsdesign.export.c.c_text import Real
 from nlsdesign.export.c.controller_code import source_text
 from nlsdesign.export.c.guarded_step import PARAMETER_REFUSED, GuardedModel, index_bit
 from nlsdesign.export.c.writer import CWriter
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.control import torque_controller
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.model.flat import FlatModel, Variable

@@ -17,7 +17,7 @@ from fmpy.ssp.simulation import simulate_ssp
 
 from nlsdesign import quantity
 from nlsdesign.export import Late, Wire, cosimulate, export_fmu, read_ssp, write_ssp
-from nlsdesign.export.ssp.system_format import STRUCTURE_FILE
+from nlsdesign.export.cosimulation.ssp import STRUCTURE_FILE
 from nlsdesign.foundation.errors import ExportError, NlsError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model.flat import FlatModel

@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 
 from nlsdesign.export import export_c
+from nlsdesign.export.compilation import target_run
 from nlsdesign.export.compilation.cross_compiler import run_compiler
-from nlsdesign.export.target import emulator, target_run
-from nlsdesign.export.target.elf_file import SectionSizes, section_sizes
-from nlsdesign.export.target.emulator import emulated, missing_emulator
-from nlsdesign.export.target.processors import CORTEX_M4F, CORTEX_M7
-from nlsdesign.export.target.target_run import measure_on_target
+from nlsdesign.export.compilation.processors import CORTEX_M4F, PROCESSORS
+from nlsdesign.export.compilation.target_build import SectionSizes, section_sizes
+from nlsdesign.export.compilation.target_run import emulated, measure_on_target, missing_emulator
 from nlsdesign.foundation.errors import ExportError
 from tests.hand_built import controller, observer
 
-PROCESSORS = (CORTEX_M4F, CORTEX_M7)
 needs_emulator = pytest.mark.skipif(bool(missing_emulator()), reason=missing_emulator())
 
 
@@ -57,7 +55,7 @@ def test_sizes_are_read_from_an_object(tmp_path):
 
 
 def test_without_the_emulator_sizes_are_measured_and_the_reason_is_given(source, monkeypatch):
-    monkeypatch.setattr(emulator.shutil, "which", lambda name: None)
+    monkeypatch.setattr(target_run.shutil, "which", lambda name: None)
     cost = measure_on_target(source)
     assert cost.run is None
     assert "qemu-system-arm is not installed" in cost.reason

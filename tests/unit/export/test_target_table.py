@@ -10,8 +10,7 @@ import pytest
 import nlsdesign as nls
 from benchmarks import targets
 from nlsdesign.export import CORTEX_M4F
-from nlsdesign.export.target.emulator import missing_emulator
-from nlsdesign.export.target.target_run import TargetRun
+from nlsdesign.export.compilation.target_run import TargetRun, missing_emulator
 from nlsdesign.feedback.control import joined
 from nlsdesign.feedback.observer import design_observer_with_details
 
@@ -50,7 +49,7 @@ def test_a_missed_goal_is_named(chosen, monkeypatch):
         source=None,
         processor=CORTEX_M4F,
         alone=None,
-        added=nls.export.target.elf_file.SectionSizes(20_000, 0, 0),
+        added=nls.export.compilation.target_build.SectionSizes(20_000, 0, 0),
         state=10,
         run=TargetRun(np.array([450, 460, 470]), np.array([8]), np.zeros(1), np.zeros(1), True),
     )

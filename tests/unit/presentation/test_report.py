@@ -19,7 +19,7 @@ import pytest
 import sympy
 
 from nlsdesign.bench.discrepancy.reporting.verdict import Course, RecordGap, Verdict
-from nlsdesign.bench.identification.statistics.residuals import Binned
+from nlsdesign.bench.identification.residuals import Binned
 from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError

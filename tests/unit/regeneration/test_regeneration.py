@@ -11,8 +11,8 @@ import pytest
 
 from nlsdesign import regeneration
 from nlsdesign.bench.identification import Record, RecordSet
-from nlsdesign.bench.identification.estimation.least_squares import Fit
-from nlsdesign.bench.identification.estimation.parameters import declared_parameter
+from nlsdesign.bench.identification.least_squares import Fit
+from nlsdesign.bench.identification.parameters import declared_parameter
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import ROTATION, Assembly, Encoder, Fixed, GearedMotor, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly

@@ -31,10 +31,10 @@ from ....model.structure import body_moved_by
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.equation_error.filter_choice import rate_span
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter
+from ...identification.filters import derivative
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter
 from ...identification.records.measurement import Record
-from ...identification.statistics.filters import derivative
 from ..block_prediction import shown_values
 from ..tearing import blocks_of
 from .effect import Candidate, Unknown, wrapped

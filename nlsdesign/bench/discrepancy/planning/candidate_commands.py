@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....foundation.arrays import Array
+from ...identification.filters import derivative, smoothing
 from ...identification.records.measurement import Record
-from ...identification.statistics.filters import derivative, smoothing
 
 _WIDTH, _SPAN = 4.0, 30.0
 """Width of the filter and span of a rate, in samples: noise must not count as a large rate."""

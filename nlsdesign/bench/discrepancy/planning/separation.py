@@ -24,8 +24,8 @@ from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter, box
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter, box
 from ...identification.records.measurement import Record
 from ..effects.effect import Unknown
 from ..selection.hypothesis import Hypothesis

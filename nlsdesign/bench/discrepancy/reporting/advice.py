@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...identification.estimation.least_squares import Fit
+from ...identification.least_squares import Fit
 from ..selection.comparison import Judged
 
 _APART = 1.0

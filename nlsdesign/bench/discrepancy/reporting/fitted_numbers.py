@@ -9,8 +9,8 @@ from typing import NamedTuple
 from ....components.assembly.named_parts import Assembly
 from ....foundation.quantity import to_resolution
 from ....model.derived_deck import named_by_content
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter
 from ..effects.effect import SOURCE
 
 

@@ -19,16 +19,14 @@ from ....model.derived_deck import derived
 from ....model.readings import reading_of
 from ...identification.equation_error.block import Drive
 from ...identification.equation_error.evidence import Bench
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import declared_parameter
-from ...identification.output_error.multiple_shooting import coloured_sigma, fit_by_simulation
-from ...identification.output_error.prediction import predict_in_windows
-from ...identification.output_error.simulation_error import Shots, Weights
-from ...identification.output_error.wiring import Wiring
-from ...identification.records.canonical_order import in_canonical_order
-from ...identification.records.measurement import Record, RecordSet
+from ...identification.least_squares import Fit
+from ...identification.multiple_shooting import coloured_sigma, fit_by_simulation, predict_in_windows
+from ...identification.parameters import declared_parameter
+from ...identification.records.measurement import Record, RecordSet, in_canonical_order
 from ...identification.records.quality import Finding
-from ...identification.statistics.metrics import rmse
+from ...identification.residuals import rmse
+from ...identification.simulation_error import Shots, Weights
+from ...identification.windowed_simulation import Wiring
 from ..block_prediction import shown_values
 from ..screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from ..screening.wrong_numbers import out_of_reach

@@ -17,8 +17,8 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.quantity import typeset_unit, with_unit
 from ...identification.equation_error.filter_choice import rate_span
+from ...identification.filters import derivative
 from ...identification.records.measurement import RecordSet
-from ...identification.statistics.filters import derivative
 from ..selection.comparison import Judged
 
 Part = tuple[Array, Mapping[str, Array], bool]

@@ -14,9 +14,9 @@ from ....foundation.arrays import Array
 from ....foundation.quantity import significant, three_digits, typeset_unit
 from ....model import flatten
 from ...identification.equation_error.filter_choice import rate_span
-from ...identification.estimation.least_squares import Fit
-from ...identification.statistics.filters import derivative
-from ...identification.statistics.residuals import Binned, shapes
+from ...identification.filters import derivative
+from ...identification.least_squares import Fit
+from ...identification.residuals import Binned, shapes
 from ..effects.plain_names import capitalised, simpler_forms, title
 from ..planning.experiment import Experiment
 from ..screening.scale_and_sign import Acting

@@ -14,10 +14,10 @@ from ....foundation.symbolic import depends
 from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ....model.structure import motions_of_efforts
+from ...identification.filters import derivative
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
-from ...identification.statistics.filters import derivative
-from ...identification.statistics.loop_work import Loop, loop_of
+from ...identification.residuals import Loop, loop_of
 from ..block_prediction import shown_values
 
 _QUICK_OVER_SLOW = 3.0

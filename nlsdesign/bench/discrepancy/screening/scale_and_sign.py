@@ -25,9 +25,9 @@ from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench
 from ...identification.equation_error.filter_choice import rate_span
+from ...identification.filters import derivative
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
-from ...identification.statistics.filters import derivative
 from ..block_prediction import shown_values
 from ..effects.places import efforts_of_ties
 from ..effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on

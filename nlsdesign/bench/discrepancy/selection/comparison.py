@@ -21,8 +21,8 @@ from ....model import Variable, flatten
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter, declared_parameter, free_parameter
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter, declared_parameter, free_parameter
 from ...identification.records.measurement import Record
 from ..effects.effect import Candidate, Unknown
 from ..fitting import FitProblem, Key, Plain, Start, Tally, explains_enough, method_for, refusal

@@ -25,10 +25,9 @@ from scipy.optimize import lsq_linear
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
 from ...identification.equation_error.evidence import Evidence
-from ...identification.estimation.least_squares import Fit, StackedRows
-from ...identification.estimation.levenberg_marquardt import ENOUGH, minimise
-from ...identification.estimation.parameters import box
-from ...identification.statistics.residuals import effective_size
+from ...identification.least_squares import ENOUGH, Fit, StackedRows, minimise
+from ...identification.parameters import box
+from ...identification.residuals import effective_size
 from ..fitting import Key, Tally
 
 SEGMENTS = 6

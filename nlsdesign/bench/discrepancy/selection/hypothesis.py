@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from ....components.assembly.named_parts import Assembly
 from ....foundation.quantity import to_resolution
 from ...identification.equation_error.evidence import Bench
-from ...identification.estimation.least_squares import Fit
+from ...identification.least_squares import Fit
 from ..effects.effect import Candidate, Unknown
 from ..fitting import Key, Tally, like_the_others
 from .criteria import Criteria

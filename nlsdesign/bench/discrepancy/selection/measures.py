@@ -11,8 +11,8 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from ....foundation.arrays import Array
-from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter, box
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter, box
 from ..effects.effect import Unknown
 
 DECLARED = "declared numbers"

@@ -24,10 +24,10 @@ from scipy.interpolate import make_interp_spline
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
 from ....simulation import Trace
+from ..filters import Smoothing, kernel
 from ..records.clocks import Resolution
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
-from ..statistics.filters import Smoothing, kernel
 from .block_response import DrivenBlock
 
 _RESOLVED = 0.05

@@ -11,11 +11,10 @@ import numpy as np
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError, unknown_name
 from ....foundation.symbolic import Expression, depends
+from ..filters import derivative, smoothed, without_rounding
 from ..records.measurement import Record
-from ..statistics.filters import derivative, smoothed, without_rounding
 from .batch import ChainFunction, ColumnFunction, PointFunction
-from .block import Block
-from .late_signals import advanced, free_delay, late_drives
+from .block import Block, advanced, free_delay, late_drives
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, placed, rosenbrock_step, stages_of
 
 _PROBES = 50

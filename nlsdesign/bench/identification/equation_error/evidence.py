@@ -14,16 +14,15 @@ from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
 from ....simulation import Trace
-from ..records.canonical_order import in_canonical_order
-from ..records.measurement import Record, RecordSet
-from ..statistics.coloured import NoisePart, independent_number
-from ..statistics.filters import Smoothing, difference, every, filter_weights, smoothing
-from ..statistics.metrics import rmse
+from ..filters import Smoothing, difference, every, filter_weights, smoothing
+from ..records.measurement import Record, RecordSet, in_canonical_order
+from ..residuals import rmse
 from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
 from .block import Block, Drive
 from .block_response import DrivenBlock, Samples
 from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces, rectified
 from .noise import Noise as Noise
+from .noise import NoisePart, independent_number
 from .noise import estimate_noise as estimate_noise
 
 _NOISY, _SMEARED = 5.0, 0.027

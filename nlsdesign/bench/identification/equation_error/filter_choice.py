@@ -32,8 +32,8 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError
+from ..filters import derivative, filter_weights, filtered
 from ..records.measurement import Record
-from ..statistics.filters import derivative, filter_weights, filtered
 from .block import Block
 from .noise import Noise
 

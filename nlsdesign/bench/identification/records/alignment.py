@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from ....foundation.errors import MeasurementError, unknown_name
 from ....simulation import Trace
-from .clocks import Channel, Resolution, on_one_clock
-from .lag import Lag, lag_between
+from .clocks import Channel, Lag, Resolution, lag_between, on_one_clock
 from .measurement import Record
 
 

@@ -11,11 +11,9 @@ from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError, nearest
 from ....foundation.quantity import parse_unit, same_dimension
 from ....simulation import Trace
-from .channel_quality import Checked, Sampled, check_channels
-from .clocks import Channel, Resolution, on_one_clock, resolutions
-from .lag import lag_between
+from .clocks import Channel, Resolution, lag_between, on_one_clock, resolutions
 from .mapping import Align, Column, ColumnMap
-from .quality import Finding, check_columns, check_time
+from .quality import Checked, Finding, Sampled, check_channels, check_columns, check_time
 from .table_files import RecordTable
 
 _LEAST_STEP, _SHORT_STEP, _LONG_STEP = 1e-8, 1e-5, 0.5

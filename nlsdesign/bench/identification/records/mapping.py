@@ -1,7 +1,11 @@
-"""Mapping of the columns of a file to signals of a model, with units."""
+"""Mapping of the columns of a file to signals of a model, with units, as ``records.toml`` says it.
+
+A field of the wrong kind is one message with file, field, rule and next step.
+"""
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,10 +16,58 @@ from ....foundation.errors import MeasurementError, UnitError, nearest
 from ....foundation.quantity import parse_unit, same_dimension, typeset_unit
 from ....foundation.reading import text_of
 from ....model import FlatModel
-from .toml_fields import globs_at, number_at, table_at, text_at
 
 _FASTEST = 1e6
 """Highest rate in Hz of a common clock: beyond it a record of minutes does not fit into memory."""
+
+
+def table_at(file: str, field: str, given: Any, next_step: str) -> Mapping[str, Any]:
+    """Return a field that must be a table."""
+    if not isinstance(given, dict):
+        raise MeasurementError(f"{file}: {field}", f"{_shown(given)} is not a table", next_step=next_step)
+    return given
+
+
+def text_at(where: str, field: str, given: Any) -> str:
+    """Return a field that must be a text."""
+    if not isinstance(given, str):
+        raise MeasurementError(
+            f"{where}.{field}", f"{_shown(given)} is not a text", next_step=f'write {field} = "..."'
+        )
+    return given
+
+
+def number_at(where: str, field: str, given: Any, next_step: str, between: str = ": ") -> float:
+    """Return a field that must be a finite number."""
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        try:
+            number = float(given)
+        except OverflowError:  # a whole number of hundreds of digits
+            number = math.inf
+        if math.isfinite(number):
+            return number
+    raise MeasurementError(
+        f"{where}{between}{field}", f"{_shown(given)} is not a finite number", next_step=next_step
+    )
+
+
+def globs_at(file: str, field: str, given: Any) -> tuple[str, ...]:
+    """Return a field that must be a list of names of records."""
+    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        raise MeasurementError(
+            f"{file}: {field}",
+            f"{_shown(given)} is not a list of names of records",
+            next_step=f'write {field} = ["multisine*"]',
+        )
+    return tuple(given)
+
+
+def _shown(given: Any) -> str:
+    try:
+        text = repr(given)
+    except ValueError:  # whole numbers beyond the limit of digits
+        text = "the number"
+    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,13 @@
-"""Measured records, read from tables through a mapping of columns to signals with units."""
+"""Measured records, read from tables through a mapping of columns to signals with units.
+
+Held out by default are the records most like another one. That choice, like the order in which records are
+fitted, depends on their content and not on the names of their files.
+"""
 
 from __future__ import annotations
 
 import fnmatch
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,15 +15,14 @@ from typing import Literal
 
 import numpy as np
 
-from ....foundation.arrays import Mask
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError, nearest, unknown_name, visible
 from ....foundation.quantity import parse_unit
 from ....model import FlatModel
 from ....simulation import Trace
-from ..statistics.residuals import noise_of, quantum_of
+from ..residuals import noise_of, quantum_of
 from .clocks import Resolution
-from .heads import default_mapping, heads_with_units, times_among, times_without_unit
-from .held_out import surrounded
+from .csv_files import default_mapping, heads_with_units, times_among, times_without_unit
 from .ingest import read_run
 from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
@@ -26,8 +30,99 @@ from .mapping import Inputs, check_signals, read_mapping
 from .quality import Finding
 from .table_files import RecordTable, read_table, table_files, unread_tables
 
+_SHARE = 3
+"""One of so many records is held out."""
+_PER_SIGNAL = 4
+"""Marks of a signal, behind the length of the record."""
+_LAGS = 100
+"""Rates are taken over this part of the shortest record, where noise counts little."""
+_DIGITS = 9
+"""Distances that agree to so many digits are equal: they must not depend on the order of a sum."""
 _COARSER = 3.0
 """Declared counts beyond which the smallest step in all records is no matter of chance."""
+
+
+def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
+    """Return the indices of records to hold out: a third, rounded, and at least one of two.
+
+    A record is described by its length and, for every signal, by its smallest and largest value, its usual
+    rate, and how unevenly it moves: the root mean square of the rate over its mean size, large where motion
+    alternates with rest. Held out, one after the other, is a record of the pair that is most alike among
+    those that are left, so that fits keep every kind of motion: the one nearer to the middle of the range of
+    all, so that it is predicted by interpolation, and among equals the one of the smaller motion.
+
+    ``traces``: with the same signals; at least two.
+    """
+    marks = _marks(traces)
+    left = list(range(len(traces)))
+    chosen: list[int] = []
+    while len(chosen) < (len(traces) + 1) // _SHARE:
+        distance = dict(zip(left, _distance(marks[left]), strict=True))
+        apart = dict(zip(left, _to_nearest(marks[left]), strict=True))
+        rank = {k: (apart[k], distance[k], _extent(marks, k), content_digest(traces[k])) for k in left}
+        best = min(left, key=rank.__getitem__)
+        chosen.append(best)
+        left.remove(best)
+    return tuple(sorted(chosen))
+
+
+def content_digest(trace: Trace) -> str:
+    """Return a digest of time and signals, whatever their order."""
+    digest = hashlib.sha256(trace.time.tobytes())
+    for name in sorted(trace.signals):
+        digest.update(trace.signals[name].tobytes())
+    return digest.hexdigest()
+
+
+def _marks(traces: Sequence[Trace]) -> Array:
+    """Return what describes each record, shape (records, marks)."""
+    lag = min(float(t.time[-1] - t.time[0]) for t in traces) / _LAGS
+    rows = []
+    for trace in traces:
+        step = float(trace.time[1] - trace.time[0])
+        apart = max(1, round(lag / step))
+        row = [float(np.log(trace.time[-1] - trace.time[0]))]
+        for name in sorted(traces[0].signals):
+            values = trace[name]
+            change = np.abs(values[apart:] - values[:-apart])
+            rate = float(np.sqrt(np.mean(change**2)))
+            form = rate / max(float(np.mean(change)), 1e-300)
+            row += [float(values.min()), float(values.max()), _log(rate), _log(form)]
+        rows.append(row)
+    return np.array(rows)
+
+
+def _log(value: float) -> float:
+    return float(np.log(max(value, 1e-300)))
+
+
+def _distance(marks: Array) -> list[float]:
+    """Return how far each record lies from the middle of the range of all.
+
+    The mean fourth power over the marks: a record that is extreme in one of them is outside, whatever the
+    others.
+    """
+    low, high = marks.min(axis=0), marks.max(axis=0)
+    share = (marks - low) / np.where(high > low, high - low, 1.0)
+    return [round(float(d), _DIGITS) for d in np.mean((share - 0.5) ** 4, axis=1)]
+
+
+def _to_nearest(marks: Array) -> list[float]:
+    """Return the distance of each record to the one most like it, marks counted in their ranges."""
+    low, high = marks.min(axis=0), marks.max(axis=0)
+    share = (marks - low) / np.where(high > low, high - low, 1.0)
+    apart = np.sqrt(np.mean((share[:, None] - share[None]) ** 2, axis=2))
+    np.fill_diagonal(apart, np.inf)
+    return [round(float(d), _DIGITS) for d in apart.min(axis=1)]
+
+
+def _extent(marks: Array, row: int) -> float:
+    """Return the mean range of the signals of a record, as a share of the largest."""
+    ranges = marks[:, 2::_PER_SIGNAL] - marks[:, 1::_PER_SIGNAL]
+    largest = np.where(ranges.max(axis=0) > 0.0, ranges.max(axis=0), 1.0)
+    return round(float(np.mean(ranges[row] / largest)), _DIGITS)
+
+
 Role = Literal["fit", "selection", "held_out"]
 
 
@@ -421,3 +516,29 @@ def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> RecordSet:
     run = read_run(file.stem, table, mapping)
     record = Record(file.stem, run.trace, source=run.source, resolution=run.resolution, masked=run.masked)
     return RecordSet((record,), mapping.columns, run.findings, run.remarks)
+
+
+def in_canonical_order(records: RecordSet) -> RecordSet:
+    """Return the same records and findings, ordered by the content of the records.
+
+    Rounding of sums and choices among equals depend on the order of records. In canonical order results do
+    not depend on the names of files.
+    """
+    ordered = tuple(sorted(records.records, key=_content))
+    findings, remarks = (
+        tuple(sorted(group, key=lambda finding: (_place(finding, ordered), finding.text)))
+        for group in (records.findings, records.remarks)
+    )
+    return replace(records, records=ordered, findings=findings, remarks=remarks)
+
+
+def _content(record: Record) -> tuple[int, str, str]:
+    """Return number of samples, a digest of time and signals, and the role."""
+    return len(record.trace), content_digest(record.trace), record.role
+
+
+def _place(finding: Finding, ordered: tuple[Record, ...]) -> int:
+    """Return the index of the record of a finding; the number of records if it belongs to none."""
+    file = finding.place.partition(":")[0]
+    known = [k for k, record in enumerate(ordered) if (record.source or record.name).startswith(file)]
+    return known[0] if known else len(ordered)

@@ -6,27 +6,37 @@ Beside it stands what the best estimator could reach on the bench, from what is 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError
+from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError, unknown_name
 from ....foundation.prefixes import prefixed
 from ....foundation.quantity import typeset_unit
 from ....model import FlatModel
-from ....model.roles import measured_motion, spring_torque
+from ....model.roles import measured_motion, series_spring, spring_torque
 from ....simulation.buffered import Translate, as_it_is
 from ....simulation.prior import Prior
 from ....simulation.sampled_batch import PLANT, run_batch
+from ...analysis.kalman import NoiseAssumptions, declared_deviation
+from ...analysis.rest_points import rest_points
 from ..adaptive.adaptive_observer import SPREAD, AdaptiveDesign, design_adaptive_observer, encoder_quantum
 from ..adaptive.duty_and_directions import AdaptiveSettings
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
-from ..scheduling.angle_form import StateForm
-from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details
-from ..scheduling.step import FittedGain, GainRule
+from ..certificates.certificate import Certificate
+from ..certificates.co_design import CertifiedGain
+from ..certificates.contraction import Contraction, certify, declared_assumptions
+from ..scheduling.angle_form import PaperForm, StateForm
+from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details, whole_contour
+from ..scheduling.step import CascadeGain, FittedGain, GainRule, SteadyStateKalman
 from ..scheduling.table import Grid
 from .observer_bench import ObserverBench, observer_bench
+
+BEST, CASCADE, CERTIFIED = "best", "cascade", "certified"
+KINDS = (BEST, "adaptive", CASCADE, CERTIFIED, "kalman", "published")
+"""Kinds of observers by name; the first is the one that errs least over the spread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +144,152 @@ def _expected(model: FlatModel, design: AdaptiveDesign, settings: AdaptiveSettin
             next_step="use a smaller torque or lower frequencies in the duty",
         )  # fmt: skip
     return float(np.sqrt(np.mean(deviation**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class DesignedObserver:
+    """An observer of a named kind, as commands write it.
+
+    Parameters
+    ----------
+    kind
+        Which was designed: not ``best``, but what that turned out to be.
+    design
+        With table and start values.
+    reason
+        Why it was taken; empty where it was asked for.
+    expected
+        Root mean square torque error over the spread, to first order: cascade, and adaptive observer where it
+        could be designed; empty where it was asked for.
+    """
+
+    kind: str
+    design: AdaptiveDesign | ObserverDesign
+    reason: str = ""
+    expected: tuple[float, ...] = ()
+
+    @property
+    def model(self) -> FlatModel:
+        """The observer, its description with reason and what is proved of it: here nothing."""
+        model = self.design.model
+        text = "; ".join(filter(None, (model.description, self.reason, "not certified")))
+        return replace(model, description=text)
+
+    def certify(
+        self,
+        plant: FlatModel,
+        *,
+        deck: tuple[str, str] = ("", ""),
+        decay: float | None = None,
+        with_spread: bool = False,
+        real: str = "double",
+        ranges: Mapping[str, Any] | None = None,
+    ) -> Certificate[Contraction]:
+        """Prove what can be proved of the observer.
+
+        Parameters
+        ----------
+        plant
+            Flat model of the actuator.
+        deck
+            Name and text of its deck.
+        decay
+            To be proved, in 1/s; 98 % of the fastest that can be by default.
+        with_spread
+            Whether parameters may be anywhere within their spread.
+        real
+            ``"double"`` or ``"float"``, of the C code.
+        ranges
+            Angles, speed and error of the angle by name, where they are not those that the deck declares.
+
+        Raises
+        ------
+        ArrangementError
+            If observers of that kind cannot be certified.
+        """
+        if not isinstance(self.design, ObserverDesign):
+            raise ArrangementError(
+                f"observer of kind '{self.kind}'", "cannot be certified", next_step="take --kind certified"
+            )
+        spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if with_spread else {}
+        declared = declared_assumptions(plant, self.design)
+        assumed = replace(declared, spreads=spreads, real=real, **(ranges or {}))
+        return certify(plant, self.design, assumptions=assumed, decay=decay, deck=deck)
+
+
+def designed_observer(
+    plant: FlatModel,
+    *,
+    kind: str | None = None,
+    decay: float | None = None,
+    sample_time: float = 1e-3,
+    spring: str | None = None,
+    measured: str | None = None,
+    grid: Grid | None = None,
+) -> DesignedObserver:
+    """Design an observer of the torque of a series spring.
+
+    Parameters
+    ----------
+    plant
+        Flat model of an actuator.
+    kind
+        One of :data:`KINDS`; the first by default.
+    decay
+        Of a certified gain, in 1/s; as fast as can be proved by default.
+    sample_time
+        In s.
+    spring
+        Path of the spring; decided from the structure if it is left out.
+    measured
+        State that is measured; decided from the structure if it is left out.
+    grid
+        Of its table; by the default torque error if it is left out.
+
+    Raises
+    ------
+    ArrangementError
+        If the model has no spring or no driven body, the structure leaves open which is meant, or there is
+        no observer of that kind.
+    UnknownNameError
+        If that is no kind.
+    """
+    try:
+        torque, measured = series_spring(plant, spring).effort, measured_motion(plant, measured)
+    except ArrangementError as error:
+        alone = "nlsdesign export fmu --what plant writes the plant alone, with its C sources inside"
+        raise ArrangementError(error.thing, error.rule, next_step=f"{error.next_step}; {alone}") from None
+    named: dict[str, Any] = {
+        "estimate": torque, "measured": measured, "sample_time": sample_time, "grid": grid,
+    }  # fmt: skip
+    kind = kind or BEST
+    if kind == BEST:
+        chosen = choose_observer(plant, **named)
+        adaptive = isinstance(chosen.design, AdaptiveDesign)
+        return DesignedObserver(
+            "adaptive" if adaptive else CASCADE, chosen.design, chosen.reason, chosen.expected
+        )
+    if kind == "adaptive":
+        return DesignedObserver(kind, design_adaptive_observer(plant, **named))
+    if kind == "published":
+        return DesignedObserver(kind, design_observer_with_details(plant, form=PaperForm(), **named))
+    gains: dict[str, Callable[[], Any]] = {
+        CASCADE: CascadeGain,
+        CERTIFIED: lambda: CertifiedGain(decay=decay),
+        "kalman": lambda: _kalman(plant, measured, sample_time),
+    }
+    if kind not in gains:
+        raise unknown_name("kind of observer", kind, KINDS)
+    gain = gains[kind]()
+    return DesignedObserver(kind, design_observer_with_details(plant, gain=gain, **named))
+
+
+def _kalman(plant: FlatModel, measured: str, sample_time: float) -> SteadyStateKalman:
+    """Return the rule with the noise that the deck declares, and that assumed where it declares none."""
+    over = whole_contour(plant)
+    points = rest_points(plant, np.linspace(over.lower, over.upper, 41), angle=measured)
+    process = NoiseAssumptions(sample_time=sample_time).process(points)
+    return SteadyStateKalman(process, (declared_deviation(plant, measured),))
 
 
 def design_observer(

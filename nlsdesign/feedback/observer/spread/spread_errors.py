@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -15,13 +17,16 @@ from ....foundation.data_frames import Axis, data_set
 from ....foundation.errors import ArrangementError, ConvergenceError, unknown_name
 from ....foundation.prefixes import shared_prefix
 from ....foundation.quantity import three_digits
+from ....foundation.writing import write_table, write_text
 from ....model import FlatModel
+from ....model.roles import measured_motion, series_spring
 from ....simulation.buffered import Translate, as_it_is
 from ....simulation.prior import Prior, declared_prior
 from ....simulation.sampled_batch import PLANT, BatchTrace, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
-from .observer_bench import ObserverBench
+from .choice import CASCADE, DesignedObserver, designed_observer
+from .observer_bench import ObserverBench, observer_bench
 
 FINE = 1e-6
 """Counts over declared counts of the run that has no rounding of the encoder worth mentioning."""
@@ -140,6 +145,48 @@ class SpreadErrors:
                 rows.append([name, f"{f:g}", *cells, bound])
         return rows
 
+    def content(self) -> dict[str, Any]:
+        """Return the errors as JSON holds them."""
+        keys = ("observer", "frequency_Hz", "exact", "median", "quantile_90", "rms", "bound")
+        return {
+            "unit": self.unit,
+            "amplitude": self.torque,
+            "draws": int(self.drawn.shape[1]),
+            "draws_that_did_not_run": self.lost,
+            "errors": [dict(zip(keys, row, strict=True)) for row in _numbers(self)],
+            "causes": {name: dict(self.ranked_causes(name)) for name in self.observers},
+            "least_over_the_spread": self.best,
+        }
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write the errors as a table and as JSON.
+
+        Parameters
+        ----------
+        folder
+            Where ``errors.csv`` and ``errors.json`` are written.
+
+        Returns
+        -------
+        list of pathlib.Path
+            What was written.
+
+        Raises
+        ------
+        ExportError
+            If one cannot be written.
+        """
+        numbers = ("exact", "median", "quantile 90 %", "rms", "bound")
+        heads = ["observer", "frequency [Hz]", *(f"{name} [{self.unit}]" for name in numbers)]
+        rows = [
+            [name, f"{f:g}", *(f"{v:.9g}" for v in values), "" if bound is None else f"{bound:.9g}"]
+            for name, f, *values, bound in _numbers(self)
+        ]
+        write_table(folder / "errors.csv", [heads, *rows])
+        text = json.dumps(self.content(), indent=2, ensure_ascii=False) + "\n"
+        write_text(folder / "errors.json", text)
+        return [folder / "errors.csv", folder / "errors.json"]
+
     @property
     def shown_in(self) -> str:
         """Unit in which :meth:`rows` shows errors, typeset."""
@@ -161,6 +208,19 @@ class SpreadErrors:
         lines = [head, "observer  Hz  exact numbers  median  90 %  rms  no estimator below"]
         lines += ["  ".join(row) for row in self.rows()]
         return "\n".join([*lines, f"least over the spread: {self.best}"])
+
+
+def _numbers(errors: SpreadErrors) -> list[tuple[Any, ...]]:
+    """Return observer, frequency, exact, median, 90 %, rms and bound, one row per sine."""
+    return [
+        (
+            name, f, float(errors.exact[i, k]), float(errors.quantile(name, 0.5)[k]),
+            float(errors.quantile(name, 0.9)[k]), float(errors.rms(name)[k]),
+            float(errors.bound[k]) if len(errors.bound) else None,
+        )
+        for i, name in enumerate(errors.observers)
+        for k, f in enumerate(errors.frequencies)
+    ]  # fmt: skip
 
 
 def observer_errors(
@@ -233,6 +293,60 @@ def observer_errors(
         errors[:, kept], _causes(errors, shifts, quantum is not None), bound,
         draws - len(kept),
     )  # fmt: skip
+
+
+def errors_beside(
+    plant: FlatModel,
+    chosen: DesignedObserver,
+    *,
+    draws: int,
+    sample_time: float,
+    spring: str | None = None,
+    measured: str | None = None,
+    translate: Translate = as_it_is,
+) -> SpreadErrors:
+    """Run the chosen observer, the cascade and the published form on one bench, over the spread of the deck.
+
+    Parameters
+    ----------
+    plant
+        Flat model of an actuator.
+    chosen
+        Is compared with the others.
+    draws
+        How many machines are drawn.
+    sample_time
+        In s.
+    spring, measured
+        Where the structure leaves them open.
+    translate
+        Turns the equations into those that are run, such as :func:`~nlsdesign.export.quickest` gives.
+
+    Raises
+    ------
+    ArrangementError
+        If no number of the deck has a spread.
+    """
+    if not any(v.spread > 0.0 for v in plant.parameters):
+        raise ArrangementError(
+            f"model '{plant.name}'", "declares no spread, so there are no errors over it",
+            next_step="give numbers a spread, or leave out --errors",
+        )  # fmt: skip
+    torque, measured = series_spring(plant, spring).effort, measured_motion(plant, measured)
+    observers = {chosen.kind: chosen.design.model}
+    for kind in (CASCADE, "published"):
+        if kind not in observers:
+            observers[kind] = designed_observer(
+                plant, kind=kind, sample_time=sample_time, spring=spring, measured=measured
+            ).design.model
+    bench = observer_bench(plant, estimate=torque, measured=measured, sample_time=sample_time)
+    try:
+        encoder_quantum(plant, measured)
+        bounded = 2
+    except ArrangementError:
+        # What no estimator can do better depends on the counts; without an encoder it is not computed.
+        bounded = 0
+    return observer_errors(observers, bench, draws=draws, bounded=bounded, translate=translate)
 
 
 def relevant(prior: Prior, bench: ObserverBench) -> Prior:

@@ -13,7 +13,7 @@ import pytest
 from nlsdesign.bench.discrepancy import ALL, diagnose, write_verdict
 from nlsdesign.bench.discrepancy.reporting.advice import more_excitation
 from nlsdesign.bench.identification import Parameter, load_records
-from nlsdesign.bench.identification.estimation.least_squares import Fit
+from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.cli import main
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import deck_digest, declare, write_deck

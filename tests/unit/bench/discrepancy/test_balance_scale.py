@@ -10,8 +10,8 @@ from nlsdesign import components as c
 from nlsdesign.bench.discrepancy.tearing import BalanceTerms, blocks_of, scaled_balance
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.estimation.least_squares import fit
-from nlsdesign.bench.identification.estimation.parameters import Parameter, declared_parameter
+from nlsdesign.bench.identification.least_squares import fit
+from nlsdesign.bench.identification.parameters import Parameter, declared_parameter
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import Assembly, DriveSaturation, assembly, tie
 from nlsdesign.components.assembly.deck_template import load_template

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from nlsdesign.bench.discrepancy.selection.cross_validation import SEGMENTS, by_pieces, by_records, tallies_of
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.evidence import Evidence
-from nlsdesign.bench.identification.estimation.least_squares import Fit
+from nlsdesign.bench.identification.least_squares import Fit
 
 ROWS, RANDOM = 60, np.random.default_rng(4)
 SLOPES = {name: RANDOM.standard_normal((ROWS, 2)) for name in ("one", "two", "chosen")}

@@ -24,7 +24,7 @@ from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis, excesse
 from nlsdesign.bench.discrepancy.selection.measures import DECLARED
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.estimation.least_squares import Fit
+from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.components import Assembly, Fixed, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.quantity import Quantity

@@ -18,9 +18,9 @@ from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Floor
+from nlsdesign.bench.identification.filters import smoothing
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.measurement import Role
-from nlsdesign.bench.identification.statistics.filters import smoothing
 from nlsdesign.components import (
     ROTATION,
     Assembly,

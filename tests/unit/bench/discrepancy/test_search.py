@@ -18,8 +18,8 @@ from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.selection.measures import EffectNumber, Standing
 from nlsdesign.bench.discrepancy.selection.search import Outcome, search
 from nlsdesign.bench.discrepancy.selection.trials import Skipped
-from nlsdesign.bench.identification.estimation.least_squares import Fit
-from nlsdesign.bench.identification.estimation.parameters import Parameter
+from nlsdesign.bench.identification.least_squares import Fit
+from nlsdesign.bench.identification.parameters import Parameter
 from nlsdesign.components import Assembly, Fixed
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import ConvergenceError

@@ -9,8 +9,8 @@ from nlsdesign import components as c
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
+from nlsdesign.bench.identification.filters import smoothing
 from nlsdesign.bench.identification.records.measurement import Record
-from nlsdesign.bench.identification.statistics.filters import smoothing
 from nlsdesign.components import Assembly, Tie, assembly, tie
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.foundation.quantity import Quantity

@@ -34,7 +34,7 @@ from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.block import Drive
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Evidence
-from nlsdesign.bench.identification.estimation.least_squares import Fit
+from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.components import Fixed
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly

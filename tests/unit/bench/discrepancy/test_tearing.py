@@ -9,8 +9,8 @@ from nlsdesign.bench.discrepancy.effects import current_sensor_bias, force_senso
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
+from nlsdesign.bench.identification.filters import smoothing
 from nlsdesign.bench.identification.records.measurement import Record
-from nlsdesign.bench.identification.statistics.filters import smoothing
 from nlsdesign.components import (
     ROTATION,
     Assembly,

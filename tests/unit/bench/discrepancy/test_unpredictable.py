@@ -15,7 +15,7 @@ from nlsdesign.bench.discrepancy.fitting import Key, Tally, diverges, like_the_o
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.block import Drive
 from nlsdesign.bench.identification.equation_error.evidence import Evidence
-from nlsdesign.bench.identification.estimation.least_squares import Fit
+from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.foundation.errors import ConvergenceError
 
 ROWS = {("spring", r): 100 for r in ("slow", "middle", "quick")} | {("motor", "quick"): 50}

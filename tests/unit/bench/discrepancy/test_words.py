@@ -27,8 +27,8 @@ from nlsdesign.bench.discrepancy.screening.scale_and_sign import _hint
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.selection.measures import DECLARED, Excess
 from nlsdesign.bench.discrepancy.selection.trials import Skipped
-from nlsdesign.bench.identification.estimation.least_squares import Fit
-from nlsdesign.bench.identification.estimation.parameters import declared_parameter
+from nlsdesign.bench.identification.least_squares import Fit
+from nlsdesign.bench.identification.parameters import declared_parameter
 from nlsdesign.components import (
     ROTATION,
     Assembly,

@@ -13,9 +13,8 @@ from scipy.signal import resample_poly
 from nlsdesign.bench.identification import Record, load_records, noise_of
 from nlsdesign.bench.identification.equation_error.evidence import estimate_noise
 from nlsdesign.bench.identification.records.alignment import aligned, joined, resampled
-from nlsdesign.bench.identification.records.clocks import Channel, on_one_clock
+from nlsdesign.bench.identification.records.clocks import Channel, lag_between, on_one_clock
 from nlsdesign.bench.identification.records.ingest import read_run
-from nlsdesign.bench.identification.records.lag import lag_between
 from nlsdesign.bench.identification.records.mapping import Column, ColumnMap, read_mapping
 from nlsdesign.bench.identification.records.table_files import RecordTable
 from nlsdesign.foundation.errors import MeasurementError, UnknownNameError, ValueRangeError

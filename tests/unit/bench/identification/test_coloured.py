@@ -7,14 +7,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from nlsdesign.bench.identification.statistics.coloured import (
+from nlsdesign.bench.identification.equation_error.noise import (
     NoisePart,
     Stretch,
     colour_of,
     independent_number,
     variance_behind,
 )
-from nlsdesign.bench.identification.statistics.filters import filter_weights
+from nlsdesign.bench.identification.filters import filter_weights
 
 STEP = 0.002
 WEIGHTS = filter_weights(0.004, 0, STEP)

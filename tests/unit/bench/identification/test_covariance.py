@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from nlsdesign.bench.identification.estimation.covariance import Piece, robust_covariance
+from nlsdesign.bench.identification.covariance import Piece, robust_covariance
 from nlsdesign.foundation.arrays import Array
 
 COUNT, STEP = 600, 0.01

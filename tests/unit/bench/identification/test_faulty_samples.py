@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.bench.identification.records.faulty_samples import (
+from nlsdesign.bench.identification.records.quality import (
     LONGEST,
     Surroundings,
     Witness,

@@ -16,14 +16,14 @@ from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.equation_error.stepping import exact_step, rosenbrock_step, stages_of
-from nlsdesign.bench.identification.estimation.least_squares import (
+from nlsdesign.bench.identification.least_squares import (
     Fit,
     Parameter,
     declared_parameter,
     fit,
+    minimise,
     predicted_cost,
 )
-from nlsdesign.bench.identification.estimation.levenberg_marquardt import minimise
 from nlsdesign.bench.identification.records.measurement import Column, Record, RecordSet
 from nlsdesign.components import (
     Assembly,

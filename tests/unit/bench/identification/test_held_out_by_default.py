@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from nlsdesign.bench.identification.records.held_out import surrounded
+from nlsdesign.bench.identification.records.measurement import surrounded
 from nlsdesign.simulation import Trace
 
 TIME = np.arange(2000) * 1e-3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nlsdesign.bench.identification.statistics.losses import Huber, bounded_total, huber_rows
+from nlsdesign.bench.identification.least_squares import Huber, bounded_total, huber_rows
 
 X = np.array([0.3, -0.8])
 

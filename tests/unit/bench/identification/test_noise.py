@@ -10,10 +10,14 @@ import pytest
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Floor
-from nlsdesign.bench.identification.equation_error.noise import Noise, estimate_noise
+from nlsdesign.bench.identification.equation_error.noise import (
+    Noise,
+    NoisePart,
+    estimate_noise,
+    independent_number,
+)
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.bench.identification.statistics.coloured import NoisePart, independent_number
-from nlsdesign.bench.identification.statistics.residuals import effective_size
+from nlsdesign.bench.identification.residuals import effective_size
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten

@@ -1,4 +1,4 @@
-"""Noise, effective sample size, whiteness, filters and metrics against closed forms."""
+"""Noise, effective sample size, filters and metrics against closed forms."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from nlsdesign.bench.identification.statistics.filters import (
+from nlsdesign.bench.identification.filters import (
     derivative,
     difference,
     every,
     filter_weights,
     kernel,
-    noise_gain,
     smoothing,
     without_rounding,
 )
-from nlsdesign.bench.identification.statistics.metrics import agreement
-from nlsdesign.bench.identification.statistics.residuals import (
+from nlsdesign.bench.identification.residuals import (
+    agreement,
     autocorrelation,
     binned,
     effective_size,
@@ -27,7 +26,6 @@ from nlsdesign.bench.identification.statistics.residuals import (
     quantum_of,
     shapes,
     spectrum,
-    whiteness,
 )
 
 DRAW = np.random.default_rng(7)
@@ -59,11 +57,10 @@ def test_effective_size_is_that_of_a_first_order_process(memory: float) -> None:
     assert effective_size(process) == pytest.approx(expected, rel=0.1)
 
 
-def test_whiteness_tells_white_from_coloured() -> None:
-    white, coloured = whiteness(WHITE), whiteness(lfilter([1.0], [1.0, -0.3], WHITE))
-    assert white.ratio < 2.0
-    assert coloured.ratio > 10.0
+def test_autocorrelation_begins_at_one_and_falls_with_the_memory() -> None:
     assert autocorrelation(WHITE, 3)[0] == pytest.approx(1.0)
+    coloured = autocorrelation(lfilter([1.0], [1.0, -0.3], WHITE), 3)
+    np.testing.assert_allclose(coloured, [1.0, 0.3, 0.09, 0.027], atol=0.05)
 
 
 def test_bins_hold_the_mean_and_its_error() -> None:
@@ -154,10 +151,11 @@ def test_rounding_is_removed_over_a_share_of_the_span_and_cubics_pass() -> None:
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_noise_gain_is_what_white_noise_shows(order: int) -> None:
+def test_the_weights_of_a_filter_tell_what_white_noise_shows_behind_it(order: int) -> None:
     noise, step = np.random.default_rng(5).standard_normal(200_000), 0.002
     found = smoothing(len(noise), 4.0, 1) @ derivative(noise, step, order=order, span=0.062)
-    assert np.std(found) == pytest.approx(noise_gain(0.008, order, step, 0.062), rel=0.05)
+    weights = filter_weights(0.008, order, step, 0.062)
+    assert np.std(found) == pytest.approx(np.linalg.norm(weights), rel=0.05)
     assert kernel(4.0).sum() == pytest.approx(1.0)
 
 

@@ -17,12 +17,11 @@ from nlsdesign.bench.identification import (
     free_parameter,
     predict_in_windows,
 )
-from nlsdesign.bench.identification.estimation.least_squares import Fit
-from nlsdesign.bench.identification.estimation.parameters import Parameter
-from nlsdesign.bench.identification.estimation.profile import profile_of
-from nlsdesign.bench.identification.output_error.cma_es import fit_by_cma
-from nlsdesign.bench.identification.output_error.simulation_error import Point, SimulationError
-from nlsdesign.bench.identification.output_error.wiring import wired
+from nlsdesign.bench.identification.least_squares import Fit, profile_of
+from nlsdesign.bench.identification.multiple_shooting import fit_by_cma
+from nlsdesign.bench.identification.parameters import Parameter
+from nlsdesign.bench.identification.simulation_error import Point, SimulationError
+from nlsdesign.bench.identification.windowed_simulation import wired
 from nlsdesign.components import Dashpot, Mass, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError

@@ -14,7 +14,7 @@ import pytest
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import OUT_OF_TABLE
-from nlsdesign.export.compilation.running_c import CompiledStep
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.observer import (
     Assumptions,
     CertifiedGain,

@@ -10,8 +10,8 @@ import pytest
 from nlsdesign.components import LinearElastic, ViscousMaterial, series
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_c
-from nlsdesign.export.target.cross_build import controller_sizes
-from nlsdesign.export.target.processors import CORTEX_M4F
+from nlsdesign.export.compilation.processors import CORTEX_M4F
+from nlsdesign.export.compilation.target_build import controller_sizes
 from nlsdesign.feedback.observer import (
     FixedGrid,
     GridByTolerance,

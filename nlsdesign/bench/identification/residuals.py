@@ -1,4 +1,8 @@
-"""What a residual tells: its noise floor, how many independent numbers it holds, and its shape."""
+"""What a residual tells: its noise floor, its size, its shape, and how many independent numbers it holds.
+
+A residual of force over extension also has a loop, whose sign tells whether a piece takes work over a cycle,
+as a passive one must, or gives any.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....foundation.arrays import Array
+from ...foundation.arrays import Array
 
 _ORDERS, _PLAINLY = (4, 8, 12), 0.6
 _MEDIAN_OF_NORMAL = 0.6744897501960817
+_BACK = 0.03
+"""A path has come back where it is this near its beginning, as a share of its range."""
+_SIGNIFICANT = 5.0
+_LEAST_SHARE = 0.01
+"""Below this share of the work on the way, rounding and filters decide on the sign."""
 
 
 def noise_of(signal: Array) -> float:
@@ -74,25 +83,6 @@ def effective_size(residual: Array) -> float:
     return float(n / (1.0 + 2.0 * np.sum(kept**2)))
 
 
-class Whiteness(NamedTuple):
-    """Ljung–Box statistic relative to its expectation, and its effective size."""
-
-    ratio: float
-    effective_size: float
-    samples: int
-
-
-def whiteness(residual: Array, lags: int = 20) -> Whiteness:
-    """Measure how far a residual is from white noise.
-
-    Result: a ratio near 1 is white; its standard deviation is √(2/lags).
-    """
-    n = len(residual)
-    rho = autocorrelation(residual, lags)[1:]
-    statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
-    return Whiteness(float(statistic / lags), effective_size(residual), n)
-
-
 class Binned(NamedTuple):
     """Mean residual over a quantity: centres of the bins, means, and their standard errors."""
 
@@ -141,3 +131,127 @@ def shapes(
                     f"over {n}, {direction}": binned(residual[mask], v[mask]) for n, v in signals.items()
                 }
     return result
+
+
+class Agreement(NamedTuple):
+    """How well a prediction meets a measurement.
+
+    Parameters
+    ----------
+    rmse
+        Root mean square error, in the unit of the signal.
+    relative
+        Mean relative error in per cent, as in Austin et al. 2015: mean of |error|/|measured|.
+    of_spread
+        RMSE in per cent of the measurement's standard deviation.
+    noise_ratio
+        RMSE over the noise floor; 1 is as good as it can be.
+    """
+
+    rmse: float
+    relative: float
+    of_spread: float
+    noise_ratio: float
+
+
+def rmse(error: Array) -> float:
+    """Return the root mean square of an error.
+
+    Parameters
+    ----------
+    error
+        Shape (n,).
+    """
+    return float(np.sqrt(np.mean(np.square(error))))
+
+
+def agreement(measured: Array, predicted: Array, *, noise: float = 0.0) -> Agreement:
+    """Compare a prediction with a measurement.
+
+    Parameters
+    ----------
+    measured, predicted
+        Shape (n,).
+    noise
+        Noise floor in the unit of the signal; with zero the ratio is infinite.
+
+    Returns
+    -------
+    Agreement
+        The relative error leaves out samples below a tenth of the largest measured size, where the quotient
+        says nothing.
+    """
+    error = predicted - measured
+    size = np.abs(measured)
+    large = size > 0.1 * size.max()
+    spread = float(np.std(measured))
+    size_of_error = rmse(error)
+    return Agreement(
+        size_of_error,
+        float(100.0 * np.mean(np.abs(error[large]) / size[large])) if np.any(large) else float("nan"),
+        100.0 * size_of_error / spread if spread > 0.0 else float("inf"),
+        size_of_error / noise if noise > 0.0 else float("inf"),
+    )
+
+
+class Loop(NamedTuple):
+    """Work over a path that comes back to where it began.
+
+    Parameters
+    ----------
+    work
+        ∮F dδ in J: what the piece has taken.
+    share
+        Of ∮|F dδ|, the work that went in and out.
+    uncertainty
+        Standard deviation of the work, from the noise of the force, in J.
+    first, last
+        Indices of the samples between which the path is closed.
+    late_by
+        Least delay of the force against the extension in s that turns the sign: with the force read so much
+        earlier the loop is empty. Zero where the work is not negative.
+    """
+
+    work: float
+    share: float
+    uncertainty: float
+    first: int
+    last: int
+    late_by: float
+
+    @property
+    def gives(self) -> bool:
+        """Whether the piece has plainly given work."""
+        return self.work < -_SIGNIFICANT * self.uncertainty and self.share < -_LEAST_SHARE
+
+    @property
+    def takes(self) -> bool:
+        """Whether the piece has plainly taken work."""
+        return self.work > _SIGNIFICANT * self.uncertainty and self.share > _LEAST_SHARE
+
+
+def loop_of(extension: Array, force: Array, step: float, *, noise: float = 0.0) -> Loop | None:
+    """Return the loop of a record, or ``None`` if its path does not come back.
+
+    ``extension``, ``force``: of a piece, force positive against positive extension; shape (n,).
+    """
+    span = float(np.ptp(extension))
+    back = np.flatnonzero(np.abs(extension - extension[0]) <= _BACK * span)
+    last = int(back[-1])
+    if span == 0.0 or last < len(extension) // 2:
+        return None
+    path, pull = extension[: last + 1], force[: last + 1]
+    steps = np.diff(path)
+    parts = 0.5 * (pull[1:] + pull[:-1]) * steps
+    work = float(parts.sum() - np.mean(pull[[0, -1]]) * (path[-1] - path[0]))
+    # A force that comes late by τ takes τ·∫ (dF/dt) dδ from the work, to first order.
+    per_second = float(np.sum(np.diff(pull) * steps)) / step
+    delay = -work / per_second if work < 0.0 < per_second else 0.0
+    return Loop(
+        work,
+        work / max(float(np.abs(parts).sum()), 1e-300),
+        noise * float(np.linalg.norm(steps)),
+        0,
+        last,
+        delay,
+    )

@@ -1,7 +1,12 @@
-"""What a controller does and costs on its processor: outputs, instructions, flash, memory, stack."""
+"""What a controller does and costs on its processor: outputs, instructions, flash, memory, stack.
+
+The emulator of Cortex-M boards, ``qemu-system-arm``, runs it and counts instructions.
+"""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,14 +16,65 @@ from numpy.typing import NDArray
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
+from ...foundation.processes import run_to_end
 from ..c.c_text import Real
 from ..c.programs import sample_inputs
 from ..c.writer import CSource
-from ..compilation.running_c import CompiledStep
-from .cross_build import controller_object, controller_sizes, image, sized_object
-from .elf_file import SectionSizes, section_sizes
-from .emulator import emulated, missing_emulator
+from .compiled_step import CompiledStep
 from .processors import CORTEX_M4F, Processor
+from .target_build import (
+    SectionSizes,
+    controller_object,
+    controller_sizes,
+    image,
+    section_sizes,
+    sized_object,
+)
+
+EMULATOR = "qemu-system-arm"
+_SECONDS = 300
+
+
+def missing_emulator() -> str:
+    """Return why nothing can be run, or an empty text."""
+    if shutil.which(EMULATOR) is None:
+        return f"{EMULATOR} is not installed (Debian: apt-get install qemu-system-arm)"
+    return ""
+
+
+def emulated(image: Path, processor: Processor) -> list[list[int]]:
+    """Run an image and return the numbers that it says, line by line.
+
+    Each instruction takes one nanosecond of the emulator's clock.
+    """
+    missing = missing_emulator()
+    if missing:
+        raise ExportError("the emulator", missing.replace(f"{EMULATOR} ", "", 1), next_step="install it")
+    command = [
+        EMULATOR,
+        "-machine",
+        processor.machine,
+        "-icount",
+        "shift=0",
+        "-nographic",
+        "-monitor",
+        "none",
+    ]
+    command += ["-serial", "none", "-semihosting-config", "enable=on,target=native", "-kernel", str(image)]
+    try:
+        done = run_to_end(command, seconds=_SECONDS)
+    except subprocess.TimeoutExpired as error:
+        raise ExportError(
+            f"{image.name} on {processor.name}", f"does not end within {_SECONDS} s", next_step="report it"
+        ) from error
+    answer = done.stdout + done.stderr
+    if done.returncode != 0 or "fault" in answer:
+        last = answer.strip().splitlines()[-1:] or ["it said nothing"]
+        raise ExportError(
+            f"{image.name} on {processor.name}", f"fails under {EMULATOR}: {last[0]}", next_step="report it"
+        )
+    return [[int(number, 16) for number in line.split()] for line in answer.splitlines() if line.strip()]
+
 
 _NS_PER_TICK = 40  # the clock of the boards runs at 25 MHz, an instruction takes 1 ns
 _KNOWN, _NOTHING = 2003, 2  # instructions of the two functions of the shell

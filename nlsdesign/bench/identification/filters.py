@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from ....foundation.arrays import Array, Mask
+from ...foundation.arrays import Array, Mask
 
 _REACH = 5.0
 _NARROW = 0.3
@@ -118,11 +118,6 @@ def filter_weights(width: float, order: int, step: float, span: float = 0.0) -> 
     """Return the weights of derivative and filter together, to be convolved with a signal."""
     result: Array = np.convolve(kernel(width / step), difference(order, span / step)) / step**order
     return result
-
-
-def noise_gain(width: float, order: int, step: float, span: float = 0.0) -> float:
-    """Return the factor from the standard deviation of white noise to that behind derivative and filter."""
-    return float(np.linalg.norm(filter_weights(width, order, step, span)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,12 @@ from pathlib import Path
 from typing import Any
 
 from ..components.assembly.deck_writer import deck_digest, declare
-from ..export.c.provenance import SHORT, stamp_of
-from ..export.files import BROKEN_ARCHIVE
-from ..export.fmi.fmu_origin import ORIGIN_FILE, ORIGIN_FORMAT
 from ..foundation.deck import read_deck
 from ..foundation.errors import ExportError, NlsError
 from ..model.derived_deck import digits_in_name
+from .c.provenance import SHORT, stamp_of
+from .files import BROKEN_ARCHIVE
+from .fmi.authorship import ORIGIN_FILE, ORIGIN_FORMAT
 
 MEGABYTE = 1 << 20
 LARGEST_TEXT, LARGEST_ARCHIVE = 32 * MEGABYTE, 512 * MEGABYTE
@@ -67,21 +67,106 @@ class ExportedFile:
         return self.digest[:SHORT]
 
 
-def exported_files(folder: Path) -> tuple[list[ExportedFile], list[ExportError]]:
-    """Return the exported files and decks in a folder and below it, and what could not be read.
+@dataclass(frozen=True)
+class ExportedFolder:
+    """The exported files and decks of a folder, and whether they belong together.
+
+    Parameters
+    ----------
+    folder
+        That was looked through.
+    files
+        Files that this package wrote.
+    problems
+        Of files that could not be read.
+    reference
+        Digest of the deck that they are to belong to; empty if they are only to belong together.
+    """
+
+    folder: Path
+    files: tuple[ExportedFile, ...]
+    problems: tuple[ExportError, ...]
+    reference: str = ""
+
+    @property
+    def apart(self) -> tuple[str, ...]:
+        """Why each file does not belong, empty where it does."""
+        decks = {file.short for file in self.files}
+        wanted = self.reference or (self.files[0].digest if len(decks) == 1 else "")
+        return tuple(
+            (file.edited and f"edited: {file.edited}") or _foreign(file, wanted) for file in self.files
+        )
+
+    @property
+    def together(self) -> bool:
+        """Whether all files could be read, belong, and are as they were written."""
+        return not self.problems and not any(self.apart)
+
+    def findings(self) -> list[str]:
+        """Return what is to be said of the folder, in sentences."""
+        names = {file.short: file.deck for file in self.files if file.deck}
+        made = {(file.short, file.parent[:SHORT]) for file in self.files if file.parent[:SHORT] in names}
+        relations = [f"{names.get(new, new)} was made from {names[old]}." for new, old in sorted(made)]
+        return [*map(str, self.problems), *relations, self._verdict()]
+
+    def _verdict(self) -> str:
+        count, decks = len(self.files), len({file.short for file in self.files})
+        if not self.files:
+            return "Nothing could be read."
+        if not any(self.apart):
+            which = (
+                f"the deck {self.reference[:SHORT]}" if self.reference else f"one deck, {self.files[0].short}"
+            )
+            readable = " that can be read" if self.problems else ""
+            return f"All {count} files{readable} belong to {which}."
+        where = f"to the deck {self.reference[:SHORT]}" if self.reference else "together"
+        several = f"; they are of {decks} decks" if decks > 1 else ""
+        return f"Not all of {count} files belong {where}{several}."
+
+
+def _foreign(file: ExportedFile, wanted: str) -> str:
+    if not file.digest:
+        return "names no deck"
+    if not wanted:
+        return "one of several decks"
+    # Some files have the first digits of a digest only.
+    same = wanted.startswith(file.digest) or file.digest.startswith(wanted)
+    return "" if same else "another deck"
+
+
+def read_exports(folder: str | Path, *, reference: str = "") -> ExportedFolder:
+    """Return the exported files and decks in a folder and below it, and whether they belong together.
 
     Files that this package did not write are passed over; links are not followed.
+
+    Parameters
+    ----------
+    folder
+        To look through.
+    reference
+        Digest of the deck that they are to belong to; empty if they are only to belong together.
+
+    Raises
+    ------
+    ExportError
+        If there is no such folder, it cannot be listed, or it holds no such file.
+
+    Examples
+    --------
+    >>> read_exports("out/fmu").findings()  # doctest: +SKIP
     """
     files: list[ExportedFile] = []
     problems: list[ExportError] = []
-    for path in _paths(folder):
+    for path in _paths(Path(folder)):
         try:
-            each = exported_file(path)
+            file = exported_file(path)
         except ExportError as error:
             problems.append(error)
         else:
-            files += [each] if each else []
-    return files, problems
+            files += [file] if file else []
+    if not files and not problems:
+        raise ExportError(str(folder), "holds no C file, Modelica text, FMU or deck of this package")
+    return ExportedFolder(Path(folder), tuple(files), tuple(problems), reference)
 
 
 def _paths(folder: Path) -> Iterator[Path]:

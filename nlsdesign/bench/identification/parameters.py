@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from ....foundation.arrays import Array
-from ....model import Variable
+from ...foundation.arrays import Array
+from ...model import Variable
 
 _REACH = 2.0
 

@@ -4,10 +4,14 @@ Each record is cut into windows that begin at states of their own. Joined window
 constraints, which are linearised like the residuals and eliminated, so what is left to solve has the size of
 the parameters and of the records' first states. Windows apart each begin at the measured state: that is the
 error of a prediction over the length of a window. Source: Bock 1987 (condensing).
+
+:func:`predict_in_windows` tells how far a simulation runs away from a record within a window. CMA-ES, which
+needs no derivatives but many simulations, is the yardstick.
 """
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -15,22 +19,23 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ....foundation.arrays import Array
-from ....foundation.errors import ConvergenceError
-from ....model import FlatModel
-from ..estimation.least_squares import Fit, covariance_of
-from ..estimation.parameters import Parameter
-from ..records.measurement import Record
-from ..statistics.losses import Loss, Squares
-from ..statistics.metrics import rmse
-from ..statistics.residuals import effective_size
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError, MeasurementError, missing_library
+from ...model import FlatModel
+from .least_squares import Fit, Loss, Squares, covariance_of
+from .parameters import Parameter, box
+from .records.measurement import Record
+from .residuals import effective_size, rmse
 from .simulation_error import Linear, Point, Shots, SimulationError, Weights
-from .wiring import Wiring
+from .windowed_simulation import Wiring
 
 _ITERATIONS = 60
 _GAIN, _JOINED = 1e-8, 1e-6
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-6, 1e-12, 1e8
+_FAILED = 1e12
+_STEP = 0.3
+"""First step on the fitted scale, where a logarithm of 0.3 is a third."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,3 +238,131 @@ def _effective_size(rows: Sequence[Array]) -> float:
 def without(fit: SimulatedFit, name: str) -> tuple[Parameter, ...]:
     """Return the parameters of a fit, at their fitted values, without one of them."""
     return tuple(replace(p, start=fit.fit.values[p.name]) for p in fit.fit.parameters if p.name != name)
+
+
+class Prediction(NamedTuple):
+    """A record as predicted in windows.
+
+    Parameters
+    ----------
+    time
+        Of the samples in whole windows, in s, shape (n,).
+    error
+        Predicted minus measured by name of the measured signal, in SI, shape (n,).
+    """
+
+    time: Array
+    error: dict[str, Array]
+
+    def rmse(self, signal: str) -> float:
+        """Return the root mean square error over all windows.
+
+        Parameters
+        ----------
+        signal
+            Name of the measured signal.
+        """
+        return rmse(self.error[signal])
+
+
+def predict_in_windows(
+    model: FlatModel, record: Record, length: float, *, wiring: Wiring | None = None, substeps: int = 1
+) -> Prediction:
+    """Simulate a record in windows, each from the measured state, driven by the measured inputs.
+
+    Parameters
+    ----------
+    model
+        Continuous, without tables.
+    record
+        Measured.
+    length
+        Of a window in s; a last window that is not whole is left out.
+    wiring
+        By name where ``None``.
+    substeps
+        Integration steps from sample to sample.
+
+    Raises
+    ------
+    MeasurementError
+        If the record is shorter than one window.
+    ConvergenceError
+        If a simulation is not finite.
+    """
+    if length > record.trace.time[-1] - record.trace.time[0] + 0.5 * record.step:
+        raise MeasurementError(
+            f"record '{record.name}'",
+            f"lasts {record.trace.time[-1] - record.trace.time[0]:g} s, which is less than {length:g} s",
+            next_step="take shorter windows",
+        )
+    problem = SimulationError(
+        model, [record], [], shots=Shots(length, False, substeps), wiring=wiring, slopes=False
+    )
+    (windows,) = problem.windows
+    kept = (len(record.trace) // windows.count) * windows.count
+    rows = problem.residual(problem.start()).reshape(len(problem.sigma), -1) * problem.sigma[:, None]
+    error = {name: rows[i, :kept] for i, name in enumerate(problem.wiring.outputs)}
+    return Prediction(record.trace.time[:kept], error)
+
+
+@dataclass(frozen=True)
+class Evolved:
+    """Where CMA-ES ended.
+
+    Parameters
+    ----------
+    values
+        In SI by name.
+    cost
+        Half the sum of squares of residuals and priors, as of :func:`fit_by_simulation`.
+    simulations
+        How often all records were simulated.
+    """
+
+    values: dict[str, float]
+    cost: float
+    simulations: int
+
+
+def fit_by_cma(
+    model: FlatModel,
+    records: Sequence[Record],
+    parameters: Sequence[Parameter],
+    *,
+    shots: Shots,
+    weights: Weights | None = None,
+    seed: int = 1,
+    simulations: int = 5000,
+) -> Evolved:
+    """Fit parameters with the evolution strategy of Hansen and Ostermeier 2001.
+
+    ``model``, ``records``, ``parameters``, ``shots``, ``weights``: as for :func:`fit_by_simulation`; the
+    windows must be apart, since nothing here joins them. ``seed``: of the random numbers; the same seed gives
+    the same result.
+    """
+    try:
+        cma = importlib.import_module("cma")
+    except ModuleNotFoundError:
+        raise missing_library("a fit by CMA-ES", "cma", "cma") from None
+    if shots.joined:
+        raise ConvergenceError(
+            "a fit by CMA-ES", "cannot join windows", next_step="use Shots(length, joined=False)"
+        )
+    problem = SimulationError(model, records, parameters, shots=shots, weights=weights, slopes=False)
+    starts = problem.start().starts
+
+    def cost(x: np.ndarray) -> float:
+        try:
+            residual = problem.residual(Point(x, starts))
+        except ConvergenceError:
+            return _FAILED
+        return 0.5 * float(residual @ residual)
+
+    low, high, first = box(parameters)
+    options = {"bounds": [list(low), list(high)], "seed": seed, "maxfevals": simulations, "verbose": -9}
+    best, strategy = cma.fmin2(cost, first, _STEP, options)
+    least = float(strategy.result.fbest)
+    if not least < _FAILED:
+        raise ConvergenceError("a fit by CMA-ES", "no simulation was finite", next_step="narrow the bounds")
+    return Evolved(problem.values(np.asarray(best)), least, int(strategy.result.evaluations))

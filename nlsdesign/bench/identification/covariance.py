@@ -1,6 +1,6 @@
 """How well fitted numbers are known: what the residuals scatter, not what the noise was taken to be.
 
-Residuals are coloured by filters, noise and what a model lacks. Piece are therefore grouped into segments of
+Residuals are coloured by filters, noise and what a model lacks. They are therefore grouped into segments of
 the records, longer than the residuals remember, and the gradients of the segments tell how far the numbers
 scatter (Liang and Zeger 1986), each as it would be if its segment had not been fitted (Bell and McCaffrey
 2002): H⁻¹·(Σ g·gᵀ + P)·H⁻¹, with the information H = JᵀJ + P, the part P of the priors in it, and for each
@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....foundation.arrays import Array
-from ..statistics.residuals import autocorrelation
+from ...foundation.arrays import Array
+from .residuals import autocorrelation
 
 _SEGMENTS = 60
 """Segments of all records together that are aimed at: enough for a variance to a fifth."""

@@ -32,3 +32,6 @@ CORTEX_M4F = Processor("Cortex-M4F", "thumb-freestanding-eabihf", "cortex_m4+vfp
 
 CORTEX_M7 = Processor("Cortex-M7", "thumb-freestanding-eabihf", "cortex_m7+fp_armv8d16", "mps2-an500")
 """Floating-point unit for float and double."""
+
+PROCESSORS = (CORTEX_M4F, CORTEX_M7)
+"""Those that tables and tests go through; the flash of an observer is measured on the first."""

@@ -1,5 +1,7 @@
 """Simulation of records in windows, with exact derivatives of everything with respect to where they begin.
 
+A :class:`Wiring` says which inputs of a model a record drives, and with which signals it is compared.
+
 Each window begins at a state of its own; a Runge–Kutta step of fourth order carries the state and its
 derivatives with respect to that beginning and to the parameters from sample to sample. The derivative of the
 step is that of the same arithmetic, so sums of squares and gradients agree to rounding.
@@ -8,20 +10,69 @@ step is that of the same arithmetic, so sums of squares and gradients agree to r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ....foundation.arrays import Array
-from ....foundation.errors import ConvergenceError, unknown_name
-from ....foundation.symbolic import Expression
-from ....model import FlatModel
-from ....model.structure import body_moved_by
-from ..equation_error.filter_choice import rate_span
-from ..records.measurement import Record
-from ..statistics.filters import derivative
-from .wiring import Wiring
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError, MeasurementError, unknown_name
+from ...foundation.symbolic import Expression
+from ...model import FlatModel
+from ...model.structure import body_moved_by
+from .equation_error.block import Drive
+from .equation_error.filter_choice import rate_span
+from .filters import derivative
+from .records.measurement import Record
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """Wires between the measured signals of records and a model.
+
+    Parameters
+    ----------
+    inputs
+        How each driven input of the model follows from a measured signal, by name of the input. Others rest
+        at their start value.
+    outputs
+        Signal or state of the model that predicts each measured signal, by name of the measured one.
+    late_by
+        Name of a parameter of the fit that says by how many seconds a measured signal comes late, by name of
+        the measured one.
+    """
+
+    inputs: Mapping[str, Drive]
+    outputs: Mapping[str, str]
+    late_by: Mapping[str, str] = field(default_factory=dict)
+
+
+def wired(model: FlatModel, measured: Sequence[str], late_by: Mapping[str, str] | None = None) -> Wiring:
+    """Wire measured signals to the inputs and signals of a model that have their names.
+
+    An input that is the speed of a measured motion is driven by its smoothed rate.
+    """
+    names = {v.name for v in model.inputs}
+    known = names | {v.name for v in model.states + model.signals}
+    inputs, outputs = {}, {}
+    for signal in measured:
+        if signal not in known:
+            raise unknown_name("signal of the model", signal, known)
+        if signal not in names:
+            outputs[signal] = signal
+            continue
+        inputs[signal] = Drive(signal)
+        body = body_moved_by(model.bodies, signal)
+        if body and body.rate in names - set(measured):
+            inputs[body.rate] = Drive(signal, 1)
+    if not outputs:
+        raise MeasurementError(
+            "records",
+            "measure inputs of the model alone, so there is nothing to compare",
+            next_step=f"measure one of: {', '.join(sorted(known - names))}",
+        )
+    return Wiring(inputs, outputs, late_by or {})
 
 
 class Shot(NamedTuple):

@@ -9,15 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....foundation.arrays import Array
-from ....foundation.errors import MeasurementError, ValueRangeError
-from ....model import FlatModel
-from ..estimation.least_squares import Fit
-from ..estimation.parameters import Parameter, box
-from ..estimation.priors import prior_rows
-from ..records.measurement import Record, from_sample
-from .windowed_simulation import Shooter, Shot, Windows
-from .wiring import Wiring, wired
+from ...foundation.arrays import Array
+from ...foundation.errors import MeasurementError, ValueRangeError
+from ...model import FlatModel
+from .least_squares import Fit
+from .parameters import Parameter, box
+from .records.measurement import Record, from_sample
+from .windowed_simulation import Shooter, Shot, Windows, Wiring, wired
 
 
 @dataclass(frozen=True)
@@ -147,7 +145,7 @@ class SimulationError:
         stated = [weights.sigma.get(n, 0.0) or _noise(records, n) for n in self.wiring.outputs]
         self.sigma = np.array(stated) * math.sqrt(shots.phases)
         self._low, self._high, self._first = box(parameters)
-        self._matrix, self._offset = prior_rows(parameters, weights.known)
+        self._matrix, self._offset = _prior_rows(parameters, weights.known)
         self.priors = len(self._offset)
         self._size = np.ones(len(model.states))
         self._unknown = model.start(model.states)
@@ -319,3 +317,36 @@ def _noise(records: Sequence[Record], signal: str) -> float:
     white = float(np.median([g.noise for g in resolutions]))
     rounding = float(np.median([g.quantum for g in resolutions])) / math.sqrt(12.0)
     return max(white, rounding) or float(np.std(np.concatenate(rows))) or 1.0
+
+
+def _prior_rows(parameters: Sequence[Parameter], known: Sequence[Fit] = ()) -> tuple[Array, Array]:
+    """Return M and m, so that M·x − m are the residuals of everything known before, x in the fitted scale.
+
+    ``parameters``: in the order of x; those with a finite sigma give a row each. ``known``: earlier fits;
+    each gives as many rows as it has parameters among these, correlated as they were.
+    """
+    names = [p.name for p in parameters]
+    rows = [np.diag([1.0 / p.sigma for p in parameters]).reshape(len(names), len(names))]
+    centres = [
+        np.array([p.inward(p.centre) / p.sigma if math.isfinite(p.sigma) else 0.0 for p in parameters])
+    ]
+    for fit in known:
+        places = [(i, names.index(p.name)) for i, p in enumerate(fit.parameters) if p.name in names]
+        if not places:
+            continue
+        own, columns = (list(side) for side in zip(*places, strict=True))
+        # From the scale of the earlier fit to that of this one, at the value found.
+        ratio = np.array(
+            [
+                fit.parameters[i].slope(fit.values[names[j]]) / parameters[j].slope(fit.values[names[j]])
+                for i, j in places
+            ]
+        )
+        covariance = fit.covariance[np.ix_(own, own)] * np.outer(ratio, ratio)
+        strength, axes = np.linalg.eigh(covariance)
+        whitened = (axes / np.sqrt(np.maximum(strength, 1e-12 * strength.max()))).T
+        wide = np.zeros((len(own), len(names)))
+        wide[:, columns] = whitened
+        rows.append(wide)
+        centres.append(whitened @ np.array([parameters[j].inward(fit.values[names[j]]) for j in columns]))
+    return np.vstack(rows), np.concatenate(centres)
