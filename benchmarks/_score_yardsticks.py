@@ -18,8 +18,8 @@ from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet
+from nlsdesign.bench.identification.equation_error.block_noise import rate_span
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.equation_error.filter_choice import rate_span
 from nlsdesign.bench.identification.filters import derivative
 from nlsdesign.bench.identification.records.measurement import Record
 from nlsdesign.components import Assembly

@@ -17,6 +17,9 @@ _CHANGED = f"{NOT_STATED}; changed from"
 
 BASE = ("kg", "m", "s", "A", "K", "rad")
 
+MM = 1e3
+"""Millimetres in a metre: lengths of drawings and figures are shown in millimetres."""
+
 _HIGHEST_POWER = 20
 _DEGREE = math.pi / 180.0
 # symbol -> (factor to SI, exponents of kg, m, s, A, K, rad)

@@ -14,8 +14,8 @@ from scipy.ndimage import gaussian_filter1d
 from nlsdesign.bench.discrepancy import Refit, predict, refit
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet
+from nlsdesign.bench.identification.equation_error.block_noise import rate_span
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.equation_error.filter_choice import rate_span
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.measurement import Record
 from nlsdesign.components import (

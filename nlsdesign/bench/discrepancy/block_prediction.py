@@ -15,8 +15,8 @@ from ...model import FlatModel, flatten
 from ...model.readings import reading_of
 from ...simulation import RangeWarning, Trace, range_warnings, simulate
 from ..identification.equation_error.block import Block
+from ..identification.equation_error.block_noise import measured_inputs
 from ..identification.equation_error.evidence import Bench
-from ..identification.equation_error.filter_choice import measured_inputs
 from ..identification.records.measurement import Record, RecordSet
 from .tearing import blocks_of
 

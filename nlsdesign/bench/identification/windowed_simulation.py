@@ -22,7 +22,7 @@ from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ...model.structure import body_moved_by
 from .equation_error.block import Drive
-from .equation_error.filter_choice import rate_span
+from .equation_error.block_noise import rate_span
 from .filters import derivative
 from .records.measurement import Record
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
-from ...foundation.quantity import Quantity
+from ...foundation.quantity import MM, Quantity
 from ...foundation.writing import write_text
 from ..statics.contour import Contour, turn
 from .arc_path import ArcPath
@@ -28,7 +28,6 @@ from .svg_drawing import page, part_svg, path_data
 FORMATS = ("csv", "svg", "dxf")
 """Files that are written unless others are asked for."""
 
-_MM = 1e3
 _COLUMNS = "angle_deg,direction_deg,x_mm,y_mm,lever_arm_mm,radius_of_curvature_mm,radius_mm"
 
 
@@ -102,7 +101,7 @@ def write_drawings(
         texts = _contour_texts(contour, note, cable_radius)
     elif cable_radius:
         raise ValueRangeError(
-            f"cable_radius {cable_radius * _MM:g} mm", "is declared by the machined cam already",
+            f"cable_radius {cable_radius * MM:g} mm", "is declared by the machined cam already",
             next_step="leave cable_radius out",
         )  # fmt: skip
     else:
@@ -151,12 +150,12 @@ def edge_csv(part: CamPart, *, note: str = "") -> str:
     head = [
         "# cam, machined edge; lengths in mm, axis at (0, 0), cable at angle zero along x",
         "# a row without a radius is a straight line; a positive radius turns to the left",
-        f"# cable radius {part.number('cable_radius') * _MM:.6g} mm is taken off",
+        f"# cable radius {part.number('cable_radius') * MM:.6g} mm is taken off",
         f"# {note}",
         "outline,start_x_mm,start_y_mm,end_x_mm,end_y_mm,radius_mm,centre_x_mm,centre_y_mm",
     ]
     cells = [
-        ",".join([what, *("" if item is None else f"{item * _MM + 0.0:.6f}" for item in row)])
+        ",".join([what, *("" if item is None else f"{item * MM + 0.0:.6f}" for item in row)])
         for what, row in rows
     ]
     return "\n".join([*head, *cells]) + "\n"
@@ -164,21 +163,21 @@ def edge_csv(part: CamPart, *, note: str = "") -> str:
 
 def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
     """Return the table of the lower right lip; the other three are its mirror images."""
-    points = contour.surface(cable_radius) * _MM
+    points = contour.surface(cable_radius) * MM
     table = np.column_stack(
         [
             np.degrees(contour.angles),
             np.degrees(contour.directions),
             points,
-            contour.lever_arms * _MM,
-            (contour.radii_of_curvature - cable_radius) * _MM,
+            contour.lever_arms * MM,
+            (contour.radii_of_curvature - cable_radius) * MM,
             np.hypot(*points.T),
         ]
     )
     head = [
         "# cam contour, lower right lip in the frame of the cam; lengths in mm, angles in deg",
-        f"# cable radius {cable_radius * _MM:.6g} mm is taken off, "
-        f"anchor distance {contour.anchor_distance * _MM:.6g} mm",
+        f"# cable radius {cable_radius * MM:.6g} mm is taken off, "
+        f"anchor distance {contour.anchor_distance * MM:.6g} mm",
         f"# {note}",
         _COLUMNS,
     ]
@@ -187,7 +186,7 @@ def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
 
 def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
     """Return a picture at scale 1:1: both halves, the centre, the cable at rest and at the last angle."""
-    reach = 1.15 * float(contour.radii.max()) * _MM + 4.0
+    reach = 1.15 * float(contour.radii.max()) * MM + 4.0
     last = float(contour.angles[-1])
     halves = [_polygon(half) for half in contour.outlines(cable_radius=cable_radius)]
     # In the frame of the cam the cable turns the other way.
@@ -210,7 +209,7 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
 
 def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
     """Return both halves as closed polylines on the layer ``CONTOUR``, in millimetres."""
-    taken = f"cable radius {cable_radius * _MM:.6g} mm taken off" if cable_radius else "cable's centre line"
+    taken = f"cable radius {cable_radius * MM:.6g} mm taken off" if cable_radius else "cable's centre line"
     lines = [f"Cam contour, {taken}; millimetres, 1:1", "no edge to be cut: without channel and run-out"]
     return contour_dxf(contour.outlines(cable_radius=cable_radius), lines=[*lines, note] if note else lines)
 

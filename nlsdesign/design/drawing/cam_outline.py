@@ -9,11 +9,9 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
-from ...foundation.quantity import Quantity
+from ...foundation.quantity import MM, Quantity
 from .arc_path import ArcPath, biarc, clockwise_arc, joined, line
 from .lip_edge import LipEdge
-
-_MM = 1e3
 
 
 def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[ArcPath, ArcPath]:
@@ -33,8 +31,8 @@ def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[A
     taken = float(seat[0].points[-1][0]) if seat else 0.0
     if relief.points[0][0] < taken:
         raise ValueRangeError(
-            f"channel, {_MM * float(mouth[0]):.4g} mm from the axis to its mouth",
-            f"needs {_MM * (float(mouth[0] - relief.points[0][0]) + taken):.4g} mm for its relief"
+            f"channel, {MM * float(mouth[0]):.4g} mm from the axis to its mouth",
+            f"needs {MM * (float(mouth[0] - relief.points[0][0]) + taken):.4g} mm for its relief"
             + (" and the ferrule" if seat else ""),
             next_step="take a smaller channel_clearance or ferrule, or a contour that begins farther out",
         )
@@ -89,7 +87,7 @@ def _back(circles: list[tuple[Array, float]], first: float, last: float) -> ArcP
         pieces = [(one, first, into), (body, into, out), (other, out, last)]
     else:
         raise ArrangementError(
-            f"body of radius {_MM * body[1]:.4g} mm",
+            f"body of radius {MM * body[1]:.4g} mm",
             "has no convex back together with the ends of the edge",
             next_step="take a smaller over_travel or body_radius, or a shorter lead_in",
         )
@@ -121,8 +119,8 @@ def _seat(radius: float, depth: float) -> ArcPath:
     """Return the pocket of a ferrule about the origin, below a wall at −depth, from left to right."""
     if radius <= depth:
         raise ValueRangeError(
-            f"ferrule seat of {_MM * 2 * radius:.4g} mm",
-            f"is no wider than the channel, {_MM * 2 * depth:.4g} mm",
+            f"ferrule seat of {MM * 2 * radius:.4g} mm",
+            f"is no wider than the channel, {MM * 2 * depth:.4g} mm",
             next_step="give the diameter of the ferrule",
         )
     half = math.sqrt(radius**2 - depth**2)

@@ -10,13 +10,13 @@ from scipy.interpolate import BPoly
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import MM
 from ..statics.contour import Contour
 from .arc_path import ArcPath, biarc, clockwise_arc, joined
 
 ACCURACY = 0.5e-6
 """Largest distance between the arcs and the contour in m."""
 
-_MM = 1e3
 _REFINE = 4
 _CHECKED = 33
 
@@ -86,14 +86,14 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
     if radii[index] <= 0.0:
         raise ValueRangeError(
             f"contour {place}",
-            f"is concave there (radius of curvature {_MM * radii[index]:.4g} mm); a taut cable lifts off",
+            f"is concave there (radius of curvature {MM * radii[index]:.4g} mm); a taut cable lifts off",
             next_step="design with MinimumRadiusOfCurvature above the cable's radius",
         )
     if radii[index] < cable_radius + ACCURACY:
         raise ValueRangeError(
-            f"cable radius {_MM * cable_radius:g} mm",
+            f"cable radius {MM * cable_radius:g} mm",
             f"the cable is thicker than the sharpest radius under its centre line, "
-            f"{_MM * radii[index]:.4g} mm {place}",
+            f"{MM * radii[index]:.4g} mm {place}",
             next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
         )
 

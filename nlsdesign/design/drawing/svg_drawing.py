@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...foundation.quantity import MM
 from .arc_path import ArcPath
 from .cam_part import CamPart
 
-_MM = 1e3
 _TEXT = 2.2
 
 
 def part_svg(part: CamPart, *, note: str = "") -> str:
     """Return a cam as it is made, at scale 1:1, its cable at angle zero and at both ends of the contour."""
-    reach = 1.12 * _MM * max(part.outermost, *(float(np.abs(cable.points).max()) for cable in part.cables))
+    reach = 1.12 * MM * max(part.outermost, *(float(np.abs(cable.points).max()) for cable in part.cables))
     body = []
     if part.base_radius:
         body.append(
@@ -36,8 +36,8 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
     ]
     body.append('<path d="M -1.5 0 H 1.5 M 0 -1.5 V 1.5" stroke="#202020" stroke-width="0.08"/>')
     text = (
-        f"Machined edge for a cable of radius {_MM * part.number('cable_radius'):.4g} mm, "
-        f"plate {_MM * part.number('thickness'):.4g} mm; mm, 1:1"
+        f"Machined edge for a cable of radius {MM * part.number('cable_radius'):.4g} mm, "
+        f"plate {MM * part.number('thickness'):.4g} mm; mm, 1:1"
     )
     return page(reach, body, lines=[text, note])
 
@@ -79,9 +79,9 @@ def page(reach: float, body: list[str], *, lines: list[str]) -> str:
 
 def path_data(path: ArcPath) -> str:
     """Return the path in mm as the data of an SVG path, y upwards."""
-    points, (_, ends, bulges) = path.points * _MM, path.ends
+    points, (_, ends, bulges) = path.points * MM, path.ends
     steps = [f"M {points[0][0]:.5f} {points[0][1]:.5f}"]
-    for (x, y), bulge, radius in zip(ends * _MM, bulges, np.abs(path.radii) * _MM, strict=True):
+    for (x, y), bulge, radius in zip(ends * MM, bulges, np.abs(path.radii) * MM, strict=True):
         if bulge == 0.0:
             steps.append(f"L {x:.5f} {y:.5f}")
         else:
@@ -92,7 +92,7 @@ def path_data(path: ArcPath) -> str:
 
 
 def _circle(x: float, y: float, radius: float, look: str) -> str:
-    return f'<circle cx="{_MM * x:.5f}" cy="{_MM * y:.5f}" r="{_MM * radius:.5f}" {look}/>'
+    return f'<circle cx="{MM * x:.5f}" cy="{MM * y:.5f}" r="{MM * radius:.5f}" {look}/>'
 
 
 def _escaped(text: str) -> str:

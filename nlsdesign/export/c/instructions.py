@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ...foundation.errors import ExportError
+from ...model.graph import fold, read_graph
 from .c_text import Real
 
 _INLINE = 64  # longest text that is written inside another expression
@@ -68,22 +69,16 @@ class _Graph:
 
     def __init__(self, function: ca.Function, inputs: Sequence[Sequence[str]]) -> None:
         self.nodes: list[_Node] = []
-        self.results: dict[tuple[int, int], int] = {}
-        work: dict[int, int] = {}
-        for k in range(function.n_instructions()):
-            operation = function.instruction_id(k)
-            read, written = function.instruction_input(k), function.instruction_output(k)
-            if operation == ca.OP_OUTPUT:
-                self.results[written[0], written[1]] = work[read[0]]
-                continue
-            if operation == ca.OP_INPUT:
-                node = _Node(operation, text=inputs[read[0]][read[1]])
-            elif operation == ca.OP_CONST:
-                node = _Node(operation, value=float(function.instruction_constant(k)))
-            else:
-                node = self._choice(_Node(operation, tuple(work[i] for i in read)))
-            self.nodes.append(node)
-            work[written[0]] = len(self.nodes) - 1
+        self.results = fold(
+            read_graph(function),
+            lambda argument, element: self._added(_Node(ca.OP_INPUT, text=inputs[argument][element])),
+            lambda value: self._added(_Node(ca.OP_CONST, value=value)),
+            combined=lambda operation, operands: self._added(self._choice(_Node(operation, tuple(operands)))),
+        )
+
+    def _added(self, node: _Node) -> int:
+        self.nodes.append(node)
+        return len(self.nodes) - 1
 
     def _choice(self, node: _Node) -> _Node:
         """Return one choice for the sum of two half choices with opposite conditions."""

@@ -12,6 +12,8 @@ from typing import TypeVar
 
 import casadi as ca
 
+from ...model.graph import fold, read_graph
+
 Interval = tuple[float, float]
 EVERYTHING: Interval = (-math.inf, math.inf)
 
@@ -79,7 +81,7 @@ def dependences(function: ca.Function, symbols: Sequence[Sequence[int]], changin
             return weighed.times(weight, changing).joined(factor)
         return together.anyhow()
 
-    return _walk(function, given, lambda _: Dependence(), combined)
+    return _of_first_result(fold(read_graph(function), given, lambda _: Dependence(), combined=combined))
 
 
 def ranges(function: ca.Function, bounds: Sequence[Sequence[Interval]]) -> list[Interval]:
@@ -87,36 +89,19 @@ def ranges(function: ca.Function, bounds: Sequence[Sequence[Interval]]) -> list[
 
     The interval may be wider than the values that occur, never narrower.
     """
-    return _walk(
-        function,
+    values = fold(
+        read_graph(function),
         lambda argument, element: bounds[argument][element],
         lambda value: (value, value),
-        lambda operation, operands: _RANGES[operation](*operands) if operation in _RANGES else EVERYTHING,
+        combined=lambda operation, operands: _RANGES.get(operation, _anything)(*operands),
     )
+    return _of_first_result(values)
 
 
-def _walk(
-    function: ca.Function,
-    given: Callable[[int, int], _Value],
-    constant: Callable[[float], _Value],
-    combined: Callable[[int, Sequence[_Value]], _Value],
-) -> list[_Value]:
-    """Return what is known of each nonzero of the first result, in the order of computation."""
-    work: dict[int, _Value] = {}
-    results: dict[int, _Value] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        read, written = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_OUTPUT:
-            if written[0] == 0:
-                results[written[1]] = work[read[0]]
-        elif operation == ca.OP_INPUT:
-            work[written[0]] = given(read[0], read[1])
-        elif operation == ca.OP_CONST:
-            work[written[0]] = constant(float(function.instruction_constant(k)))
-        else:
-            work[written[0]] = combined(operation, [work[i] for i in read])
-    return [results[i] for i in range(len(results))]
+def _of_first_result(values: Mapping[tuple[int, int], _Value]) -> list[_Value]:
+    """Return what is known of each nonzero of the first result."""
+    first = {nonzero: value for (result, nonzero), value in values.items() if result == 0}
+    return [first[i] for i in range(len(first))]
 
 
 def _sum(a: Interval, b: Interval) -> Interval:
@@ -141,6 +126,10 @@ def _size(a: Interval) -> Interval:
 def _square(a: Interval) -> Interval:
     low, high = _size(a)
     return low * low, high * high
+
+
+def _anything(*_: Interval) -> Interval:
+    return EVERYTHING
 
 
 def _choice(_: Interval, a: Interval) -> Interval:

@@ -20,7 +20,7 @@ from ...foundation.locations import version
 from ...foundation.quantity import NOT_STATED, parse_unit
 from ...foundation.writing import write_text
 from ...model import FlatModel, Variable
-from ...model.function_steps import Instruction, read_instructions
+from ...model.graph import Instruction, read_graph
 from ..c.c_text import comment
 from ..c.provenance import origin_lines, stamped
 from .modelica_terms import ATOM, SERIES, SIGNED, WRITTEN_TWICE, Term, kept, term
@@ -52,7 +52,7 @@ class ModelicaEquations:
 
 def modelica_equations(model: FlatModel, names: Mapping[str, str]) -> ModelicaEquations:
     """Return the equations of a continuous model."""
-    steps, results = read_instructions(model.equations)
+    steps, results, _ = read_graph(model.equations)
     groups = (model.states, model.outputs, model.signals)
     given = {v.name for group in (model.states, model.inputs, model.parameters) for v in group}
     called: defaultdict[int, list[str]] = defaultdict(list)
@@ -77,9 +77,8 @@ def _uses(steps: Sequence[Instruction], wanted: set[int]) -> Counter[int]:
     for number in range(len(steps) - 1, -1, -1):
         if uses[number]:
             weight = 2 if steps[number].operation in WRITTEN_TWICE else 1
-            # CasADi names the operand of an operation on one value twice.
-            for operand in set(steps[number].operands):
-                uses[operand] += weight * max(1, steps[number].operands.count(operand))
+            for operand in steps[number].operands:
+                uses[operand] += weight
     return uses
 
 
@@ -116,7 +115,7 @@ class _Reader:
 
     def _value(self, step: Instruction) -> Term:
         if step.operation == ca.OP_CONST:
-            text = literal(float(step.extra))
+            text = literal(step.extra)
             return Term(text, SIGNED if text.startswith("-") else ATOM)
         if step.operation == ca.OP_INPUT:
             group = (self.model.states, self.model.inputs, self.model.parameters)

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...foundation.arrays import Array
+from ...foundation.quantity import MM
 from .cam_motion import CamMotion
 from .number_text import significant
 from .style import BLUE, VERMILLION, described, panels, styled
 
-_MM = 1e3
 _POINTS = 24
 """Half the number of points above which a lip or the cable along it is drawn with fewer points."""
 MARKER = "now"
@@ -66,10 +66,10 @@ def cam_picture(motion: CamMotion, *, start: float | None = None) -> CamPicture:
     tallest = max(float(np.max(motion.contour.radii)), 6.5e-3)
     lower, upper = motion.halves
     return CamPicture(
-        halves=(_path(_reduced(lower) * _MM) + " Z", _path(_reduced(upper) * _MM) + " Z"),
-        width=motion.wall * _MM + 2.0,
-        height=tallest * _MM + 1.5,
-        wall=motion.wall * _MM,
+        halves=(_path(_reduced(lower) * MM) + " Z", _path(_reduced(upper) * MM) + " Z"),
+        width=motion.wall * MM + 2.0,
+        height=tallest * MM + 1.5,
+        wall=motion.wall * MM,
         frames=frames,
         start=first,
         curve=curve,
@@ -121,15 +121,15 @@ def _frame(motion: CamMotion, index: int, shift: Array) -> dict[str, Any]:
     whole = np.vstack([_reduced(wrapped), contact, guide, clamp])
     return {
         "angle": round(float(np.degrees(motion.angles[index])), 1),
-        "cable": _path(whole * _MM),
-        "contact": _rounded(contact * _MM),
-        "foot": _rounded(foot * _MM),
-        "guide": _rounded(guide * _MM),
-        "rubber": _rounded(np.array([clamp[0], guide[1] - height / 2, length, height]) * _MM),
+        "cable": _path(whole * MM),
+        "contact": _rounded(contact * MM),
+        "foot": _rounded(foot * MM),
+        "guide": _rounded(guide * MM),
+        "rubber": _rounded(np.array([clamp[0], guide[1] - height / 2, length, height]) * MM),
         "marker": _rounded(shift),
         "words": {
-            "lever arm": f"{_MM * abs(motion.lever_arms[index]):.2f} mm",
-            "extension": f"{_MM * motion.extensions[index]:.2f} mm",
+            "lever arm": f"{MM * abs(motion.lever_arms[index]):.2f} mm",
+            "extension": f"{MM * motion.extensions[index]:.2f} mm",
             "force": f"{motion.forces[index]:.1f} N",
             "torque": f"{motion.torques[index]:.2f} N·m".replace("-", "−"),
         },

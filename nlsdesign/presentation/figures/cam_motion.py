@@ -14,6 +14,7 @@ from ...design import Contour, elastic_law
 from ...design.statics.contour import turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import MM
 from ...model import FlatModel
 from .style import (
     BLUE,
@@ -30,7 +31,6 @@ from .style import (
     styled,
 )
 
-_MM = 1e3
 _CLEARANCE = 3e-3
 """Smallest distance in m between guide and cable clamp, so that both can be seen."""
 _THICKNESS = 9e-3
@@ -113,7 +113,7 @@ class CamMotion:
         concave = np.degrees(self.contour.angles[rho < 0.0])
         return (
             f"The lips are concave between {concave[0]:.1f}° and {concave[-1]:.1f}°: there the radius of "
-            f"curvature is negative (down to −{-_MM * float(np.min(rho)):.1f} mm) and the curve may cross "
+            f"curvature is negative (down to −{-MM * float(np.min(rho)):.1f} mm) and the curve may cross "
             "itself. A cable cannot follow it, so this cam cannot be made as drawn; the torque is that of "
             "the law, not of such a cam."
         )
@@ -260,21 +260,21 @@ def cam_positions(motion: CamMotion, *, angles: Sequence[float] | None = None) -
     return described(
         figure,
         f"The cam at {shown}: the cable runs from the cam's centre over its lip to a guide on either side "
-        f"and stretches the rubber behind it by {_MM * float(np.max(motion.extensions)):.1f} mm at most.",
+        f"and stretches the rubber behind it by {MM * float(np.max(motion.extensions)):.1f} mm at most.",
     )
 
 
 def _draw(axes: Axes, motion: CamMotion, index: int) -> None:
     for half in motion.halves:
         axes.fill(
-            *(turn(half, float(motion.angles[index])) * _MM).T,
+            *(turn(half, float(motion.angles[index])) * MM).T,
             facecolor=GRID.light,
             edgecolor=MUTED.light,
             linewidth=0.8,
         )
-    cable = motion.cable(index) * _MM
-    length, height = (item * _MM for item in motion.rubber(index))
-    wall, y = motion.wall * _MM, cable[-1, 1]
+    cable = motion.cable(index) * MM
+    length, height = (item * MM for item in motion.rubber(index))
+    wall, y = motion.wall * MM, cable[-1, 1]
     for side in (1.0, -1.0):
         end = np.vstack([cable, [[wall - length, y]]]) * side
         axes.plot(*end.T, color=BLUE.light, linewidth=1.4)
@@ -285,7 +285,7 @@ def _draw(axes: Axes, motion: CamMotion, index: int) -> None:
             alpha=0.85,
         )
         axes.plot([side * wall] * 2, [-6.5, 6.5], color=MUTED.light, linewidth=2.0)
-        axes.plot([side * motion.guide * _MM], [side * y], marker="o", color=MUTED.light, markersize=4)
+        axes.plot([side * motion.guide * MM], [side * y], marker="o", color=MUTED.light, markersize=4)
         axes.plot(*(side * cable[-2]), marker="o", color=VERMILLION.light, markersize=5)
     _lever_arm(axes, cable[-2], cable[-1])
     axes.plot([0], [0], marker="o", color=INK.light, markersize=4, markerfacecolor=SURFACE.light)
@@ -295,7 +295,7 @@ def _draw(axes: Axes, motion: CamMotion, index: int) -> None:
         axes.add_patch(Arc((0, 0), 2 * reach, 2 * reach, theta1=min(0, degrees), theta2=max(0, degrees),
                            edgecolor=MUTED.light, linewidth=0.8))  # fmt: skip
     axes.set_title(
-        f"{degrees:.0f}°: lever arm {_MM * motion.lever_arms[index]:.1f} mm, "
+        f"{degrees:.0f}°: lever arm {MM * motion.lever_arms[index]:.1f} mm, "
         f"{motion.forces[index]:.0f} N, {motion.torques[index]:.2f} N·m"
     )
     axes.set_aspect("equal")

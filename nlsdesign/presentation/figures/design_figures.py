@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ...design import CamDesign, Contour, LimitState
 from ...design.statics.contour import turn
 from ...foundation.arrays import Array
-from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.quantity import MM, parse_unit, with_unit
 from .style import (
     AFTER,
     BLUE,
@@ -26,8 +26,6 @@ from .style import (
     panels,
     styled,
 )
-
-_MM = 1e3
 
 
 @styled
@@ -48,18 +46,18 @@ def design_picture(design: CamDesign) -> Figure:
     for panel, angle in zip(axes, (0.0, last), strict=True):
         _draw(panel, design, angle)
     low, high = (pick([end(panel) for panel in axes]) for pick, end in ((min, _lowest), (max, _highest)))
-    low -= 0.08 * (wide - left) * _MM  # room for the dimensions
+    low -= 0.08 * (wide - left) * MM  # room for the dimensions
     for panel in axes:
-        panel.set_xlim(left * _MM, wide * _MM)
+        panel.set_xlim(left * MM, wide * MM)
         panel.set_ylim(low, high + 2.0)
-    figure.set_figheight(2.0 * (WIDTH - 0.8) * (high + 2.0 - low) / ((wide - left) * _MM) + 1.2)
-    _dimension_radius(axes[0], design, low + 0.02 * (wide - left) * _MM)
+    figure.set_figheight(2.0 * (WIDTH - 0.8) * (high + 2.0 - low) / ((wide - left) * MM) + 1.2)
+    _dimension_radius(axes[0], design, low + 0.02 * (wide - left) * MM)
     axes[1].set_xlabel(f"distance from the centre in mm{_rubber_note(design)}")
-    radius = float(design.contour.radii.max()) * _MM
+    radius = float(design.contour.radii.max()) * MM
     return described(
         figure,
         f"The designed cam at 0° and {np.degrees(last):.0f}°, to scale: radius {radius:.1f} mm, lever arm up "
-        f"to {_MM * float(design.contour.lever_arms.max()):.1f} mm; the rubber is "
+        f"to {MM * float(design.contour.lever_arms.max()):.1f} mm; the rubber is "
         f"{_rubber_words(design)}.",
     )
 
@@ -124,25 +122,25 @@ def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
     contour = design.contour
     parallel = not np.isfinite(contour.anchor_distance)
     for half in _halves(contour, parallel):
-        axes.fill(*(turn(half, angle) * _MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
+        axes.fill(*(turn(half, angle) * MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
     arm = float(np.interp(angle, contour.angles, contour.lever_arms))
     contact = _contact(contour, angle)
     end = _end_of_cable(contour, float(contour.radii.max())) + (contact * [0.0, 1.0] if parallel else 0.0)
     for side in (1.0,) if parallel else (1.0, -1.0):
-        line = np.vstack([contact, end]) * side * _MM
+        line = np.vstack([contact, end]) * side * MM
         axes.plot(*line.T, color=BLUE.light, linewidth=1.6)
         axes.plot(*line[0], marker="o", color=VERMILLION.light, markersize=5)
         if not parallel:
             axes.plot(*line[1], marker="o", color=MUTED.light, markersize=4)
-        _rubber(axes, design, end * side * _MM, side, angle)
+        _rubber(axes, design, end * side * MM, side, angle)
     along = (end - contact) / float(np.hypot(*(end - contact)))
-    foot = (contact - along * float(contact @ along)) * _MM
+    foot = (contact - along * float(contact @ along)) * MM
     axes.plot([0.0, foot[0]], [0.0, foot[1]], color=GREEN.light, linewidth=1.4, linestyle=(0, (2, 1)))
     axes.plot([0], [0], marker="o", color=INK.light, markersize=4, markerfacecolor=SURFACE.light)
     force = float(np.interp(angle, design.curves.angles, design.curves.forces))
     torque = float(np.interp(angle, design.check.angles, design.check.torques))
     axes.set_title(
-        f"{np.degrees(angle):.0f}°: arm {_MM * arm:.1f} mm, {force:.0f} N, {torque:.2f} N·m", fontsize=8.5
+        f"{np.degrees(angle):.0f}°: arm {MM * arm:.1f} mm, {force:.0f} N, {torque:.2f} N·m", fontsize=8.5
     )
     axes.set_aspect("equal")
     axes.grid(visible=False)
@@ -174,14 +172,14 @@ def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: flo
         return
     length, area = pieces[0]
     stretched = length + float(np.interp(angle, design.curves.angles, design.curves.extensions))
-    height, start = float(np.sqrt(area)) * _MM, 4.0
-    x = side * (np.array([0.0, stretched * _MM, stretched * _MM, 0.0]) + start) + place[0]
+    height, start = float(np.sqrt(area)) * MM, 4.0
+    x = side * (np.array([0.0, stretched * MM, stretched * MM, 0.0]) + start) + place[0]
     y = place[1] + np.array([-0.5, -0.5, 0.5, 0.5]) * height
     axes.fill(x, y, facecolor=ORANGE.light, alpha=0.85)
     axes.plot([place[0], place[0] + side * start], [place[1]] * 2, color=BLUE.light, linewidth=1.6)
     if side > 0.0:
         axes.annotate(
-            f"{stretched * _MM:.1f}", (float(np.mean(x)), float(y.min())), (0, -9), ha="center", fontsize=7.5,
+            f"{stretched * MM:.1f}", (float(np.mean(x)), float(y.min())), (0, -9), ha="center", fontsize=7.5,
             textcoords="offset points", color=INK.light,
         )  # fmt: skip
 
@@ -204,7 +202,7 @@ def _rubber_note(design: CamDesign) -> str:
     if not pieces:
         return ""
     length, area = pieces[0]
-    return f"; rubber unstretched {length * _MM:.1f} mm, {area * _MM**2:.1f} mm² (drawn square)"
+    return f"; rubber unstretched {length * MM:.1f} mm, {area * MM**2:.1f} mm² (drawn square)"
 
 
 def _rubber_words(design: CamDesign) -> str:
@@ -212,15 +210,15 @@ def _rubber_words(design: CamDesign) -> str:
     if not pieces:
         return "not a declared piece"
     length, area = pieces[0]
-    return f"{length * _MM:.1f} mm long with a section of {area * _MM**2:.0f} mm²"
+    return f"{length * MM:.1f} mm long with a section of {area * MM**2:.0f} mm²"
 
 
 def _dimension_radius(axes: Axes, design: CamDesign, y: float) -> None:
     """Dimension the largest radius of the cam and the distance of the anchor."""
-    contour, radius = design.contour, float(design.contour.radii.max()) * _MM
-    anchor = float(_end_of_cable(contour, radius / _MM)[0]) * _MM
+    contour, radius = design.contour, float(design.contour.radii.max()) * MM
+    anchor = float(_end_of_cable(contour, radius / MM)[0]) * MM
     _dimension(axes, 0.0, radius, y, f"R {radius:.1f}")
-    if contour.anchor_distance * _MM == anchor:
+    if contour.anchor_distance * MM == anchor:
         _dimension(axes, 0.0, -anchor, y, f"anchor {anchor:.1f}")
 
 

@@ -14,11 +14,10 @@ from matplotlib.patches import Circle
 from ...design import CamPart
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import Quantity, with_unit
+from ...foundation.quantity import MM, Quantity, with_unit
 from .sheet import THICK, THIN, Sheet
 from .style import GRID, MUTED, SURFACE, VERMILLION, described, styled
 
-_MM = 1e3
 _WIDTH, _HEIGHT, _BORDER = 297.0, 210.0, 8.0
 _COLUMN = 202.0
 """Left edge of the column with tables and title block."""
@@ -157,31 +156,31 @@ class _View:
         self.low, self.high = every.min(axis=0), every.max(axis=0)
         left, lower, right, upper = _VIEW
         room = np.array([right - left, upper - lower])
-        fits = [s for s in _SCALES if np.all(s * _MM * (self.high - self.low) <= room)]
+        fits = [s for s in _SCALES if np.all(s * MM * (self.high - self.low) <= room)]
         self.scale = fits[0] if fits else _SCALES[-1]
         self.origin = (
-            np.array([left + right, lower + upper]) / 2 - self.scale * _MM * (self.low + self.high) / 2
+            np.array([left + right, lower + upper]) / 2 - self.scale * MM * (self.low + self.high) / 2
         )
 
     def at(self, points: Array) -> Array:
         """Return places on the page of points of the part."""
-        result: Array = self.origin + self.scale * _MM * np.asarray(points)
+        result: Array = self.origin + self.scale * MM * np.asarray(points)
         return result
 
 
 def _main_view(page: Sheet, view: _View) -> None:
     part = view.part
     if part.base_radius:
-        _circle(page, view.at(np.zeros(2)), view.scale * _MM * part.base_radius, linewidth=THICK)
+        _circle(page, view.at(np.zeros(2)), view.scale * MM * part.base_radius, linewidth=THICK)
     for outline in view.outlines:
         page.area(view.at(outline), facecolor=GRID.light)
     for hole in part.holes:
         _circle(
-            page, view.at(hole.centre), view.scale * _MM * hole.diameter / 2,
+            page, view.at(hole.centre), view.scale * MM * hole.diameter / 2,
             linewidth=THIN if hole.base_only else THICK, linestyle=(0, (3, 2)) if hole.base_only else "-",
             facecolor="none" if hole.base_only else SURFACE.light,
         )  # fmt: skip
-        _cross(page, view.at(hole.centre), view.scale * _MM * hole.diameter / 2 + 1.2)
+        _cross(page, view.at(hole.centre), view.scale * MM * hole.diameter / 2 + 1.2)
     for cable in part.cables:
         page.line(*view.at(_clipped(cable.points, 1.06 * part.outermost)), color=VERMILLION.light, width=THIN)
     low, high = view.at(view.low) - 4.0, view.at(view.high) + 4.0
@@ -189,7 +188,7 @@ def _main_view(page: Sheet, view: _View) -> None:
     page.line((axis[0], low[1]), (axis[0], high[1]), linestyle=_AXIS, color=MUTED.light)
     page.line((low[0], axis[1]), (high[0], axis[1]), linestyle=_AXIS, color=MUTED.light)
     if "bolt_circle" in part.numbers:
-        circle = view.scale * _MM * part.number("bolt_circle") / 2
+        circle = view.scale * MM * part.number("bolt_circle") / 2
         _circle(page, axis, circle, linewidth=THIN, linestyle=_AXIS, edgecolor=MUTED.light)
 
 
@@ -266,10 +265,10 @@ def _side_view(page: Sheet, view: _View) -> None:
     """Plate seen from the right: lips and, with a groove, the base plate."""
     part = view.part
     left = 184.0
-    thick = view.scale * _MM * part.number("thickness")
+    thick = view.scale * MM * part.number("thickness")
     if thick > 14.0:
         left = max(198.0 - thick - 2.0, _VIEW[2] + 8.0)
-    floor = thick - view.scale * _MM * part.number("groove_depth") if part.base_radius else 0.0
+    floor = thick - view.scale * MM * part.number("groove_depth") if part.base_radius else 0.0
     for outline in view.outlines:
         low, high = (
             view.at(np.array([0.0, float(value)]))[1] for value in (outline[:, 1].min(), outline[:, 1].max())
@@ -303,19 +302,19 @@ def _mouth_detail(page: Sheet, part: CamPart) -> None:
     inside = part.number("channel_width")
     relief = part.outlines[0].points[-1] if len(part.outlines[0].points) else np.zeros(2)
     shown = max(1.6 * inside, 1.25 * (mouth - float(relief[0])), 4 * part.number("cable_radius"))
-    scale = next((s for s in _SCALES if s * _MM * shown <= radius), _SCALES[-1])
+    scale = next((s for s in _SCALES if s * MM * shown <= radius), _SCALES[-1])
     middle = np.array([mouth, 0.0])
     frame = Circle((x, y), radius, facecolor="none", edgecolor=MUTED.light, linewidth=THIN)
     page.axes.add_patch(frame)
     for outline in part.outlines:
-        patch = page.area((outline.polygon(5e-7) - middle) * _MM * scale + [x, y], facecolor=GRID.light)
+        patch = page.area((outline.polygon(5e-7) - middle) * MM * scale + [x, y], facecolor=GRID.light)
         patch.set_clip_path(frame)
-    half = _MM * scale * part.number("mouth_width") / 2
+    half = MM * scale * part.number("mouth_width") / 2
     text = f"{_length(part.number('mouth_width'))} at the mouth"
     page.measure(
         np.array([x, y - half]), np.array([x, y + half]), text=text, away=x + radius + 3.0, upright=True
     )
-    half, at = _MM * scale * inside / 2, x - 0.75 * radius
+    half, at = MM * scale * inside / 2, x - 0.75 * radius
     text = f"{_length(inside)} inside"
     page.measure(
         np.array([at, y - half]), np.array([at, y + half]), text=text, away=x - radius - 3.0, upright=True
@@ -324,7 +323,7 @@ def _mouth_detail(page: Sheet, part: CamPart) -> None:
 
 
 def _notes(page: Sheet, part: CamPart, title: TitleBlock) -> None:
-    tolerance = _MM * part.number("edge_tolerance")
+    tolerance = MM * part.number("edge_tolerance")
     lines = [
         f"1  Edge under the cable: lines and arcs of {title.file}, profile ± {tolerance:.3g} mm over the",
         "    contact and the run-out; no burr, break the flanks 0.1 mm.",
@@ -356,7 +355,7 @@ def _column(
             (
                 f"{math.degrees(r.angle):.1f}",
                 f"{r.torque:.3f}",
-                f"{_MM * r.lever_arm:.3f}",
+                f"{MM * r.lever_arm:.3f}",
                 f"{r.tension:.1f}",
             )
             for r in rows
@@ -416,10 +415,10 @@ def _rectangle(x: float, y: float, width: float, height: float) -> Array:
 
 
 def _length(value: float) -> str:
-    return f"{round(_MM * value, 2):g}"
+    return f"{round(MM * value, 2):g}"
 
 
 def _value(number: Quantity) -> str:
     if number.unit == "m":
-        return f"{_MM * number.number:.4g} mm"
+        return f"{MM * number.number:.4g} mm"
     return f"{number.shown:.4g}°" if number.unit == "deg" else with_unit(f"{number.shown:.4g}", number.unit)

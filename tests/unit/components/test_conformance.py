@@ -1,7 +1,7 @@
 """What holds for every component alike: units, words, sources, derivatives, pickle, print, deck, C.
 
-The components are taken from the public list of the room, so a new one is tested from its first day: it needs
-an example in ``tests/parts``.
+The components are found where a deck finds them, so a new one is tested from its first day: it needs an
+example in ``tests/parts``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-import nlsdesign.components as room
 from nlsdesign.components import (
     Cam,
     Element,
@@ -32,20 +31,16 @@ from nlsdesign.export.compilation.cross_compiler import compiler, run_compiler
 from nlsdesign.export.fmi.fmu import fmi_headers, fmu_texts
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError
+from nlsdesign.foundation.extensions import extended_by
 from nlsdesign.foundation.quantity import parse_unit
 from nlsdesign.model import FlatModel, flatten
-from tests.parts import examples
+from tests.documented_law import documented_law
+from tests.parts import declarable, examples, missing_examples
 from tests.parts.systems import around, named
 from tests.selection import quick_only
 
 STEP = 1e-6
 """Relative to the size of each variable, for the finite difference."""
-
-
-def public() -> list[type[Part]]:
-    """Every component that can be declared."""
-    found = [each for each in vars(room).values() if inspect.isclass(each) and issubclass(each, Part)]
-    return sorted((c for c in found if not inspect.isabstract(c) and c is not Part), key=lambda c: c.__name__)
 
 
 def flat(part: Part) -> FlatModel:
@@ -60,15 +55,20 @@ def part(request: pytest.FixtureRequest) -> Part:
     return EXAMPLES[request.param]
 
 
-@pytest.mark.parametrize("kind", public(), ids=lambda c: c.__name__)
+@pytest.mark.parametrize("kind", declarable(), ids=lambda c: c.__name__)
 def test_every_component_has_an_example_in_each_of_its_readings(kind: type[Part]) -> None:
-    mine = [part for part in EXAMPLES.values() if type(part) is kind]
-    assert mine, f"{kind.__name__} has no example in tests/parts"
-    for field, kinds in readings(kind).items():
-        assert {type(getattr(part, field)) for part in mine} == set(kinds), field
+    assert not missing_examples(kind), missing_examples(kind)
 
 
-@pytest.mark.parametrize("kind", public(), ids=lambda c: c.__name__)
+def test_a_law_without_an_example_is_noticed(tmp_path: Path) -> None:
+    with extended_by(documented_law(tmp_path)):
+        (kind,) = (c for c in declarable() if c.__name__ == "WireBundle")
+        assert missing_examples(kind) == (
+            "WireBundle has no example: add one to EXAMPLES of a file in tests/parts"
+        )
+
+
+@pytest.mark.parametrize("kind", declarable(), ids=lambda c: c.__name__)
 def test_every_element_states_what_it_brings(kind: type[Part]) -> None:
     if issubclass(kind, Element) and kind not in (Parallel, Series):
         assert kind.phenomena

@@ -29,8 +29,8 @@ from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ....model.structure import body_moved_by
 from ...identification.equation_error.block import Block
+from ...identification.equation_error.block_noise import rate_span
 from ...identification.equation_error.evidence import Bench, Evidence
-from ...identification.equation_error.filter_choice import rate_span
 from ...identification.filters import derivative
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter

@@ -26,8 +26,9 @@ from ....model.readings import reading_of
 from ....model.structure import MovingBody, body_moved_by
 from ....simulation import Trace, simulate
 from ...identification.equation_error.block import Block
+from ...identification.equation_error.block_noise import LEAST_ROWS, BlockNoise, block_noise
 from ...identification.equation_error.block_response import DrivenBlock
-from ...identification.equation_error.evidence import Bench, Floor, noise_floor
+from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import Record
 from ..selection.hypothesis import Hypothesis
 from ..tearing import blocks_of
@@ -185,7 +186,6 @@ class Machine:
         return Record("experiment", Trace(time, dict(signals), dict(self.units), "experiment"))
 
 
-_LEAST_ROWS = 20
 _REACH = 1.02
 """A drive or motion may exceed its limit by this factor: the model that says so is not better known."""
 _DECIDES = 3.0
@@ -447,14 +447,14 @@ class _Plan:
         score = sum(math.log1p(0.5 * s.standard_errors**2) for s in separations)
         return _Judged(record, tuple(separations), score)
 
-    def _floors(self, record: Record) -> dict[str, Floor]:
+    def _floors(self, record: Record) -> dict[str, BlockNoise]:
         bench = self._bench
         floors = {
-            b.name: noise_floor(b, record, bench.noise, bench.filters[b.name])
+            b.name: block_noise(b, record, bench.noise, bench.filters[b.name])
             for b in self._blocks
             if b.name in self._open and b.name in bench.filters
         }
-        return {name: f for name, f in floors.items() if len(f.sigma) >= _LEAST_ROWS}
+        return {name: f for name, f in floors.items() if len(f.sigma) >= LEAST_ROWS}
 
 
 def _differing(hypotheses: Sequence[Hypothesis]) -> set[str]:

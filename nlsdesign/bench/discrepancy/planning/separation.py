@@ -22,8 +22,9 @@ from scipy.stats import qmc
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
+from ...identification.equation_error.block_noise import BlockNoise
 from ...identification.equation_error.block_response import DrivenBlock
-from ...identification.equation_error.evidence import Bench, Evidence, Floor
+from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter, box
 from ...identification.records.measurement import Record
@@ -77,7 +78,7 @@ class ReadyHypothesis:
     information: Mapping[str, Array]
     values: tuple[Values, ...]
 
-    def responses(self, record: Record, floors: Mapping[str, Floor]) -> list[dict[str, BlockResponse]]:
+    def responses(self, record: Record, floors: Mapping[str, BlockNoise]) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of the numbers that the hypothesis may have.
 
         ``floors``: by the name of the block; blocks without one are left out.
@@ -85,7 +86,7 @@ class ReadyHypothesis:
         return self.at(record, floors, self.values)
 
     def at(
-        self, record: Record, floors: Mapping[str, Floor], values: Sequence[Values]
+        self, record: Record, floors: Mapping[str, BlockNoise], values: Sequence[Values]
     ) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of some numbers."""
         result: list[dict[str, BlockResponse]] = [{} for _ in values]

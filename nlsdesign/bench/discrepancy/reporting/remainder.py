@@ -16,7 +16,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.quantity import typeset_unit, with_unit
-from ...identification.equation_error.filter_choice import rate_span
+from ...identification.equation_error.block_noise import rate_span
 from ...identification.filters import derivative
 from ...identification.records.measurement import RecordSet
 from ..selection.comparison import Judged

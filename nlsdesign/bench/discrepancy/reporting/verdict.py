@@ -13,7 +13,7 @@ from ....components.assembly.named_parts import Assembly
 from ....foundation.arrays import Array
 from ....foundation.quantity import significant, three_digits, typeset_unit
 from ....model import flatten
-from ...identification.equation_error.filter_choice import rate_span
+from ...identification.equation_error.block_noise import rate_span
 from ...identification.filters import derivative
 from ...identification.least_squares import Fit
 from ...identification.residuals import Binned, shapes

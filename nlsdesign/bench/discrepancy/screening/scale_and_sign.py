@@ -22,9 +22,9 @@ from ....model import FlatModel, flatten
 from ....model.readings import ReadingNames, reading_of
 from ....model.structure import MovingBody, top_part
 from ...identification.equation_error.block import Block
+from ...identification.equation_error.block_noise import rate_span
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench
-from ...identification.equation_error.filter_choice import rate_span
 from ...identification.filters import derivative
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding

@@ -19,8 +19,9 @@ from ....foundation.processes import parallel_map
 from ....foundation.quantity import Quantity
 from ....model import Variable, flatten
 from ...identification.equation_error.block import Block
+from ...identification.equation_error.block_noise import BlockNoise
 from ...identification.equation_error.block_response import free_in
-from ...identification.equation_error.evidence import Bench, Evidence, Floor
+from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter, declared_parameter, free_parameter
 from ...identification.records.measurement import Record
@@ -212,7 +213,7 @@ class Judged:
 
     block: Block
     record: Record
-    floor: Floor
+    floor: BlockNoise
     predicted: Array
     residual: Array
 

@@ -2,74 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import casadi as ca
 import numpy as np
-import scipy.special
 
 from ....foundation.arrays import Array
+from ....model.graph import fold, read_graph
+from ....simulation.numpy_columns import ON_COLUMNS
 
 _CHUNK = 250
 _COLUMNS = 4096
 """Columns that are computed at once: what an instruction works on then lies in the cache."""
 
-_OPERATIONS: dict[int, Callable[..., Any]] = {
-    ca.OP_ASSIGN: lambda a: a,
-    ca.OP_LIFT: lambda a, b: a,
-    ca.OP_ADD: np.add,
-    ca.OP_SUB: np.subtract,
-    ca.OP_MUL: np.multiply,
-    ca.OP_DIV: np.divide,
-    ca.OP_NEG: np.negative,
-    ca.OP_EXP: np.exp,
-    ca.OP_LOG: np.log,
-    ca.OP_POW: np.power,
-    ca.OP_CONSTPOW: np.power,
-    ca.OP_SQRT: np.sqrt,
-    ca.OP_SQ: np.square,
-    ca.OP_TWICE: lambda a: np.add(a, a),
-    ca.OP_INV: lambda a: np.divide(1.0, a),
-    ca.OP_SIN: np.sin,
-    ca.OP_COS: np.cos,
-    ca.OP_TAN: np.tan,
-    ca.OP_ASIN: np.arcsin,
-    ca.OP_ACOS: np.arccos,
-    ca.OP_ATAN: np.arctan,
-    ca.OP_ATAN2: np.arctan2,
-    ca.OP_SINH: np.sinh,
-    ca.OP_COSH: np.cosh,
-    ca.OP_TANH: np.tanh,
-    ca.OP_ASINH: np.arcsinh,
-    ca.OP_ACOSH: np.arccosh,
-    ca.OP_ATANH: np.arctanh,
-    ca.OP_LOG1P: np.log1p,
-    ca.OP_EXPM1: np.expm1,
-    ca.OP_HYPOT: np.hypot,
-    ca.OP_ERF: scipy.special.erf,
-    ca.OP_ERFINV: scipy.special.erfinv,
-    ca.OP_FLOOR: np.floor,
-    ca.OP_CEIL: np.ceil,
-    ca.OP_FMOD: np.fmod,
-    ca.OP_REMAINDER: lambda a, b: a - b * np.rint(a / b),
-    ca.OP_FABS: np.abs,
-    ca.OP_SIGN: np.sign,
-    ca.OP_COPYSIGN: np.copysign,
-    ca.OP_FMIN: np.fmin,
-    ca.OP_FMAX: np.fmax,
-    # Truth is a number in CasADi, and sums of truths are counts.
-    ca.OP_LT: lambda a, b: np.less(a, b) * 1.0,
-    ca.OP_LE: lambda a, b: np.less_equal(a, b) * 1.0,
-    ca.OP_EQ: lambda a, b: np.equal(a, b) * 1.0,
-    ca.OP_NE: lambda a, b: np.not_equal(a, b) * 1.0,
-    ca.OP_NOT: lambda a: np.equal(a, 0.0) * 1.0,
-    ca.OP_AND: lambda a, b: np.logical_and(a, b) * 1.0,
-    ca.OP_OR: lambda a, b: np.logical_or(a, b) * 1.0,
-    ca.OP_IF_ELSE_ZERO: lambda a, b: np.where(a, b, 0.0),
-}
-"""The elementary operations of CasADi on arrays, by number."""
+
+def _on_columns(operation: int, operands: Sequence[Any]) -> Any:
+    return ON_COLUMNS[operation](*operands)
 
 
 class ColumnFunction:
@@ -85,29 +35,7 @@ class ColumnFunction:
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._rows, self._size = function.size1_out(0) * function.size2_out(0), function.sz_w()
-        self._inputs: list[tuple[int, int]] = []
-        self._constants: list[float] = []
-        self._program: list[tuple[Callable[..., Any] | None, int, list[int]]] = []
-        self._prepare(function)
-
-    def _prepare(self, function: ca.Function) -> None:
-        """Read the instructions; inputs and constants get places of their own, before and behind CasADi's."""
-        place: dict[int, int] = {}
-        for k in range(function.n_instructions()):
-            operation, read = function.instruction_id(k), function.instruction_input(k)
-            written = function.instruction_output(k)
-            if operation == ca.OP_OUTPUT:
-                self._program.append((None, written[1], [place[read[0]]]))
-            elif operation == ca.OP_INPUT:
-                self._inputs.append((read[0], read[1]))
-                place[written[0]] = -len(self._inputs)
-            elif operation == ca.OP_CONST:
-                self._constants.append(float(function.instruction_constant(k)))
-                place[written[0]] = self._size + len(self._constants) - 1
-            else:
-                self._program.append((_OPERATIONS[operation], written[0], [place[i] for i in read]))
-                place[written[0]] = written[0]
+        self._rows, self._graph = function.numel_out(0), read_graph(function)
 
     def __call__(self, count: int, arrays: Sequence[Array]) -> Array:
         """Return the outputs, shape (rows, count).
@@ -124,15 +52,9 @@ class ColumnFunction:
         return result
 
     def _compute(self, arrays: Sequence[Array], result: Array) -> None:
-        given = [arrays[i][row] for i, row in reversed(self._inputs)]
-        value: list[Any] = [*[None] * self._size, *self._constants, *given]
-        for operation, place, read in self._program:
-            if operation is None:
-                result[place] = value[read[0]]
-            elif len(read) == 2:
-                value[place] = operation(value[read[0]], value[read[1]])
-            else:
-                value[place] = operation(value[read[0]])
+        values = fold(self._graph, lambda argument, row: arrays[argument][row], float, combined=_on_columns)
+        for (_, row), value in values.items():
+            result[row] = value
 
 
 class ChainFunction:

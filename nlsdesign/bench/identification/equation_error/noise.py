@@ -22,6 +22,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ....foundation.arrays import Array
+from ..filters import filter_weights
 from ..records.measurement import Record, RecordSet
 
 _DEGREE = 4
@@ -296,13 +297,20 @@ class Noise:
         """Return the standard deviation of the whole noise of a signal."""
         return math.sqrt(self.level[signal] ** 2 + sum(p.variance for p in self.parts.get(signal, ())))
 
-    def behind(self, signal: str, weights: Array, step: float) -> float:
-        """Return the standard deviation of the noise of a signal behind a filter."""
+    def behind(
+        self, signal: str, step: float, *, width: float = 0.0, order: int = 0, span: float = 0.0
+    ) -> float:
+        """Return the standard deviation of the noise of a signal behind a derivative and a filter.
+
+        ``width`` of the Gaussian, ``span`` of rates and the ``step`` between samples are in s.
+        """
+        weights = filter_weights(width, order, step, span)
         white = self.level[signal] * float(np.linalg.norm(weights))
         return math.sqrt(white**2 + variance_behind(self.parts.get(signal, ()), weights, step))
 
-    def memory(self, signal: str, weights: Array, step: float) -> tuple[NoisePart, ...]:
+    def memory(self, signal: str, step: float, *, width: float) -> tuple[NoisePart, ...]:
         """Return the parts of the noise of a signal that remember, with their variances behind a filter."""
+        weights = filter_weights(width, 0, step)
         parts = self.parts.get(signal, ())
         return tuple(NoisePart(variance_behind([p], weights, step), p.time) for p in parts)
 
@@ -315,7 +323,7 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     motions are at rest, and from what is left of a motion that repeats when it is subtracted from itself one
     period later. What drives a block varies at rest for other reasons than noise.
     """
-    seen = records.of("fit", "selection") or records.records
+    seen = records.deciding
     level, rounded, quanta = {}, {}, {}
     for column in records.columns:
         resolutions = [r.resolution_of(column.signal) for r in seen]

@@ -223,6 +223,11 @@ class RecordSet:
         """Full names of the measured signals."""
         return tuple(c.signal for c in self.columns)
 
+    @property
+    def deciding(self) -> tuple[Record, ...]:
+        """Records that may decide on noise and filters: those held out only where there are no others."""
+        return self.of("fit", "selection") or self.records
+
     def of(self, *roles: Role) -> tuple[Record, ...]:
         """Return the records of some roles.
 

@@ -10,6 +10,7 @@ the count of an encoder of the model; other uses of floor, such as the interval 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -19,6 +20,7 @@ from scipy.linalg import expm
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
 from ....model import FlatModel, Table
+from ....model.graph import applied, as_results, fold, read_graph
 from ....model.roles import measured_motion
 from ....model.transform import named
 from ...analysis.rest import evaluate_rows, rate_state, rest_states
@@ -45,39 +47,35 @@ def with_fine_counts(model: FlatModel) -> FlatModel:
         return model
     function = model.equations
     arguments = [ca.SX.sym(function.name_in(i), function.sparsity_in(i)) for i in range(function.n_in())]
-    results = [ca.SX.zeros(function.sparsity_out(i)) for i in range(function.n_out())]
-    work: dict[int, ca.SX] = {}
-    # What a place of the working memory holds: a count, something over a count, or half a count more.
-    kinds: dict[int, str] = {}
-    ratios: dict[int, ca.SX] = {}
-    for k in range(function.n_instructions()):
-        code, out, into = (
-            function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-        )  # fmt: skip
-        if code == ca.OP_OUTPUT:
-            results[out[0]].nz[out[1]] = work[into[0]]
-            continue
-        if code == ca.OP_INPUT:
-            value = arguments[into[0]].nz[into[1]]
-            kind = "count" if into[0] == _PARAMETER and into[1] in places else ""
-        elif code == ca.OP_CONST:
-            value, kind = ca.SX(function.instruction_constant(k)), ""
-        else:
-            read = [kinds.get(i, "") for i in into]
-            kind = _FOLLOWS.get((code, *read), "")
-            operands = [work[i] for i in into]
-            if kind == "shifted":
-                ratio = operands[read.index("ratio")]
-            if code == ca.OP_FLOOR and read == ["shifted"]:
-                value = ratios[into[0]]
-            else:
-                value = (ca.SX.binary if len(operands) == 2 else ca.SX.unary)(code, *operands)
-            if kind == "shifted":
-                ratios[out[0]] = ratio
-        work[out[0]], kinds[out[0]] = value, kind
+    values = fold(
+        read_graph(function),
+        lambda i, k: _Counted(arguments[i].nz[k], "count" if i == _PARAMETER and k in places else ""),
+        lambda value: _Counted(ca.SX(value)),
+        combined=_without_rounding,
+    )
+    results = as_results(function, {place: each.value for place, each in values.items()})
     names = ([function.name_in(i) for i in range(function.n_in())],
              [function.name_out(i) for i in range(function.n_out())])  # fmt: skip
     return replace(model, equations=ca.Function(function.name(), arguments, results, *names))
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """An expression, and whether it is a count, a ratio to one, or such a ratio shifted by half a count."""
+
+    value: ca.SX
+    kind: str = ""
+    ratio: ca.SX | None = None
+
+
+def _without_rounding(operation: int, operands: Sequence[_Counted]) -> _Counted:
+    """Return an operation as it is, but for the floor of a shifted ratio, which is the ratio."""
+    kinds = [each.kind for each in operands]
+    if operation == ca.OP_FLOOR and operands[0].ratio is not None:
+        return _Counted(operands[0].ratio)
+    kind = _FOLLOWS.get((operation, *kinds), "")
+    ratio = operands[kinds.index("ratio")].value if kind == "shifted" else None
+    return _Counted(applied(operation, [each.value for each in operands]), kind, ratio)
 
 
 class LinearMode(ABC):

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ArrangementError
+from ....model.graph import fold, read_graph
 
 Bounds: TypeAlias = tuple[Array, Array]
 
@@ -73,63 +74,45 @@ def enclose(function: ca.Function, boxes: Sequence[Sequence[tuple[ArrayLike, Arr
         for i in range(function.n_out())
     ]
     places = [_dense_places(function.sparsity_out(i)) for i in range(function.n_out())]
-    work: list[Bounds] = [(np.zeros(1), np.zeros(1))] * function.sz_w()
-    shares = _Shares()
     undecided = np.zeros(shape, dtype=bool)
-    with np.errstate(all="ignore"):
-        for k in range(function.n_instructions()):
-            kind, to, of = (
-                function.instruction_id(k),
-                function.instruction_output(k),
-                function.instruction_input(k),
+
+    def combined(operation: int, operands: Sequence[_Known]) -> _Known:
+        if operation not in _OPERATIONS:
+            raise ArrangementError(
+                f"bounds of '{function.name()}'", f"uses operation {operation}, whose range is not known here"
             )
-            if kind == ca.OP_OUTPUT:
-                low, high = results[to[0]]
-                low[..., places[to[0]][to[1]]], high[..., places[to[0]][to[1]]] = work[of[0]]
-                continue
-            if kind == ca.OP_INPUT:
-                value = given[of[0]][of[1]]
-            elif kind == ca.OP_CONST:
-                value = (np.array(function.instruction_constant(k)),) * 2
-            elif kind in _OPERATIONS:
-                of = of[: _OPERANDS.get(kind, 1)]
-                value = _OPERATIONS[kind](*[work[i] for i in of])
-                if shares.is_share(kind, of):
-                    value = np.maximum(value[0], 0.0), np.minimum(value[1], 1.0)
-                if kind == ca.OP_FLOOR:
-                    undecided |= np.broadcast_to(value[0] != value[1], shape)
-            else:
-                raise ArrangementError(
-                    f"bounds of '{function.name()}'", f"uses operation {kind}, whose range is not known here"
-                )
-            shares.follow(kind, to[0], of)
-            work[to[0]] = value
+        low, high = _OPERATIONS[operation](*[each.bounds for each in operands])
+        if operation == ca.OP_DIV and any(operands[0] is part for part in operands[1].sum_of):
+            low, high = np.maximum(low, 0.0), np.minimum(high, 1.0)
+        if operation == ca.OP_FLOOR:
+            undecided[...] |= np.broadcast_to(low != high, shape)
+        summed = operation == ca.OP_ADD and all(each.compared for each in operands)
+        return _Known((low, high), operation in (ca.OP_LE, ca.OP_LT), tuple(operands) if summed else ())
+
+    with np.errstate(all="ignore"):
+        values = fold(
+            read_graph(function),
+            lambda argument, element: _Known(given[argument][element]),
+            lambda value: _Known((np.array(value), np.array(value))),
+            combined=combined,
+        )
+    for (output, nonzero), known in values.items():
+        low, high = results[output]
+        place = places[output][nonzero]
+        low[..., place], high[..., place] = known.bounds
     return Enclosure(tuple(Range(low, high) for low, high in results), undecided)
 
 
-class _Shares:
-    """Knows which quotients are p/(p + q) of two truth values: the slope of the greater of two numbers."""
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """Bounds of a value; whether it is the truth of a comparison, or of which two such truths it is the sum.
 
-    def __init__(self) -> None:
-        self.truths: dict[int, int] = {}
-        self.sums: dict[int, tuple[int, int]] = {}
-        self.count = 0
+    A quotient p/(p + q) of two truths lies between zero and one: the slope of the greater of two numbers.
+    """
 
-    def is_share(self, kind: int, of: Sequence[int]) -> bool:
-        """Return whether an operation is such a quotient; it lies between zero and one."""
-        return kind == ca.OP_DIV and self.truths.get(of[0], -1) in self.sums.get(of[1], ())
-
-    def follow(self, kind: int, to: int, of: Sequence[int]) -> None:
-        """Take note of what an operation writes where."""
-        summed = kind == ca.OP_ADD and all(i in self.truths for i in of)
-        pair = (self.truths[of[0]], self.truths[of[1]]) if summed else None
-        self.truths.pop(to, None)
-        self.sums.pop(to, None)
-        if pair is not None:
-            self.sums[to] = pair
-        elif kind in (ca.OP_LE, ca.OP_LT):
-            self.count += 1
-            self.truths[to] = self.count
+    bounds: Bounds
+    compared: bool = False
+    sum_of: tuple[_Known, ...] = ()
 
 
 def _dense_places(sparsity: ca.Sparsity) -> list[int]:
@@ -319,11 +302,4 @@ _OPERATIONS: dict[int, Callable[..., Bounds]] = {
     ca.OP_ATAN: _rising(np.arctan), ca.OP_ASIN: _rising(np.arcsin), ca.OP_ASINH: _rising(np.arcsinh),
     ca.OP_ERF: _rising(np.vectorize(math.erf, otypes=[float])),
     ca.OP_SIN: _wave(np.sin), ca.OP_COS: _wave(np.cos),
-}  # fmt: skip
-_OPERANDS = {
-    kind: 2
-    for kind in (
-        *(ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_FMIN, ca.OP_FMAX, ca.OP_AND, ca.OP_OR),
-        *(ca.OP_EQ, ca.OP_NE, ca.OP_LT, ca.OP_LE, ca.OP_IF_ELSE_ZERO, ca.OP_POW, ca.OP_CONSTPOW),
-    )
 }  # fmt: skip

@@ -9,7 +9,7 @@ import pytest
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
-from nlsdesign.bench.identification.equation_error.evidence import Bench, Floor
+from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
 from nlsdesign.bench.identification.equation_error.noise import (
     Noise,
     NoisePart,
@@ -53,7 +53,7 @@ def test_the_deviation_of_flicker_noise_is_told_from_rests_that_are_shorter_than
         assert noise.seen[FORCE] == pytest.approx((1.144,) * 7, abs=0.02)
 
 
-def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, Floor]:
+def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, BlockNoise]:
     """Floors of a bench whose force has noise that remembers, seen in ten rests of 0.1 s."""
     records = RecordSet((record("a", 0.2, 1e-3),), COLUMNS)
     noise = estimate_noise(records)

@@ -15,8 +15,7 @@ from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.least_squares import fit
-from nlsdesign.bench.identification.parameters import declared_parameter
+from nlsdesign.bench.identification.least_squares import declared_parameter, fit
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.measurement import in_canonical_order
 from nlsdesign.bench.identification.records.quality import Finding

@@ -1,4 +1,6 @@
-"""How wide the filter of a block is: in seconds, from the motion and its noise, the same for all hypotheses.
+"""The noise of a block on a record: the filter it reads the record through, and the floor behind that filter.
+
+How wide the filter is follows in seconds from the motion and its noise, the same for all hypotheses.
 
 All terms of a balance pass one filter, so what it takes from the motion biases nothing; noise does. A noisy
 acceleration a + n in a balance J·a = T makes the inertia too small by the share var(n)/var(a), which no
@@ -25,17 +27,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
-from ....foundation.arrays import Array
+from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
-from ..filters import derivative, filter_weights, filtered
-from ..records.measurement import Record
+from ....foundation.quantity import with_unit
+from ..filters import Smoothing, derivative, difference, filter_weights, filtered, smoothing
+from ..records.measurement import Record, RecordSet
+from ..residuals import rmse
 from .block import Block
-from .noise import Noise
+from .noise import Noise, NoisePart, independent_number
 
 READING, BALANCE = 0.1, 0.2
 """Least widths, as radians of the typical motion. A balance holds a second derivative."""
@@ -64,10 +70,20 @@ _LEAST_SPAN = 8.0
 _STEP = 2.0**0.25
 _WIDTHS = 60
 """Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""
-_LEAST_ROWS = 200
+_ROWS_OF_SHORTEST = 200
 """Rows that the shortest record is read in, at least."""
 _PROBES = 2000
 """Rows of a record on which the power of a motion is estimated at most."""
+_NOISY, _SMEARED = 5.0, 0.027
+"""A moving block says nothing where its speed is below so many times the noise of the speed, and so much of
+the span of the rate times the acceleration: where friction bends the motion at a reversal, a rate misses by
+a twentieth of span and jump of the acceleration, and a usual jump is half the root mean square of it."""
+_SLOW_SHARE = 1e-2
+"""Of the filter of a row that may reach into a reversal."""
+_RECTIFIED = 0.1
+"""Share of the noise floor up to which a block may rectify the noise of an input: 0.01 of its square."""
+LEAST_ROWS = 20
+"""Rows in which a block says anything of a record, at least."""
 
 
 class Filters(NamedTuple):
@@ -89,6 +105,171 @@ class Filters(NamedTuple):
     span: float
     spacing: float
     straightened: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class BlockNoise:
+    """What a block makes of the noise of a record: the filter it reads through, and the floor behind it.
+
+    ``filter`` is a zero-phase filter, thinned, without the rows that say nothing; its shape is (rows, n).
+    ``sigma`` is the noise floor of each row in the unit of the block, ``raw_sigma`` that of each unfiltered
+    sample, shape (n,), which only blocks with a target use. Its own noise makes at most ``independent``
+    independent rows of them. The floor is known from ``known`` effective squares of that noise. Both are
+    infinite where the noise is white.
+    """
+
+    filter: Smoothing
+    sigma: Array
+    raw_sigma: Array
+    independent: float = math.inf
+    known: float = math.inf
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Index of the sample in the middle of each row."""
+        return self.filter.places
+
+
+def noise_of_blocks(
+    blocks: Sequence[Block], records: RecordSet, noise: Noise, given: Mapping[str, Filters]
+) -> tuple[dict[str, Filters], dict[tuple[str, str], BlockNoise]]:
+    """Return the filters of each block, and its noise on each record, by block and record.
+
+    Filters that were given are not chosen again. A MeasurementError is raised if no record moves enough to
+    say anything about a block, or if the channel that a block predicts has no noise.
+    """
+    filters = dict(given)
+    new = [block for block in blocks if block.name not in filters]
+    pace_by_order = paces(new, records.deciding, noise)
+    for block in blocks:
+        _check_alive(block, records, noise)
+        if block.name not in filters:
+            filters[block.name] = chosen_filters(block, records.deciding, noise, pace_by_order)
+    floors: dict[tuple[str, str], BlockNoise] = {}
+    for block in blocks:
+        seen = {r.name: block_noise(block, r, noise, filters[block.name]) for r in records.records}
+        floors |= {(block.name, r): floor for r, floor in seen.items() if len(floor.sigma) >= LEAST_ROWS}
+        if not any(name == block.name for name, _ in floors):
+            raise MeasurementError(
+                f"block '{block.name}'",
+                "no record moves enough to say anything about it",
+                next_step=_needed_motion(block, records, noise, filters[block.name]),
+            )
+    for block in new:
+        straightened = set[str]()
+        for record in records.deciding:
+            if (block.name, record.name) in floors:
+                shifts = rectified(block, record, noise, filters[block.name].span)
+                most = _RECTIFIED * rmse(floors[block.name, record.name].sigma)
+                straightened |= {name for name, shift in shifts.items() if shift > most}
+        filters[block.name] = filters[block.name]._replace(straightened=tuple(sorted(straightened)))
+    return filters, floors
+
+
+def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) -> BlockNoise:
+    """Return what a block makes of the noise of a record.
+
+    The noise of each input is carried to the output by the slope of the output with respect to it. Slow
+    noise is remembered only where the block does not take rates of it.
+    """
+    step, width, span = record.step, filters.width, filters.span
+    stride = max(1, round(filters.spacing / step))
+    inputs = measured_inputs(block, record, span)
+    rows = _rows(block, record, noise, filters, inputs)
+    gains = output_slopes(block, inputs, stride)
+    own = noise.behind(block.target, step, width=width) if block.target else 0.0
+    variance = np.full(gains.shape[1], own**2)
+    raw = np.full(gains.shape[1], noise.deviation(block.target) ** 2 if block.target else 0.0)
+    memory = list(noise.memory(block.target, step, width=width)) if block.target else []
+    for i, variable in enumerate(block.model.inputs):
+        drive = block.drives.get(variable.name)
+        if drive is None:
+            continue
+        # Rounding of a signal at rest is a constant error that no filter takes away.
+        constant = noise.rounded[drive.signal] and drive.order == 0
+        deviation = noise.deviation(drive.signal)
+        order = drive.order
+        behind = (
+            deviation if constant else noise.behind(drive.signal, step, width=width, order=order, span=span)
+        )
+        variance += (gains[i] * behind) ** 2
+        if order == 0:
+            raw += (gains[i] * deviation) ** 2
+            parts = noise.memory(drive.signal, step, width=width)
+            memory += [NoisePart(float(np.mean(gains[i] ** 2)) * p.variance, p.time) for p in parts]
+    every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
+    variance, raw, spacing = variance[every_row], raw[every_row], stride * step
+    shares = [NoisePart(p.variance / float(np.mean(variance)), p.time) for p in memory]
+    heard = {drive.signal for drive in block.drives.values() if drive.order == 0}
+    heard |= {block.target} if block.target else set()
+    squares = [
+        sum(independent_number(shares, max(1, round(t / spacing)), spacing) for t in noise.seen[signal])
+        for signal in heard.intersection(noise.seen)
+    ]
+    independent = independent_number(shares, len(rows.places), spacing) if shares else math.inf
+    known = min(squares, default=math.inf)
+    return BlockNoise(rows, np.sqrt(variance[rows.places]), np.sqrt(raw), independent, known)
+
+
+def _rows(block: Block, record: Record, noise: Noise, filters: Filters, inputs: Array) -> Smoothing:
+    """Return the rows of a record that say something of a block: not masked, and in motion where need be."""
+    n, step, span = len(record.trace), record.step, filters.span
+    stride = max(1, round(filters.spacing / step))
+    margin = max(len(difference(d.order, span / step)) // 2 for d in block.drives.values())
+    rows = smoothing(n, filters.width / step, stride, margin=margin)
+    masked = record.masked_in([*(drive.signal for drive in block.drives.values()), block.target or ""])
+    rows = rows[~rows.touched_by(masked)]
+    if block.moving is None:
+        return rows
+    drive = block.drives[block.moving]
+    rate = inputs[[v.name for v in block.model.inputs].index(block.moving)]
+    noisy = _NOISY * noise.behind(drive.signal, step, order=drive.order, span=span)
+    # A rate that is measured itself is not taken over a span.
+    blurred = _SMEARED * span * rmse(np.gradient(rate, step)) if drive.order else 0.0
+    # The filter smears what happens at a reversal; so its whole reach must be in motion.
+    slow = np.abs(rate) < math.hypot(noisy, blurred)
+    moving = _in_motion(rows, slow | _reverses(rate))
+    # A motion that is never between two reversals for long, as one that shakes, is read across them.
+    return moving if len(moving.places) >= LEAST_ROWS else _in_motion(rows, slow)
+
+
+def _in_motion(matrix: Smoothing, still: Mask) -> Smoothing:
+    """Return the rows that hardly reach into what is still."""
+    return matrix[np.flatnonzero(matrix @ still.astype(float) < _SLOW_SHARE)]
+
+
+def _reverses(rate: Array) -> Mask:
+    """Tell which samples have a reversal beside them: when in between it happened, no sample tells."""
+    between = rate[1:] * rate[:-1] < 0.0
+    beside: Mask = np.append(between, False) | np.append(False, between)
+    return beside
+
+
+def _check_alive(block: Block, records: RecordSet, noise: Noise) -> None:
+    if block.target is None or noise.deviation(block.target) > 0.0:
+        return
+    head = records.column(block.target).name
+    reasons = [f for f in records.findings if f.place.partition(", row")[0].endswith(f"column '{head}'")]
+    raise MeasurementError(
+        reasons[0].place if reasons else f"column '{head}'",
+        f"{reasons[0].text if reasons else 'has no noise'}, so block '{block.name}' cannot be judged",
+        next_step="check that the channel was connected, or leave its column out of records.toml",
+    )
+
+
+def _needed_motion(block: Block, records: RecordSet, noise: Noise, filters: Filters) -> str:
+    """Return which motion would say something about a block."""
+    if block.moving is None:
+        return f"records need at least {LEAST_ROWS * filters.spacing:.2g} s; record for longer"
+    drive = block.drives[block.moving]
+    least = min(
+        _NOISY * noise.behind(drive.signal, r.step, order=drive.order, span=filters.span)
+        for r in records.records
+    )
+    unit = records.records[0].trace.units[drive.signal]
+    rate = with_unit(f"{least:.3g}", f"{unit}/s" if drive.order else unit)
+    moves = "changes faster" if drive.order else "is larger"
+    return f"record a motion in which {drive.signal} {moves} than {rate}, for seconds on end"
 
 
 def pace_of(signals: Sequence[tuple[Array, float]], noise: float, order: int = 1) -> float:
@@ -178,7 +359,7 @@ def chosen_filters(
     spacing = SPACING * BALANCE / pace
     width = min(_unbiased_width(block, records, noise, (least, span)), widest) if moving else least
     # A record shorter than a few radians of its motion keeps rows that overlap.
-    most = min(r.step * len(r.trace) for r in records) / _LEAST_ROWS
+    most = min(r.step * len(r.trace) for r in records) / _ROWS_OF_SHORTEST
     return Filters(width, span, min(max(spacing, SPACING * width), most))
 
 
@@ -229,9 +410,8 @@ def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[s
         drive = block.drives.get(variable.name)
         if drive is None or drive.order == 1 or (drive.order == 0 and drive.signal in motions):
             continue
-        weights = filter_weights(0.0, drive.order, record.step, span)
         step = np.zeros((len(model.inputs), 1))
-        step[i] = noise.behind(drive.signal, weights, record.step)
+        step[i] = noise.behind(drive.signal, record.step, order=drive.order, span=span)
         rest = 0.5 * (at(inputs + step) + at(inputs - step)) - at(inputs)
         shifts[variable.name] = float(np.sqrt(np.nanmean(rest**2)))
     return shifts
@@ -257,8 +437,7 @@ def _span_behind_limit(block: Block, records: Sequence[Record], noise: Noise, lo
             continue  # no limit, or one that does not set in
         steepest = float(np.max(size))
         while span < longest:
-            weights = filter_weights(0.0, 1, step, span)
-            if steepest * noise.behind(signal, weights, step) <= own:
+            if steepest * noise.behind(signal, step, order=1, span=span) <= own:
                 break
             span *= _STEP
         longest = min(longest, span)
@@ -288,12 +467,12 @@ def _unbiased_width(
     for width in _widths(least, [run for each in runs.values() for run in each]):
         rows = duration / max(2.0 * math.sqrt(math.pi) * width, step)
         noises = {
-            n: noise.behind(d.signal, filter_weights(width, d.order, step, span), step) ** 2
+            n: noise.behind(d.signal, step, width=width, order=d.order, span=span) ** 2
             for n, d in drives.items()
         }
         total = sum(gains[n] * noises[n] for n in drives)
         if block.target:
-            total += noise.behind(block.target, filter_weights(width, 0, step), step) ** 2
+            total += noise.behind(block.target, step, width=width) ** 2
         bias = 0.0
         for name, drive in sloped.items():
             seen = _power(runs[drive.signal], width, (drive.order, span), 0.0)[0]
