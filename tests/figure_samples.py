@@ -35,8 +35,6 @@ from nlsdesign.feedback.observer import ErrorStability
 from nlsdesign.foundation.quantity import degrees
 from nlsdesign.model import Variable
 from nlsdesign.presentation import figures
-from nlsdesign.presentation.figures.answer_histograms import MarkedQuantile, answer_histograms
-from nlsdesign.presentation.figures.answers_against import answers_against
 from nlsdesign.presentation.figures.before_after import (
     CandidateShare,
     HeldOut,
@@ -46,9 +44,17 @@ from nlsdesign.presentation.figures.before_after import (
 )
 from nlsdesign.presentation.figures.cam_motion import cam_motion
 from nlsdesign.presentation.figures.over_angle import observer_stability
-from nlsdesign.presentation.figures.response_surfaces import SurfacePanel, response_surfaces
-from nlsdesign.presentation.figures.sensitivity_bars import VarianceShare, sensitivity_bars
-from nlsdesign.presentation.figures.sweep_points import PointKinds, ShownColumn
+from nlsdesign.presentation.figures.sweep_figures import (
+    MarkedQuantile,
+    PointKinds,
+    ShownColumn,
+    SurfacePanel,
+    VarianceShare,
+    answer_histograms,
+    answers_against,
+    response_surfaces,
+    sensitivity_bars,
+)
 from nlsdesign.simulation import Trace
 from tests import cam_cases
 

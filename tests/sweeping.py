@@ -128,6 +128,6 @@ if __name__ == "__main__":
 
     place, points, where = sys.argv[1:]
     chosen: Executor = DaskScheduler(where) if "://" in where else Processes(int(where))
-    from nlsdesign.foundation.interruption import guarded
+    from nlsdesign.foundation.processes import guarded
 
     guarded(lambda: print(len(same_run(Path(place), int(points), chosen))))

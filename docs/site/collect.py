@@ -22,7 +22,7 @@ from pathlib import Path
 
 from nlsdesign.cli.studies import study_names
 from nlsdesign.foundation import locations
-from nlsdesign.foundation.writing import write_text
+from nlsdesign.foundation.text_files import write_text
 
 GALLERY = Path(__file__).resolve().parents[1] / "gallery"
 _FIGURE = re.compile(r"<figure.*?(?P<svg><svg.*?</svg>)(?P<rest>.*?)</figure>", re.S)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.quantity import typeset_unit
-from ..foundation.writing import make_folder
+from ..foundation.text_files import make_folder
 from .output import (
     deck_option,
     examples,

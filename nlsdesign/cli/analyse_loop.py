@@ -146,7 +146,7 @@ def _loops(
 
 
 def _written(result: LoopEvaluation, out: Path) -> list[Path]:
-    from ..foundation.writing import make_folder
+    from ..foundation.text_files import make_folder
     from ..presentation import figures
 
     make_folder(out)

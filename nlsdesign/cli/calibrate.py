@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import MeasurementError
-from ..foundation.writing import write_text
+from ..foundation.text_files import write_text
 from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, next_command, show_json, show_table
 from .overwriting import out_option

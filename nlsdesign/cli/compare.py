@@ -36,7 +36,7 @@ def compare(results: tuple[Path, ...], out: Path, as_json: bool) -> None:
     """
     if len(results) < 2:
         raise click.UsageError("one result cannot be compared; name two folders or more")
-    from ..foundation.writing import write_text
+    from ..foundation.text_files import write_text
     from ..presentation.report import differing_numbers, key_figures, write_comparison
 
     labels = _labels(results)

@@ -11,7 +11,7 @@ import click
 
 from ..foundation.errors import ExportError, NlsError, UnitError, nearest, unknown_name
 from ..foundation.quantity import Quantity, same_dimension, typeset_unit
-from ..foundation.writing import write_text
+from ..foundation.text_files import write_text
 from .output import examples, json_option, next_command, show_json
 from .readiness import shown_command
 from .units import parse_number, split_number

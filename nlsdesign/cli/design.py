@@ -229,7 +229,7 @@ def _with_progress(job: DesignJob, note: Callable[[str], None]) -> Any:
 def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Target:
     """Return the target; one that follows from a task is worked out, shown and drawn first."""
     from ..design import Target, TaskTarget
-    from ..foundation.writing import make_folder
+    from ..foundation.text_files import make_folder
     from ..model import flatten
     from ..presentation.figures import curve_of_task, motor_over_task, write_figures
 
@@ -249,8 +249,7 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
     import json
 
     from ..components.assembly.deck_writer import write_deck
-    from ..foundation.writing import make_folder, write_text
-    from ..foundation.written_files import discard
+    from ..foundation.text_files import discard, make_folder, write_text
     from ..presentation.figures import (
         design_picture,
         limit_margins,

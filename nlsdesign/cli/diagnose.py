@@ -83,8 +83,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..foundation.deck import load_deck
     from ..foundation.locations import version
     from ..foundation.progress import Steps
-    from ..foundation.writing import make_folder
-    from ..foundation.written_files import discard
+    from ..foundation.text_files import discard, make_folder
     from ..model import flatten
     from ..presentation.report import verdict_sections, write_report
 
@@ -166,7 +165,7 @@ def _regenerated(
 
 def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list[Section]]:
     """Write the observer of the better model; return data, text and sections on it."""
-    from ..foundation.writing import write_text
+    from ..foundation.text_files import write_text
     from ..presentation.report import regeneration_sections
     from ..regeneration import write_regeneration
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..foundation.errors import ExportError, ValueRangeError
-from ..foundation.prefixes import prefixed
 from ..foundation.quantity import typeset_unit
+from ..foundation.written_numbers import prefixed
 from .units import Bytes, Number
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..foundation.prefixes import shared_prefix, without_power
 from ..foundation.quantity import typeset_unit
+from ..foundation.written_numbers import shared_prefix, without_power
 from .output import next_command, show_table
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, TypeVar
 import click
 
 from ..foundation.errors import ValueRangeError
-from ..foundation.written_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
+from ..foundation.text_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
 from .named_paths import NamedPath
 from .output import show_json
 

@@ -78,7 +78,7 @@ def report(
 
 
 def _decks(table: SweepTable, points: tuple[int, ...], *, out: Path, as_json: bool) -> None:
-    from ..foundation.writing import write_text
+    from ..foundation.text_files import write_text
     from ..sweeps.point_deck import point_deck_text
 
     texts = {point: point_deck_text(table, point) for point in dict.fromkeys(points)}

@@ -19,9 +19,7 @@ import click
 from ..foundation.errors import NlsError, brief, unknown_name
 from ..foundation.locations import bundled, folder
 from ..foundation.quantity import with_unit
-from ..foundation.reading import is_there, text_of
-from ..foundation.writing import make_folder
-from ..foundation.written_files import listed_files
+from ..foundation.text_files import is_there, listed_files, make_folder, text_of
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files

@@ -62,7 +62,7 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     executor = _executor(given)
-    from ..sweeps.arrow_columns import libraries
+    from ..sweeps.sweep_columns import libraries
     from ..sweeps.sweep_file import read_sweep_file
 
     libraries()
@@ -81,7 +81,7 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
 
 def _require_room(folder: Path) -> None:
     """Refuse, before any point is computed, a page that would replace what somebody has changed."""
-    from ..foundation.written_files import WORDS, file_state
+    from ..foundation.text_files import WORDS, file_state
 
     for path in (folder / name for name in ("sweep.html", "points.csv")):
         state = file_state(path)

@@ -13,8 +13,8 @@ import click
 
 from ..foundation.command_words import typed_command
 from ..foundation.errors import fit_for_message
-from ..foundation.interruption import usual_temporary_folder, was_interrupted
 from ..foundation.locations import version
+from ..foundation.processes import usual_temporary_folder, was_interrupted
 
 _ADVICE = {
     errno.ENAMETOOLONG: "give a shorter name",

@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..foundation.errors import ExportError
-from ..foundation.writing import draft
+from ..foundation.text_files import draft
 
 BROKEN_ARCHIVE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,

@@ -14,7 +14,7 @@ from typing import Any, Self
 from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name, visible
 from .locations import folder
 from .quantity import Quantity, parse_unit
-from .reading import is_there, text_of
+from .text_files import is_there, text_of
 
 _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..components.assembly.named_parts import Assembly
 from ..design import CamDesign, Contour, DesignSettings, Limit, Target, design_cam
 from ..foundation.errors import ConvergenceError, InfeasibleError
-from ..foundation.prefixes import prefixed
+from ..foundation.written_numbers import prefixed
 from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
 from .limit_words import in_words

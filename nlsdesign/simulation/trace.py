@@ -13,7 +13,7 @@ from ..foundation.arrays import Array
 from ..foundation.data_frames import Axis, data_frame, data_set
 from ..foundation.errors import MeasurementError, unknown_name
 from ..foundation.quantity import parse_unit, with_unit
-from ..foundation.writing import write_table
+from ..foundation.text_files import write_table
 from ..model import Variable
 from .events import Event
 

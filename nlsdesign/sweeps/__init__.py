@@ -5,14 +5,13 @@ The report of a sweep and the command import it. It decides no physics: question
 
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import Subject
-from .design_question import DesignQuestion
-from .diagnosis_question import DiagnosisQuestion
-from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
 from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
+from .questions import AngleQuestion, DesignQuestion, DiagnosisQuestion, LoopQuestion, SpreadQuestion
 from .run_sweep import SweepTask, sweep
-from .saltelli_sample import SaltelliSample
+from .saltelli import SaltelliSample
+from .sweep_columns import SweepColumn
 from .sweep_question import FunctionQuestion, SweepQuestion
-from .sweep_table import SweepColumn, SweepTable, read_sweep
+from .sweep_table import SweepTable, read_sweep
 
 __all__ = [
     "AngleQuestion",

@@ -1,13 +1,15 @@
-"""What is better in an answer of a sweep, and what a point must keep: objects that the user chooses."""
+"""What is better in an answer of a sweep, what a point must keep, and the order of the points."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..foundation.arrays import Array, Mask
+from ..foundation.arrays import Array, Indices, Mask
+from ..foundation.errors import ValueRangeError, unknown_name
 from ..foundation.quantity import three_digits, with_unit
 
 
@@ -151,3 +153,97 @@ class NotBelow(Requirement):
     def words(self, unit: str) -> str:
         """Return it as text."""
         return f"at least {with_unit(three_digits(self.value), unit or '1')}"
+
+
+@dataclass(frozen=True, eq=False)
+class RankedPoints:
+    """Which points are on the front, and which do not count.
+
+    Parameters
+    ----------
+    preferences, requirements
+        As given.
+    failed
+        Points without an answer, shape (n,).
+    missed
+        Points with an answer that does not keep a requirement.
+    incomplete
+        Points that keep all requirements, with an answer to compare that is no finite number.
+    front
+        Indices of the points that no other betters in all preferences, the best in the first one first; empty
+        without preferences.
+    misses
+        How many points miss each requirement, in their order.
+    """
+
+    preferences: tuple[Preference, ...]
+    requirements: tuple[Requirement, ...]
+    failed: Mask
+    missed: Mask
+    incomplete: Mask
+    front: Indices
+    misses: tuple[int, ...]
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Names of the answers with a direction or a requirement, each once."""
+        names = [each.answer for each in self.preferences] + [each.answer for each in self.requirements]
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def compared(self) -> Mask:
+        """Points that were compared with one another."""
+        return ~(self.failed | self.missed | self.incomplete)
+
+
+def rank_points(
+    answers: Mapping[str, Array],
+    done: Mask,
+    *,
+    preferences: Sequence[Preference] = (),
+    requirements: Sequence[Requirement] = (),
+) -> RankedPoints:
+    """Return which points no other betters; failures, misses and what is no finite number are set aside.
+
+    ``preferences``: what is better; a point is on the front where no other is at least as good in all and
+    better in one.
+    """
+    named = [each.answer for each in preferences]
+    for name in (*named, *(each.answer for each in requirements)):
+        if name not in answers:
+            raise unknown_name("answer", name, answers)
+    for name in named:
+        if named.count(name) > 1:
+            raise ValueRangeError(f"answer '{name}'", "has two directions", next_step="state one of them")
+    done = np.asarray(done, dtype=bool)
+    kept = [each.kept(answers[each.answer]) for each in requirements]
+    missed = done & ~np.all(kept, axis=0) if kept else np.zeros_like(done)
+    costs = (
+        np.array([each.cost(answers[each.answer]) for each in preferences]).reshape(len(named), len(done)).T
+    )
+    whole = np.all(np.isfinite(costs), axis=1) if named else done
+    incomplete = done & ~missed & ~whole
+    rows = np.flatnonzero(done & ~missed & ~incomplete)
+    front = rows[nondominated(costs[rows])] if named else np.zeros(0, dtype=np.intp)
+    if len(front):
+        front = front[np.lexsort((front, costs[front, 0]))]
+    counts = tuple(int(np.sum(done & ~each)) for each in kept)
+    return RankedPoints(tuple(preferences), tuple(requirements), ~done, missed, incomplete, front, counts)
+
+
+def nondominated(costs: Array) -> Indices:
+    """Return the rows that no other row betters: at most as large in each column and smaller in one.
+
+    Equal rows are kept together.
+
+    ``costs``: finite numbers, shape (n, k); the smaller, the better.
+    """
+    unique, places = np.unique(np.asarray(costs, dtype=float), axis=0, return_inverse=True)
+    # In the order of the columns a later row never betters an earlier one.
+    best = np.empty_like(unique)
+    kept: list[int] = []
+    for number, row in enumerate(unique):
+        if not np.any(np.all(best[: len(kept)] <= row, axis=1)):
+            best[len(kept)] = row
+            kept.append(number)
+    return np.flatnonzero(np.isin(places.ravel(), kept))

@@ -1,4 +1,8 @@
-"""The run of a sweep: points go out, rows come in, parts are written, and at the end the table."""
+"""The run of a sweep: points go out, rows come in, parts are written, and at the end the table.
+
+Batches within a point run as compiled code where there is a compiler, else in CasADi, with the same bits.
+NumPy has elementary functions of its own, so a table would depend on who computed it.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +14,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import casadi as ca
+
 from ..components.assembly.named_parts import Assembly
-from ..foundation.errors import ArrangementError, NlsError, ValueRangeError
+from ..export import natively, quickest
+from ..foundation.errors import ArrangementError, ExportError, NlsError, ValueRangeError
 from ..foundation.progress import Progress, Quiet
 from ..foundation.work_sharing import Executor, PointOutcome, Processes, shared_map
-from .arrow_columns import libraries
+from ..simulation.column_graph import ColumnGraph, NotByColumnsError
+from ..simulation.column_runs import ColumnRun
 from .axes import AxisSet
 from .axis_values import Subject
 from .changes import DECK
-from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn
+from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn, libraries
 from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
 from .sweep_parts import Parts
 from .sweep_plan import PointPlan
@@ -280,3 +288,30 @@ def duration(seconds: float) -> str:
             part = {"h": 3600, "min": 60, "s": 1}[small]
             return f"{whole // size} {large} {whole % size // part} {small}"
     return f"{whole} s"
+
+
+@dataclass(frozen=True)
+class SameBits:
+    """Compiled code where that is to be had, and CasADi where it is not: a worker may lack a compiler."""
+
+    def __call__(self, function: ca.Function) -> ca.Function:
+        """Return a function as compiled code, or as it is."""
+        if quickest() is not natively:
+            return function
+        try:
+            return natively(function)
+        except ExportError:  # the cache of a worker may be full
+            return function
+
+    def columns(self, graph: ColumnGraph) -> ColumnRun:
+        """Return compiled code that runs samples of many columns."""
+        if quickest() is not natively:
+            raise NotByColumnsError
+        try:
+            return natively.columns(graph)
+        except ExportError:
+            raise NotByColumnsError from None
+
+
+same_bits = SameBits()
+"""What questions of a sweep give to batches."""

@@ -15,15 +15,21 @@ from ..feedback.control import TorqueGains
 from ..foundation.deck import Deck, load_deck, read_deck
 from ..foundation.errors import DeckError, NlsError, UnitError, brief, unknown_name
 from ..foundation.quantity import parse_unit, same_dimension
-from ..foundation.reading import text_of
+from ..foundation.text_files import text_of
 from ..foundation.written_numbers import split_number
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import unit_of_field
-from .design_question import QUICK, DesignQuestion
-from .diagnosis_question import RECORDS, DiagnosisQuestion
-from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
+from .questions import (
+    QUICK,
+    RECORDS,
+    AngleQuestion,
+    DesignQuestion,
+    DiagnosisQuestion,
+    LoopQuestion,
+    SpreadQuestion,
+)
 from .run_sweep import SweepTask, require_askable, sweep_task
-from .saltelli_sample import SaltelliSample
+from .saltelli import SaltelliSample
 from .sweep_question import SweepQuestion
 
 _TABLES: Final = ("decks", "axes", "ask")

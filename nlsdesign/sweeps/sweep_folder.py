@@ -18,10 +18,9 @@ import numpy as np
 from ..components.assembly.deck_writer import deck_digest, deck_text
 from ..components.assembly.named_parts import Assembly
 from ..foundation.errors import ExportError, MeasurementError
+from ..foundation.text_files import make_folder, write_text
 from ..foundation.work_sharing import CodeIdentity, code_identity
-from ..foundation.writing import make_folder, write_text
-from .arrow_columns import arrow_column, libraries, numpy_column, read_columns
-from .sweep_columns import RESULTS_FILE, SweepColumn
+from .sweep_columns import RESULTS_FILE, SweepColumn, arrow_column, libraries, numpy_column, read_columns
 from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
 from .sweep_plan import PointPlan
 from .sweep_table import ABOUT_FILE, DECK_FILE, DECKS_FOLDER, about_text, read_about

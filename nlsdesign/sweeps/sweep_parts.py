@@ -17,9 +17,17 @@ from numpy.typing import NDArray
 
 from ..foundation.arrays import Mask
 from ..foundation.errors import ExportError, MeasurementError
-from ..foundation.writing import draft
-from .arrow_columns import arrow_column, give_back, libraries, numpy_column, read_columns
-from .sweep_columns import DONE, RESULTS_FILE, SweepColumn
+from ..foundation.text_files import draft
+from .sweep_columns import (
+    DONE,
+    RESULTS_FILE,
+    SweepColumn,
+    arrow_column,
+    give_back,
+    libraries,
+    numpy_column,
+    read_columns,
+)
 
 PARTS_FOLDER: Final = "parts"
 TIMINGS_FILE: Final = "timings.parquet"

@@ -16,10 +16,9 @@ from ..components.assembly.named_parts import Assembly
 from ..foundation.arrays import Mask
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, MeasurementError, unknown_name
-from ..foundation.reading import is_there, text_of
-from .arrow_columns import give_back, libraries, numpy_column, read_columns
+from ..foundation.text_files import is_there, text_of
 from .changes import changed_assembly
-from .sweep_columns import DONE, RESULTS_FILE, SweepColumn
+from .sweep_columns import DONE, RESULTS_FILE, SweepColumn, give_back, libraries, numpy_column, read_columns
 from .sweep_parts import rows_in_order
 
 __all__ = [

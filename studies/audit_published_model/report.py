@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.foundation.writing import write_text
+from nlsdesign.foundation.text_files import write_text
 from nlsdesign.presentation.report import (
     Chapter,
     FileSection,

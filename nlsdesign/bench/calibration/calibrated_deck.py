@@ -16,8 +16,7 @@ from ...components.assembly.named_parts import Assembly
 from ...foundation.deck import Written
 from ...foundation.errors import ExportError, MeasurementError, NlsError
 from ...foundation.quantity import Quantity, parse_unit, three_digits, to_resolution, typeset_unit, with_unit
-from ...foundation.reading import text_of
-from ...foundation.writing import write_text
+from ...foundation.text_files import text_of, write_text
 from ...model.derived_deck import derived
 from ...simulation import Prior
 from .bench_response import shared_factors

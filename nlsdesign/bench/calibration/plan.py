@@ -12,7 +12,7 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, InfeasibleError, unknown_name
-from ...foundation.prefixes import shared_prefix, without_power
+from ...foundation.written_numbers import shared_prefix, without_power
 from ...model import flatten
 from ...model.roles import series_spring
 from ...simulation import Prior

@@ -20,7 +20,7 @@ from typing import Any, Literal, Protocol
 from ...components import Assembly
 from ...components.assembly.deck_writer import write_deck
 from ...foundation.errors import ConvergenceError, MeasurementError
-from ...foundation.writing import make_folder, write_text
+from ...foundation.text_files import make_folder, write_text
 from ...model import flatten
 from ...model.derived_deck import derived
 from ..identification.equation_error.evidence import Bench

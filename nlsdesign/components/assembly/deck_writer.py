@@ -10,7 +10,7 @@ from typing import Any
 from ...foundation.deck import Deck, ParentDeck
 from ...foundation.errors import DeckError, NlsError, nearest
 from ...foundation.quantity import Quantity
-from ...foundation.writing import write_text
+from ...foundation.text_files import write_text
 from ..core.element import Element
 from ..core.part import Part
 from ..core.tie import Tie

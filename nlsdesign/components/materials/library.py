@@ -12,7 +12,7 @@ from ...foundation.errors import DeckError, nearest, unknown_name
 from ...foundation.extensions import extension_files
 from ...foundation.locations import folder
 from ...foundation.quantity import Quantity, same_dimension, with_unit
-from ...foundation.reading import text_of
+from ...foundation.text_files import text_of
 
 EVIDENCE = ("measured curve", "data sheet", "range")
 """Grades of evidence, best first."""

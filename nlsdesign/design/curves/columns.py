@@ -13,7 +13,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError, UnitError, nearest
 from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
-from ...foundation.reading import text_of
+from ...foundation.text_files import text_of
 from ...foundation.written_numbers import name_and_unit
 
 

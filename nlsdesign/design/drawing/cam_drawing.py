@@ -16,7 +16,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...foundation.quantity import MM, Quantity
-from ...foundation.writing import write_text
+from ...foundation.text_files import write_text
 from ..statics.contour import Contour, turn
 from .arc_path import ArcPath
 from .cam_part import CamPart

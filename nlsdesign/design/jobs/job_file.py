@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from ...foundation.deck import Deck, read_deck
 from ...foundation.errors import DeckError, NlsError, UnitError, brief, unknown_name
 from ...foundation.quantity import Quantity, quantity
-from ...foundation.reading import text_of
+from ...foundation.text_files import text_of
 from ...foundation.written_numbers import split_number
 from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target

@@ -12,7 +12,7 @@ from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import parse_unit, typeset_unit
-from ...foundation.writing import write_table
+from ...foundation.text_files import write_table
 from ..curves.target import Target
 from .finish import SolvedSearch, finished
 from .result import CamDesign

@@ -11,8 +11,8 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
-from ...foundation.prefixes import prefixed, without_power
 from ...foundation.quantity import Quantity, parse_unit, with_unit
+from ...foundation.written_numbers import prefixed, without_power
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
-from ...foundation.writing import write_bytes
+from ...foundation.text_files import write_bytes
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.column_graph import ColumnGraph
 from ...simulation.column_runs import ColumnRun

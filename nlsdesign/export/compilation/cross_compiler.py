@@ -12,8 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ...foundation.errors import ExportError, unknown_name
-from ...foundation.interruption import usual_temporary_folder
-from ...foundation.processes import run_to_end
+from ...foundation.processes import run_to_end, usual_temporary_folder
 from ..files import shell
 
 STRICT = (

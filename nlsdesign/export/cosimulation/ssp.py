@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 from ...foundation.errors import ExportError, UnitError, ValueRangeError
 from ...foundation.locations import version as package_version
 from ...foundation.quantity import BASE, Quantity, Unit, parse_unit
-from ...foundation.writing import draft
+from ...foundation.text_files import draft
 from .cosimulate import FmuSystem, check_order, check_signals, unpacked_fmus
 from .fmu_description import FmuDescription, FmuScalar, fit_to_show, unpack
 from .wires import Wire, as_wire, check_wires, delay_of, gain_to, split_name

@@ -21,7 +21,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ...foundation.errors import ExportError, ValueRangeError, nearest
-from ...foundation.writing import draft, write_bytes
+from ...foundation.text_files import draft, write_bytes
 from ...model.flat import FlatModel
 from ..c.c_text import identifier
 from ..compilation import cross_compiler

@@ -18,7 +18,7 @@ import casadi as ca
 from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...foundation.quantity import NOT_STATED, parse_unit
-from ...foundation.writing import write_text
+from ...foundation.text_files import write_text
 from ...model import FlatModel, Variable
 from ...model.graph import Instruction, read_graph
 from ..c.c_text import comment

@@ -19,7 +19,7 @@ from ...foundation.arrays import Array, Mask
 from ...foundation.data_frames import Axis, data_frame, data_set
 from ...foundation.errors import unknown_name
 from ...foundation.quantity import typeset_unit
-from ...foundation.writing import write_table
+from ...foundation.text_files import write_table
 from ...model import FlatModel, Variable
 from ...model.roles import measured_motion
 from .rest_points import RestPoint, RestPoints, rest_points

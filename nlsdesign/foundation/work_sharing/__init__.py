@@ -4,15 +4,11 @@ Sweeps import it. It knows functions, points and workers, and nothing of what is
 room that may import ``distributed``, ``dask`` and ``mpi4py``.
 """
 
-from .chunks import PointOutcome
+from .chunks import CodeIdentity, PointOutcome, code_identity
 from .dask_scheduler import DaskScheduler
-from .identity import CodeIdentity, code_identity
-from .in_this_process import InThisProcess
 from .mpi_ranks import MpiRanks
-from .shared_map import shared_map
-from .spread_over import spread_over
-from .team import Executor
-from .worker_processes import Processes
+from .shared_map import shared_map, spread_over
+from .teams import Executor, InThisProcess, Processes
 
 __all__ = [
     "CodeIdentity",

@@ -1,21 +1,92 @@
-"""Chunks of points, and what a worker does with one: each point is answered, and a failure is an answer."""
+"""Chunks of points, what a worker does with one, and which code answers.
+
+Each point of a chunk is answered, and a failure is an answer. Work that cannot be sent, and workers that
+run other code, are refused.
+"""
 
 from __future__ import annotations
 
 import functools
+import hashlib
 import os
 import pickle
 import socket
 import threading
 import time
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final
 
-from ..errors import NlsError
+from ..errors import NlsError, WorkSharingError
+from ..locations import folder, version
 from ..processes import alone
-from .identity import CodeIdentity, own_identity
+
+_PACKAGE: Final = Path(__file__).resolve().parents[2]
+_SHOWING: Final = ("cli", "presentation", "live", "_bundled", "__pycache__")
+"""Rooms that show results. No room that computes may import them, so no answer depends on them."""
+_SUFFIXES: Final = (".py", ".toml", ".csv", ".json")
+_SHOWN_DIGITS: Final = 12
+
+
+@dataclass(frozen=True)
+class CodeIdentity:
+    """Version and digest of the code that computes.
+
+    Parameters
+    ----------
+    version
+        Of the package.
+    digest
+        SHA-256 of its files.
+    files
+        Digest of each file by its place.
+    """
+
+    version: str
+    digest: str
+    files: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"nlsdesign {self.version} (code {self.digest[:_SHOWN_DIGITS]})"
+
+    def without_files(self) -> CodeIdentity:
+        """Return the same identity without the list of files, for workers."""
+        return CodeIdentity(self.version, self.digest)
+
+
+@functools.cache
+def code_identity(package: Path = _PACKAGE) -> CodeIdentity:
+    """Return the identity of the package as it stands on disk, read once in each process.
+
+    Parameters
+    ----------
+    package
+        Folder of the package; another one only in tests.
+    """
+    files = dict(_digests(package))
+    text = "\n".join(f"{name} {digest}" for name, digest in sorted(files.items()))
+    return CodeIdentity(version(package=package), hashlib.sha256(text.encode()).hexdigest(), files)
+
+
+def own_identity() -> CodeIdentity:
+    """Return the identity of this process without its list of files, as a worker is asked for it."""
+    return code_identity().without_files()
+
+
+def _digests(package: Path) -> Iterator[tuple[str, str]]:
+    models = folder("models", package=package)
+    for top, prefix in ((package, "nlsdesign"), (models, "models")):
+        for path in sorted(top.rglob("*")):
+            inside = path.relative_to(top)
+            if path.suffix not in _SUFFIXES or set(inside.parts) & set(_SHOWING):
+                continue
+            # Decks are part of what is asked; they have a digest of their own.
+            if prefix == "models" and inside.parts[0] in ("decks", "templates"):
+                continue
+            yield f"{prefix}/{inside.as_posix()}", hashlib.sha256(path.read_bytes()).hexdigest()
+
 
 _LONGEST_REASON: Final = 500
 _one_at_a_time = threading.Lock()
@@ -146,3 +217,30 @@ def computed_elsewhere(payload: bytes, chunk: Chunk, expected: CodeIdentity) -> 
         return WorkerRefusal(here(), own)
     with _one_at_a_time, alone():
         return pickled(computed(_unpickled(payload), chunk))
+
+
+def refused(refusal: WorkerRefusal) -> WorkSharingError:
+    """Return the error for a worker whose code is another one; it names both."""
+    return WorkSharingError(
+        f"worker {refusal.worker}",
+        f"runs {refusal.identity}, and this program {code_identity()}: their answers must not be mixed",
+        next_step="install the same version at the workers and here, and start the workers again",
+    )
+
+
+def sendable(work: Callable[[Any], Any]) -> bytes:
+    """Return work as bytes for another machine; functions of a script or notebook go with their code."""
+    try:
+        import cloudpickle as library
+    except ModuleNotFoundError:
+        library = pickle
+    try:
+        content: bytes = library.dumps(work, protocol=pickle.HIGHEST_PROTOCOL)
+    except WorkSharingError:  # of a part of it, which says more
+        raise
+    except Exception as error:  # whatever an object answers to being pickled
+        raise WorkSharingError(
+            "the work", f"cannot be sent to workers: {reason_of(error)}",
+            next_step="take a function of a module, without open files, locks or connections",
+        ) from None  # fmt: skip
+    return content

@@ -22,11 +22,19 @@ from secrets import token_hex
 from typing import Any, Final
 
 from ..errors import ValueRangeError, WorkSharingError, missing_library
-from ..reading import is_there, text_of
-from .chunks import Chunk, ChunkLoss, WorkerRefusal, computed_elsewhere, reason_of
-from .identity import CodeIdentity, own_identity
-from .refusals import refused, sendable
-from .team import Finished, Team
+from ..text_files import is_there, text_of
+from .chunks import (
+    Chunk,
+    ChunkLoss,
+    CodeIdentity,
+    WorkerRefusal,
+    computed_elsewhere,
+    own_identity,
+    reason_of,
+    refused,
+    sendable,
+)
+from .teams import Finished, Team
 
 _CHUNKS_PER_WORKER: Final = 2
 _AGAIN: Final = 0.5

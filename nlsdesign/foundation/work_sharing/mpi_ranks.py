@@ -10,10 +10,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import WorkSharingError, missing_library
-from .chunks import Chunk, ChunkLoss, WorkerRefusal, computed_elsewhere, reason_of
-from .identity import own_identity
-from .refusals import refused, sendable
-from .team import Finished, Team
+from .chunks import (
+    Chunk,
+    ChunkLoss,
+    WorkerRefusal,
+    computed_elsewhere,
+    own_identity,
+    reason_of,
+    refused,
+    sendable,
+)
+from .teams import Finished, Team
 
 
 @dataclass(frozen=True)

@@ -3,28 +3,36 @@
 from matplotlib.figure import Figure
 
 from .before_after import RecordError, gap_bars
-from .beside_points import PointPanel, curves_beside_points
-from .cam_frames import torque_curve
-from .cam_motion import CamMotion, cam_motion_of, cam_positions
-from .curves import curves
-from .design_figures import design_picture, limit_margins
+from .cam_motion import CamMotion, cam_motion_of, cam_positions, torque_curve
+from .curves import (
+    PointPanel,
+    curves,
+    curves_beside_points,
+    loop_area,
+    metric_note,
+    torque_against_measured,
+    torque_against_target,
+    torque_loops,
+)
+from .design_figures import (
+    curve_of_task,
+    design_picture,
+    limit_margins,
+    motor_over_task,
+    pareto_front,
+    tolerance_bars,
+    torque_band,
+)
 from .loop_evaluation import (
     coupled_stability_map,
     impedance_over_frequency,
     margins_over_angle,
     torque_responses,
 )
-from .made_springs import tolerance_bars, torque_band
-from .number_text import compact
-from .over_angle import observability_over_angle, stability_over_angle
-from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
-from .ranked import ranked_intervals
-from .run_over_time import run_over_time
-from .spread_of_errors import errors_over_spread
+from .over_angle import errors_over_spread, observability_over_angle, ranked_intervals, stability_over_angle
+from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time, run_over_time
+from .style import compact
 from .svg import inline_svg, write_figures
-from .task_figures import curve_of_task, motor_over_task
-from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
-from .trade_off import pareto_front
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [

@@ -13,8 +13,6 @@ from matplotlib.figure import Figure
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_unit
-from .lines import thinned
-from .number_text import root_mean_square, significant
 from .style import (
     AFTER,
     BEFORE,
@@ -27,8 +25,11 @@ from .style import (
     described,
     legend,
     panels,
+    root_mean_square,
+    significant,
     styled,
 )
+from .svg import thinned
 
 Curve = tuple[Array, Array]
 

@@ -11,8 +11,20 @@ from matplotlib.figure import Figure
 from ...feedback.control.evaluation.margins import CoupledStability, LoopMargins, OutputImpedance
 from ...feedback.control.evaluation.onset import SaturationLine
 from ...feedback.control.evaluation.responses import SineResponse
-from .number_text import significant
-from .style import DASHES, HOLDS, INK, LIMIT, MUTED, described, legend, log_axis, look, panels, styled
+from .style import (
+    DASHES,
+    HOLDS,
+    INK,
+    LIMIT,
+    MUTED,
+    described,
+    legend,
+    log_axis,
+    look,
+    panels,
+    significant,
+    styled,
+)
 
 
 @styled

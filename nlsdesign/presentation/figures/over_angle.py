@@ -1,8 +1,8 @@
-"""Results over the angle: observability, estimation error, stability, stiffness."""
+"""Results over the angle, and the errors of observers: over the spread, against the bound, and by cause."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...feedback.analysis import Chart, RankDrops
-from ...feedback.observer import ErrorStability
-from .number_text import significant
-from .style import DASHES, INK, MUTED, described, legend, log_axis, look, panels, styled
+from ...feedback.observer import ErrorStability, SpreadErrors
+from ...foundation.errors import ValueRangeError
+from ...foundation.written_numbers import shared_prefix
+from .style import AFTER, DASHES, INK, MUTED, described, legend, log_axis, look, panels, significant, styled
 
 
 @styled
@@ -198,3 +199,131 @@ def _deviations(axes: Axes, charts: Mapping[str, Chart]) -> None:
     axes.set_title("Standard deviation of the torque estimate")
     axes.set_ylim(bottom=0.0)
     legend(axes, columns=2)
+
+
+_CAUSES = 7
+
+
+@styled
+def errors_over_spread(errors: SpreadErrors) -> Figure:
+    """Draw the errors of all observers over the frequency, and what causes those of the first.
+
+    Parameters
+    ----------
+    errors
+        Of at least one observer.
+    """
+    figure, (left, right) = panels(2, height=5.4)
+    places = np.arange(len(errors.frequencies), dtype=float)
+    count = len(errors.observers)
+    words, factor, unit = [], errors.shown_factor, errors.shown_in
+    for number, name in enumerate(errors.observers):
+        tone, _, point = look(number)
+        at = places + 0.22 * (number - (count - 1) / 2.0)
+        median, most = (factor * errors.quantile(name, share) for share in (0.5, 0.9))
+        left.vlines(at, median, most, color=tone, linewidth=4.0)
+        left.plot(at, median, color=tone, marker=point, linestyle="none", label=name)
+        left.plot(
+            at, factor * errors.exact[number], color=tone, marker=point, linestyle="none", fillstyle="none"
+        )
+        words.append(
+            f"{name}: exact {_range(factor * errors.exact[number])}, median {_range(median)}, 90 % "
+            f"{_range(most)} {unit}."
+        )
+    if len(errors.bound):
+        bound = factor * errors.bound
+        left.hlines(
+            bound, places - 0.45, places + 0.45, color=INK.light, linestyle=DASHES[1], linewidth=1.2,
+            label="bound on the rms",
+        )  # fmt: skip
+        words.append(f"Bound on the rms of any estimator {_range(bound)} {unit} rms.")
+    log_axis(left)
+    left.set_xticks(places, [f"{f:g} Hz" for f in errors.frequencies])
+    left.set_xlim(-0.6, len(places) - 0.4)
+    left.set_ylabel(f"torque error in {unit} rms")
+    left.set_title("Bar: median to 90 %; open: exact numbers")
+    _draw_causes(right, errors)
+    legend(left)
+    return described(figure, f"Torque errors over the spread. {' '.join(words)}")
+
+
+def _draw_causes(axes: Axes, errors: SpreadErrors) -> None:
+    """Draw what one standard deviation of each number costs the first observer, and the last beside it."""
+    ranked = errors.ranked_causes(errors.observers[0])[:_CAUSES]
+    places = -np.arange(len(ranked), dtype=float)
+    factor, unit = shared_prefix([size for _, size in ranked], errors.unit)
+    for number, name in enumerate(errors.observers):
+        tone, _, point = look(number)
+        sizes = dict(errors.ranked_causes(name))
+        axes.plot(
+            [factor * sizes[cause] for cause, _ in ranked], places, color=tone, marker=point, linestyle="none"
+        )
+    axes.set_yticks(places, [_short(cause) for cause, _ in ranked])
+    axes.tick_params(axis="y", labelsize=8)
+    axes.margins(x=0.05)
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel(f"{unit} rms for one standard deviation")
+    axes.set_title(f"Largest causes, {errors.observers[0]}")
+    axes.grid(visible=True, axis="y", color=MUTED.light, linewidth=0.3)
+
+
+def _short(cause: str) -> str:
+    """Return the last parts of a long name."""
+    return ".".join(cause.split(".")[-2:])
+
+
+def _range(values: np.ndarray) -> str:
+    low, high = (significant(float(end)) for end in (np.min(values), np.max(values)))
+    return low if low == high else f"{low} to {high}"
+
+
+Interval = Sequence[float]
+_MISSED = "missed"
+
+
+@styled
+def ranked_intervals(
+    groups: Mapping[str, Mapping[str, Interval]], *, words: str, missed: Sequence[str] = ()
+) -> Figure:
+    """Draw panels of names in their order, best on top, each with an interval and a point in it.
+
+    Parameters
+    ----------
+    groups
+        By label of the axis: lower end, point and upper end by name, best first.
+    words
+        Alternative text: what the figure shows.
+    missed
+        Names without a number, which come last in every panel.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are no groups, or an interval is not three ascending numbers.
+    """
+    if not groups:
+        raise ValueRangeError("ranked intervals", "there are none to draw", next_step="leave this figure out")
+    for label, rows in groups.items():
+        for name, interval in rows.items():
+            if len(interval) != 3 or not interval[0] <= interval[1] <= interval[2]:
+                raise ValueRangeError(f"{label}: {name} {list(interval)}", "must be three ascending numbers")
+    most = max(len(rows) for rows in groups.values()) + len(missed)
+    columns = min(2, len(groups))
+    lines = -(-len(groups) // columns)
+    figure, axes = panels(lines, columns, height=lines * (0.75 + 0.22 * most))
+    for _number, ((label, rows), each) in enumerate(zip(groups.items(), axes, strict=False)):
+        places = -np.arange(len(rows) + len(missed), dtype=float)
+        low, middle, high = np.array([list(interval) for interval in rows.values()]).reshape(-1, 3).T
+        tone = AFTER.light
+        each.hlines(places[: len(rows)], low, high, color=tone, linewidth=3.0)
+        each.plot(middle, places[: len(rows)], linestyle="", marker="o", color=INK.light)
+        for place in places[len(rows) :]:
+            each.annotate(_MISSED, (0.02, place), xycoords=("axes fraction", "data"), va="center", fontsize=8)
+        each.set_yticks(places, [*rows, *missed])
+        each.set_ylim(places[-1] - 0.6, 0.6)
+        each.grid(visible=False, axis="y")
+        each.margins(x=0.05)
+        each.set_xlabel(label)
+    for unused in axes[len(groups) :]:
+        unused.set_visible(False)
+    return described(figure, words)

@@ -1,8 +1,8 @@
-"""Torque and current over time: observers, and the co-simulated closed loop."""
+"""Signals over time: a simulated run with one panel per unit, observers, and the co-simulated closed loop."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,23 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_unit
 from ...simulation import Trace
-from .lines import thinned
-from .number_text import root_mean_square, significant
-from .style import AFTER, DASHES, INK, LIMIT, MUTED, PURPLE, described, legend, log_axis, look, panels, styled
+from .style import (
+    AFTER,
+    DASHES,
+    INK,
+    LIMIT,
+    MUTED,
+    PURPLE,
+    described,
+    legend,
+    log_axis,
+    look,
+    panels,
+    root_mean_square,
+    significant,
+    styled,
+)
+from .svg import thinned
 
 
 @styled
@@ -228,3 +242,53 @@ def _same_length(time: Array, signals: Mapping[str, Array]) -> None:
     for name, values in signals.items():
         if values.shape != time.shape:
             raise ValueRangeError(f"signal '{name}'", f"has {values.shape} samples, time has {time.shape}")
+
+
+MOST_PANELS = 6
+"""Panels of one figure."""
+
+
+def groups_of_signals(run: Trace, names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the signals by unit, in the given order."""
+    groups: dict[str, tuple[str, ...]] = {}
+    for name in names:
+        unit = run.units[name]
+        groups[unit] = (*groups.get(unit, ()), name)
+    return groups
+
+
+@styled
+def run_over_time(run: Trace, names: Sequence[str]) -> Figure:
+    """Draw signals of a run, those of one unit in one panel.
+
+    Parameters
+    ----------
+    run
+        Simulated or measured.
+    names
+        What is drawn, in this order; of more than six units those of the first six.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is none.
+    UnknownNameError
+        If the run has no such signal.
+    """
+    groups = list(groups_of_signals(run, names).items())[:MOST_PANELS]
+    if not groups:
+        raise ValueRangeError("a figure over time", "has no signal", next_step="name at least one")
+    figure, axes = panels(len(groups), height=1.0 + 1.5 * len(groups), sharex=True)
+    sizes: list[str] = []
+    for panel, (unit, members) in zip(axes, groups, strict=True):
+        for name in members:
+            tone, dash, _ = look(len(sizes))  # no two signals of the figure look alike
+            panel.plot(*thinned(run.time, run[name]), color=tone, linestyle=dash, linewidth=1.3, label=name)
+            low, high = (significant(float(end)) for end in (np.min(run[name]), np.max(run[name])))
+            sizes.append(f"{name} from {low} to {high} {typeset_unit(unit)}".strip())
+        shown = typeset_unit(unit)
+        panel.set_ylabel(f"in {shown}" if shown else "without unit")
+        legend(panel)
+    axes[-1].set_xlabel("time in s")
+    span = significant(float(run.time[-1] - run.time[0]))
+    return described(figure, f"{len(sizes)} signals over {span} s: {'; '.join(sizes)}.")

@@ -1,20 +1,33 @@
-"""Figures as SVG: the same bytes for the same figure, with colours that follow the page."""
+"""Figures as SVG with colours that follow the page, and the numbers that a figure shows.
+
+The same figure gives the same bytes. Lines are reduced to the points that a figure can show.
+"""
 
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.collections import Collection, LineCollection, PathCollection, PolyCollection
+from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator
+from numpy.typing import ArrayLike, NDArray
 
+from ...foundation.arrays import Array, Indices
 from ...foundation.errors import ExportError, nearest
-from ...foundation.writing import write_bytes
+from ...foundation.text_files import write_bytes
 from .style import STYLE, TONES, alternative_text
 
 _SVG = "{http://www.w3.org/2000/svg}"
@@ -202,3 +215,154 @@ def _mark_of(link: ET.Element) -> tuple[ET.Element | None, str | None]:
 
 def _rounded(match: re.Match[str]) -> str:
     return f"{float(match[0]):.2f}".rstrip("0").rstrip(".") or "0"
+
+
+_DIGITS = 5
+
+
+def figure_data(figure: Figure) -> dict[str, Any]:
+    """Return what a figure shows as numbers, for a file of JSON.
+
+    The numbers are those that are drawn: long records are thinned as they are in the figure.
+
+    Result: ``panels``: each with ``title``, ``x`` and ``y`` (labels of the axes, with units) and ``series``.
+    A series has a ``label``, and ``x`` and ``y`` of equal length; a value that is not a number is ``None``.
+    Lines across a panel have ``x`` or ``y`` alone.
+    """
+    panels = []
+    for axes in figure.axes:
+        series = [*_bars(axes), *_lines(axes), *_areas(axes)]
+        if series:
+            panels.append(
+                {"title": axes.get_title(loc="left") or axes.get_title(), "x": _across(axes),
+                 "y": axes.get_ylabel(), "series": series}
+            )  # fmt: skip
+    return {"panels": panels}
+
+
+def _across(axes: Axes) -> str:
+    """Return the label of the abscissa; panels that share it have it below the last one only."""
+    shared = axes.get_shared_x_axes().get_siblings(axes)
+    return next((each.get_xlabel() for each in (axes, *shared) if each.get_xlabel()), "")
+
+
+def _lines(axes: Axes) -> list[dict[str, Any]]:
+    result = []
+    for line in axes.lines:
+        name = _name(line.get_label())
+        x, y = (_column(values) for values in (line.get_xdata(), line.get_ydata()))
+        if line.get_transform() == axes.transData:
+            result.append({"label": name, "x": x, "y": y})
+        elif name and line.get_transform() == axes.get_yaxis_transform(which="grid"):
+            result.append({"label": name, "y": y[:1]})
+        elif name and line.get_transform() == axes.get_xaxis_transform(which="grid"):
+            result.append({"label": name, "x": x[:1]})
+    return result
+
+
+def _bars(axes: Axes) -> list[dict[str, Any]]:
+    result = []
+    for bars in axes.containers:
+        if not isinstance(bars, BarContainer):
+            continue
+        name = _name(bars.get_label())
+        if bars.orientation == "horizontal":
+            middles = [bar.get_y() + 0.5 * bar.get_height() for bar in bars.patches]
+            sizes = _column([bar.get_x() + bar.get_width() for bar in bars.patches])
+            result.append({"label": name, "x": sizes, "y": _ticks(axes.yaxis, middles)})
+        else:
+            middles = [bar.get_x() + 0.5 * bar.get_width() for bar in bars.patches]
+            sizes = _column([bar.get_y() + bar.get_height() for bar in bars.patches])
+            result.append({"label": name, "x": _ticks(axes.xaxis, middles), "y": sizes})
+    return result
+
+
+def _ticks(axis: Axis, places: list[float]) -> list[Any]:
+    """Return what stands at the ticks nearest to places; the places themselves where these are numbers."""
+    if not isinstance(axis.get_major_locator(), FixedLocator):
+        return _column(places)
+    ticks = np.asarray(axis.get_majorticklocs())
+    words = [text.get_text() for text in axis.get_majorticklabels()]
+    return [words[int(np.argmin(np.abs(ticks - place)))] for place in places]
+
+
+def _areas(axes: Axes) -> list[dict[str, Any]]:
+    result = []
+    for each in axes.collections:
+        name = _name(each.get_label())
+        for points in _outlines(each):
+            if len(points):
+                result.append({"label": name, "x": _column(points[:, 0]), "y": _column(points[:, 1])})
+    return result
+
+
+def _outlines(collection: Collection) -> list[np.ndarray]:
+    """Return the points of an area, of points, or the ends of short lines, all in one."""
+    if isinstance(collection, PathCollection):
+        return [np.asarray(collection.get_offsets(), dtype=float)]
+    if isinstance(collection, LineCollection):
+        segments = [np.asarray(each, dtype=float) for each in collection.get_segments()]
+        return [np.concatenate(segments)] if segments else []
+    if isinstance(collection, PolyCollection):
+        return [np.asarray(path.vertices, dtype=float) for path in collection.get_paths()]
+    return []
+
+
+def _name(label: object) -> str:
+    text = str(label or "")
+    return "" if text.startswith("_") else text
+
+
+def _column(values: Any) -> list[float | None]:
+    numbers: Any = np.ravel(np.ma.filled(np.ma.asarray(values, dtype=float), np.nan))
+    return [float(f"{v:.{_DIGITS}g}") if math.isfinite(v) else None for v in numbers.tolist()]
+
+
+COLUMNS, ROWS = 700, 400
+"""Finest grid that a full-width panel can show on paper and on screen."""
+
+
+def thinned(x: ArrayLike, y: ArrayLike, *, columns: int = COLUMNS) -> tuple[Array, Array]:
+    """Return a line with fewer points that looks the same.
+
+    Over an ascending x each of ``columns`` intervals keeps its first, last, lowest and highest point, so no
+    peak is lost. Otherwise (a loop) points are left out that fall into the same cell of the figure as the one
+    before. Short lines come back as they are.
+
+    ``x``, ``y``: shape (n,); NaN in y interrupts the line. Result: x and y of shape (m,), m ≤ n, points of
+    the given line in the given order.
+    """
+    abscissa, ordinate = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    if len(abscissa) <= 2 * columns:
+        return abscissa, ordinate
+    keep = (
+        _envelope(abscissa, ordinate, columns)
+        if np.all(np.diff(abscissa) > 0.0)
+        else _cells(abscissa, ordinate)
+    )
+    return abscissa[keep], ordinate[keep]
+
+
+def _envelope(x: Array, y: Array, columns: int) -> Indices:
+    edges = np.searchsorted(x, np.linspace(x[0], x[-1], columns + 1)[1:-1])
+    parts = [part for part in np.split(np.arange(len(x)), edges) if len(part)]
+    kept: set[int] = set()
+    for part in parts:
+        kept |= {int(part[0]), int(part[-1])}
+        if np.all(np.isnan(y[part])):
+            continue
+        kept |= {int(part[np.nanargmin(y[part])]), int(part[np.nanargmax(y[part])])}
+        kept |= {int(item) for item in part[np.isnan(y[part])][:1]}
+    return np.array(sorted(kept), dtype=np.intp)
+
+
+def _cells(x: Array, y: Array) -> Indices:
+    columns = [_cell(x, COLUMNS), _cell(y, ROWS)]
+    moved = np.any(np.diff(np.array(columns), axis=1) != 0, axis=0)
+    return np.flatnonzero(np.concatenate([[True], moved]))
+
+
+def _cell(values: Array, count: int) -> NDArray[np.int64]:
+    low, span = np.nanmin(values), np.ptp(values[np.isfinite(values)]) or 1.0
+    share = np.nan_to_num((values - low) / span, nan=-1.0)
+    return np.asarray(np.round(share * count), dtype=np.int64)

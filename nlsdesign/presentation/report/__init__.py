@@ -1,13 +1,10 @@
 """Reports: sections composed into one self-contained file of HTML."""
 
-from .calculation import OUTCOMES, CalculationSection, CalculationStep
-from .cam_section import CamSection
 from .command_pages import write_analysis_report, write_fit_report, write_observer_report
-from .design_sections import design_sections, tolerance_sections, write_design_report
-from .diagnosis import verdict_sections
-from .equations_section import EquationsSection
+from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
+from .diagnosis_sections import regeneration_sections, verdict_sections
+from .equation_section import EquationsSection
 from .page import write_report
-from .regeneration_sections import regeneration_sections
 from .sections import (
     Chapter,
     FigureSection,
@@ -19,7 +16,14 @@ from .sections import (
     TextSection,
 )
 from .side_by_side import ComparedResult, differing_numbers, key_figures, write_comparison
-from .tables import PublishedNumber, comparison_table, numbers_table
+from .tables import (
+    OUTCOMES,
+    CalculationSection,
+    CalculationStep,
+    PublishedNumber,
+    comparison_table,
+    numbers_table,
+)
 
 __all__ = [
     "OUTCOMES",

@@ -10,8 +10,8 @@ import numpy as np
 from ...bench.discrepancy.reporting.refit import Refit
 from ...feedback.analysis import Chart, RankDrops, SensorRanking
 from ...feedback.observer import SpreadErrors
-from ...foundation.prefixes import prefixed, shared_prefix, without_power
 from ...foundation.quantity import three_digits, typeset_unit
+from ...foundation.written_numbers import prefixed, shared_prefix, without_power
 from ...model import FlatModel
 from ..figures import (
     RecordError,
@@ -20,7 +20,7 @@ from ..figures import (
     observability_over_angle,
     stability_over_angle,
 )
-from .diagnosis import ROLES, fitted_table
+from .diagnosis_sections import ROLES, fitted_table
 from .page import write_report
 from .sections import (
     FigureSection,

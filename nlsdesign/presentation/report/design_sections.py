@@ -1,37 +1,86 @@
-"""Sections on a finished design: picture, torque against the target, limits, tolerance."""
+"""Sections on a finished design: picture, a cam to turn, torque against the target, limits, tolerance."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...design import CamDesign, Cause, ToleranceResult
 from ...foundation.errors import NlsError
-from ...foundation.prefixes import prefixed, shared_prefix
 from ...foundation.quantity import three_digits
+from ...foundation.written_numbers import prefixed, shared_prefix
 from ...model import flatten
 from ..figures import (
+    CamMotion,
     cam_motion_of,
     design_picture,
+    inline_svg,
     limit_margins,
     tolerance_bars,
     torque_against_target,
     torque_band,
 )
-from .cam_section import CamSection
+from ..figures.cam_motion import MARKER, cam_picture
 from .page import write_report
 from .sections import (
     FigureSection,
     FileSection,
+    Html,
     KeyNumber,
     NumbersSection,
+    PagePosition,
     Section,
     TableSection,
     TextSection,
+    data_link,
 )
 from .tables import numbers_table
+
+
+@dataclass(frozen=True, eq=False)
+class CamSection(Section):
+    """Cam, cable, rubber and contact point over the angle, with a slider; a single frame without JavaScript.
+
+    Parameters
+    ----------
+    motion
+        Cam over its range.
+    caption, means, assumed
+        As for :class:`FigureSection`.
+    start
+        Angle in rad that is shown first; 60 % of the range by default.
+    """
+
+    motion: CamMotion
+    _: KW_ONLY
+    caption: str
+    means: str = ""
+    assumed: str = ""
+    start: float | None = None
+    template: ClassVar[str] = "cam.html"
+
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return picture, frames and texts."""
+        picture = cam_picture(self.motion, start=self.start)
+        return {
+            "key": place.key,
+            "picture": picture,
+            "frame": picture.frames[picture.start],
+            "frames": json.dumps(picture.frames, ensure_ascii=False, separators=(",", ":")),
+            "marker": f"{place.key}-{MARKER}",
+            "curve": Html(inline_svg(picture.curve, place.key)),
+            "warning": self.motion.warning,
+            "data": data_link(picture.curve, self.title),
+            "caption": self.caption,
+            "means": self.means,
+            "assumed": self.assumed,
+        }
+
 
 FILES = {
     "model.toml": "deck with the designed spring",

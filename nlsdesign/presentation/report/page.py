@@ -13,10 +13,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ...foundation.errors import ExportError, ValueRangeError
 from ...foundation.locations import version
-from ...foundation.writing import write_text
+from ...foundation.text_files import write_text
 from ..figures.style import TONES
-from .html import Html, breakable, prose, visible, words
-from .sections import Chapter, PagePosition, Section
+from .sections import Chapter, Html, PagePosition, Section, breakable, prose, visible, words
 
 _PAGE_TONES = {
     "page": ("#f4f6f8", "#0e1217"),

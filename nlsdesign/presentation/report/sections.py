@@ -2,21 +2,120 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field
+from html import escape
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 from urllib.parse import quote
 
 from ...foundation.errors import ExportError, ValueRangeError
 from ..figures import Figure, inline_svg
-from ..figures.number_text import compact, significant
-from ..figures.style import alternative_text
-from .data_link import data_link, file_link
-from .html import Html
+from ..figures.style import alternative_text, compact, significant
+from ..figures.svg import figure_data
+
+_CODE = re.compile(r"`([^`\n]+)`")
+_DOTS = re.compile(r"(?<=[a-z\]])(\.)(?=[a-z])|(?<=\w)(_)(?=\w)")
+"""Dots within a hierarchical name and underscores, behind which a line may break."""
+
+
+_HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""Characters that are not seen, or turn the direction of what follows."""
+
+
+class Html(str):
+    """Text that is HTML already; templates escape every other text."""
+
+    __slots__ = ()
+
+    def __html__(self) -> str:
+        """Return the text unchanged, so that templates do not escape it."""
+        return str(self)
+
+
+def words(text: str) -> Html:
+    """Return plain text as HTML, escaped; names between backticks are set as code.
+
+    Examples
+    --------
+    >>> words("`a.b` < 3")
+    '<code>a.b</code> &lt; 3'
+    """
+    return Html(_CODE.sub(r"<code>\1</code>", escape(text)))
+
+
+def visible(page: str) -> str:
+    r"""Return a text in which control characters and marks of direction are written out, as ``\x1b``.
+
+    Examples
+    --------
+    >>> print(visible("a" + chr(27) + "[31m"))
+    a\x1b[31m
+    """
+    return _HIDDEN.sub(lambda match: match[0].encode("unicode_escape").decode(), page)
+
+
+def breakable(text: Html) -> Html:
+    """Return HTML in which a line may break behind the dots and underscores of names.
+
+    Examples
+    --------
+    >>> breakable(words("`a.b` of 1.5"))
+    '<code>a.<wbr>b</code> of 1.5'
+    """
+    return Html(_DOTS.sub(r"\g<0><wbr>", text))
+
+
+def prose(text: str) -> Html:
+    """Return paragraphs as HTML; empty lines separate them."""
+    paragraphs = [part.strip() for part in re.split(r"\n\s*\n", text) if part.strip()]
+    return Html("\n".join(f"<p>{words(part)}</p>" for part in paragraphs))
+
+
+_NO_LETTERS = re.compile(r"[^a-z0-9]+")
+_KEPT = ",:[]{}()/ "
+"""Characters that need no escape in such a link; each escape would take three."""
+
+
+class DataLink(NamedTuple):
+    """A link that holds a file or leads to one.
+
+    Parameters
+    ----------
+    name
+        Of the file, when it is saved.
+    link
+        The whole content, or the path of the file from the page.
+    words
+        What is to be had there.
+    """
+
+    name: str
+    link: str
+    words: str = "Data of this figure (JSON)"
+
+
+def file_link(file: Path, folder: Path) -> DataLink:
+    """Return a link to the file that holds the numbers behind a figure."""
+    relative = Path(os.path.relpath(file, folder)).as_posix()
+    return DataLink(
+        file.name, quote(relative), f"Data behind this figure, all points ({file.suffix[1:].upper()})"
+    )
+
+
+def data_link(figure: Figure, title: str) -> DataLink | None:
+    """Return the numbers that a figure shows as a link that holds them; none where it shows none."""
+    content = figure_data(figure)
+    if not content["panels"]:
+        return None
+    name = _NO_LETTERS.sub("_", title.lower()).strip("_")[:60] or "figure"
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
+    return DataLink(f"{name}.json", f"data:application/json;charset=utf-8,{quote(text, safe=_KEPT)}")
+
 
 Cell = str | int | float
 

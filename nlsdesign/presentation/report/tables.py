@@ -1,14 +1,19 @@
-"""Tables that reports share: numbers of a deck, and the paper against the model."""
+"""Tables that reports share: numbers of a deck, points of a sweep, paper against model, calculations."""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any, ClassVar, NamedTuple
+from urllib.parse import quote
 
+from ...foundation.errors import unknown_name, visible
 from ...foundation.quantity import Quantity, sources, typeset_unit
 from ...simulation import Trace
-from ..figures.number_text import compact, significant
-from .sections import TableSection
+from ..figures.style import compact, significant
+from .sections import Html, PagePosition, Section, TableSection
 
 _LONGEST_ROW = 8
 
@@ -120,3 +125,159 @@ def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: st
         for row in rows
     )
     return TableSection(title, ("", "paper", "here", "unit", "remark"), cells, caption=caption)
+
+
+@dataclass(frozen=True, eq=False)
+class PointTableSection(Section):
+    """A table of points, each with its deck; and what the page shows of any point that is chosen in a figure.
+
+    Parameters
+    ----------
+    table
+        One row per point of ``points``, without the number of the point.
+    points
+        Numbers of the points in the table.
+    decks
+        Path of the deck of a point, from the folder of the page, by number; for points beyond the table too.
+    rows
+        For each point that a figure shows its values, by number: ``status``, ``reason``, ``values``.
+    columns
+        Name and unit of each of the values.
+    command
+        What writes the deck of a point that has none yet; ``POINT`` stands for its number.
+    elsewhere
+        Where the rows of points stand that are not on the page.
+    """
+
+    table: TableSection
+    points: Sequence[int]
+    _: KW_ONLY
+    decks: Mapping[int, str] = field(default_factory=dict)
+    rows: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
+    columns: Sequence[tuple[str, str]] = ()
+    command: str = ""
+    elsewhere: str = ""
+    template: ClassVar[str] = "points.html"
+    script: ClassVar[str] = "points.js"
+
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return the cells, the links, and the rows as JSON that no name can break out of."""
+        inner = dict(self.table.content(place))
+        for row, number in zip(inner["rows"], self.points, strict=True):
+            row["point"] = number
+            row["deck"] = quote(self.decks[number]) if number in self.decks else ""
+        content = {
+            "columns": [[visible(name), unit] for name, unit in self.columns],
+            "rows": {str(number): row for number, row in self.rows.items()},
+            "decks": {str(number): quote(path) for number, path in self.decks.items()},
+            "command": visible(self.command),
+            "elsewhere": self.elsewhere,
+        }
+        text = json.dumps(content, separators=(",", ":"))
+        for letter in "<>&":  # they stand in texts only, where JSON may write any letter by its number
+            text = text.replace(letter, f"\\u{ord(letter):04x}")
+        return {**inner, "data": Html(text), "key": place.key, "elsewhere": self.elsewhere}
+
+
+OUTCOMES = {
+    "holds": "none",
+    "does not hold": "unknown",
+    "cannot be decided": "named",
+    "contradicts the figures": "data_suspect",
+}
+"""Possible verdicts on a statement, each with the style of its card."""
+
+# Symbols of a calculation are letters with an index, a star or a rate; those of a model are full names.
+_RATE = re.compile(r"<mi>d([^</]{1,6})/d([^</]{1,2})</mi>")
+_INDEX = re.compile(r"<mi>([^<_]{1,2})_([^<_*]{1,4})</mi>")
+_STAR = re.compile(r"<mi>([^<*]{1,2})\*</mi>")
+
+
+class CalculationStep(NamedTuple):
+    """One line of a calculation.
+
+    Parameters
+    ----------
+    words
+        What is done.
+    formula
+        SymPy equation or expression; ``None`` without one.
+    latex
+        The same formula as LaTeX.
+    """
+
+    words: str
+    formula: Any = None
+    latex: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class CalculationSection(Section):
+    """A statement with its calculation, its evidence and a verdict.
+
+    Parameters
+    ----------
+    statement
+        The tested statement and its source.
+    verdict
+        One of ``OUTCOMES``.
+    steps
+        The calculation, step by step.
+    why
+        What follows from it.
+    numbers
+        Results as text by name.
+    parts
+        Sections with figures or tables.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such verdict.
+    """
+
+    statement: str
+    verdict: str
+    _: KW_ONLY
+    steps: tuple[CalculationStep, ...]
+    why: str = ""
+    numbers: Mapping[str, str]
+    parts: tuple[Section, ...] = ()
+    template: ClassVar[str] = "calculation.html"
+
+    def __post_init__(self) -> None:
+        if self.verdict not in OUTCOMES:
+            raise unknown_name("verdict", self.verdict, OUTCOMES)
+
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return texts, formulas and evidence."""
+        steps = [
+            {"words": s.words, "formula": "" if s.formula is None else typeset(s.formula), "latex": s.latex}
+            for s in self.steps
+        ]
+        inner = [place.inner(i) for i, _ in enumerate(self.parts, start=1)]
+        parts = [
+            {"title": part.title, "template": part.template, "key": at.key, **part.content(at)}
+            for at, part in zip(inner, self.parts, strict=True)
+        ]
+        return {
+            "statement": self.statement, "verdict": self.verdict, "tone": OUTCOMES[self.verdict],
+            "steps": steps, "why": self.why, "numbers": self.numbers, "parts": parts,
+        }  # fmt: skip
+
+
+def typeset(expression: Any) -> Html:
+    """Return a SymPy expression as MathML; ``F_M``, ``F*`` and ``dF/dt`` get index, superscript and fraction.
+
+    Examples
+    --------
+    >>> import sympy
+    >>> typeset(sympy.Symbol("F_M"))
+    "<math displaystyle='true'><mrow><msub><mi>F</mi><mi>M</mi></msub></mrow></math>"
+    """
+    from .equation_section import formula  # here, because it loads SymPy
+
+    rate = r"<mfrac><mrow><mi>d</mi><mi>\1</mi></mrow><mrow><mi>d</mi><mi>\2</mi></mrow></mfrac>"
+    text = _RATE.sub(rate, formula(expression))
+    text = _STAR.sub(r"<msup><mi>\1</mi><mo>*</mo></msup>", text)
+    return Html(_INDEX.sub(r"<msub><mi>\1</mi><mi>\2</mi></msub>", text))

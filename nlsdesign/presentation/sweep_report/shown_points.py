@@ -1,15 +1,20 @@
-"""Which points of a sweep a page shows, by a rule that keeps what matters; columns in readable units."""
+"""Which points of a sweep a page shows, by a rule that keeps what matters, and their rows."""
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from ...foundation.arrays import Indices, Mask
+from ...foundation.errors import visible
+from ...foundation.quantity import typeset_unit
 from ...sweeps import SweepColumn, SweepTable
-from ...sweeps.ranked_points import RankedPoints
-from ..figures.sweep_points import PointKinds, ShownColumn
+from ...sweeps.preferences import RankedPoints
+from ...sweeps.sensitivity import AnswerSensitivity
+from ..figures.sweep_figures import PointKinds, ShownColumn
 
 MOST_OTHERS: Final = 1500
 MOST_KEPT: Final = 10_000
@@ -100,3 +105,84 @@ def _ends(table: SweepTable) -> Mask:
         if len(finite):
             mask[finite[[np.argmin(values[finite]), np.argmax(values[finite])]]] = True
     return mask
+
+
+_DIGITS, _LONGEST = 6, 300
+
+
+def row_columns(table: SweepTable) -> list[SweepColumn]:
+    """Return the columns of a row: axes, then answers."""
+    return [*table.axes, *table.answers]
+
+
+def named_columns(table: SweepTable) -> list[tuple[str, str]]:
+    """Return name and unit of each column of a row, as people read them."""
+    shown = (shown_column(table, column) for column in row_columns(table))
+    return [(each.name, typeset_unit(each.unit or "1")) for each in shown]
+
+
+def point_rows(table: SweepTable, ranked: RankedPoints, shown: ShownPoints) -> dict[int, Mapping[str, Any]]:
+    """Return for each point that is shown its status, reason and values, by number."""
+    columns = [_texts(table, column, shown) for column in row_columns(table)]
+    front = set(ranked.front.tolist())
+    rows: dict[int, Mapping[str, Any]] = {}
+    for place, row in enumerate(shown.rows.tolist()):
+        values = [column[place] for column in columns]
+        point = int(table.values["point"][row])
+        if ranked.failed[row]:
+            reason = visible(str(table.values["reason"][row]))[:_LONGEST]
+            rows[point] = {"status": "failed", "reason": reason, "values": values}
+            continue
+        note = (
+            "On the front." if row in front else
+            "Misses a requirement." if ranked.missed[row] else
+            "An answer that is compared is no finite number." if ranked.incomplete[row] else ""
+        )  # fmt: skip
+        rows[point] = {"note": note, "values": values} if note else {"values": values}
+    return rows
+
+
+def _texts(table: SweepTable, column: SweepColumn, shown: ShownPoints) -> list[Any]:
+    """Return the values of one column as JSON holds them; nothing where an answer is missing."""
+    values = shown_column(table, column, shown.rows).values
+    if values.dtype.kind not in "fiub":
+        return [visible(str(value))[:_LONGEST] for value in values.tolist()]
+    return [_number(value) for value in values.astype(float).tolist()]
+
+
+def _number(value: float) -> float | int | str | None:
+    if np.isnan(value):
+        return None
+    if np.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    short = float(f"{value:.{_DIGITS}g}")
+    return int(short) if short.is_integer() and abs(short) < 1e9 else short
+
+
+def listed_names(names: list[str], most: int = 8) -> str:
+    """Return names as text, the first of them."""
+    return ", ".join(f"`{name}`" for name in names[:most]) + (", …" if len(names) > most else "")
+
+
+class PageContent(NamedTuple):
+    """What the figures of a page are made from."""
+
+    table: SweepTable
+    ranked: RankedPoints
+    shown: ShownPoints
+    answers: tuple[str, ...]
+    sensitivities: dict[str, AnswerSensitivity]
+    points_file: Path
+
+    def varies(self, column: SweepColumn) -> bool:
+        """Tell whether a column has two different values."""
+        return self.distinct(column) > 1
+
+    def distinct(self, column: SweepColumn) -> int:
+        """Return how many different values a column has, those that are finite or words."""
+        values = np.asarray(self.table.values[column.name])
+        return len(np.unique(values[np.isfinite(values)] if values.dtype.kind == "f" else values.astype(str)))
+
+    def varying_axes(self) -> list[SweepColumn]:
+        """Return the axes that have two different values."""
+        return [axis for axis in self.table.axes if self.varies(axis)]

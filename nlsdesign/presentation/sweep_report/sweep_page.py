@@ -1,29 +1,89 @@
-"""The page of a sweep, with the files beside it."""
+"""The page of a sweep, with the files beside it: all numbers as CSV, and the decks of the points shown."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...foundation.command_words import typed_command
-from ...foundation.errors import MissingLibraryError, visible
+from ...foundation.errors import MissingLibraryError, NlsError, visible
+from ...foundation.text_files import write_table, write_text
 from ...sweeps import SweepTable
-from ...sweeps.preferences import NotBelow, Preference, Requirement
-from ...sweeps.ranked_points import RankedPoints, rank_points
+from ...sweeps.point_deck import point_deck_texts
+from ...sweeps.preferences import NotBelow, Preference, RankedPoints, Requirement, rank_points
 from ...sweeps.sensitivity import AnswerSensitivity, sensitivity
 from ..report import FileSection, Section, TableSection, TextSection, write_report
-from ..report.point_table import PointTableSection
-from .answer_sections import histogram_sections, sensitivity_sections
-from .asked_sections import asked_sections, unit_of
-from .figure_sections import coordinate_sections, front_sections
-from .page_content import PageContent
-from .point_rows import named_columns, point_rows
-from .shown_points import shown_column, shown_points
-from .surface_sections import surface_sections
-from .sweep_files import DECKS_FOLDER, about_of, write_decks, write_points
+from ..report.tables import PointTableSection
+from .shown_points import PageContent, named_columns, point_rows, shown_column, shown_points
+from .sweep_sections import (
+    asked_sections,
+    coordinate_sections,
+    front_sections,
+    histogram_sections,
+    sensitivity_sections,
+    surface_sections,
+    unit_of,
+)
+
+_NAMES = {
+    "points": "points asked",
+    "asked": "question, digest",
+    "digest": "deck, digest",
+    "plan": "points, digest",
+}
+POINTS_FILE = "points.csv"
+DECKS_FOLDER = "point_decks"
+"""Not that of the decks that were swept, so that the page may stand in the folder of the sweep."""
+
+
+def write_points(table: SweepTable, folder: Path) -> Path:
+    """Write all points as a table of comma-separated values, in SI, and return its path."""
+    path = folder / POINTS_FILE
+    write_table(path, _rows(table))
+    return path
+
+
+def _rows(table: SweepTable) -> Iterator[Sequence[str]]:
+    columns = [column for column in table.columns if column.name in table.values]
+    yield [f"{column.name} [{column.unit}]" if column.unit else column.name for column in columns]
+    values = [np.asarray(table.values[column.name]) for column in columns]
+    for row in zip(*values, strict=True):
+        yield [f"{float(cell):.9g}" if isinstance(cell, float | np.floating) else str(cell) for cell in row]
+
+
+def write_decks(table: SweepTable, points: Iterable[int], folder: Path) -> tuple[dict[int, str], list[str]]:
+    """Write the decks behind points; a point whose deck cannot be made has none, with the reason."""
+    written: dict[int, str] = {}
+    remarks: dict[str, list[int]] = {}
+    for point, text in point_deck_texts(table, points):
+        if isinstance(text, NlsError):
+            remarks.setdefault(f"{text.thing}: {text.rule}", []).append(point)
+            continue
+        name = f"{DECKS_FOLDER}/point_{point}.toml"
+        write_text(folder / name, text)
+        written[point] = name
+    return written, [f"no deck for {_numbers(numbers)}: {reason}" for reason, numbers in remarks.items()]
+
+
+def _numbers(points: Sequence[int]) -> str:
+    shown = ", ".join(map(str, points[:5]))
+    return ("point " if len(points) == 1 else "points ") + shown + (", …" if len(points) > 5 else "")
+
+
+def about_of(table: SweepTable) -> dict[str, str]:
+    """Return what the sweep says of itself, in texts by name."""
+    result = {}
+    for name, value in table.about.items():
+        if name in ("format", "columns") or value in (None, "", [], {}):
+            continue
+        text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+        result[_NAMES.get(name, name.replace("_", " "))] = text if len(text) <= 200 else text[:197] + "..."
+    return result
+
 
 PAGE_FILE = "sweep.html"
 MOST_DECKS = 50

@@ -18,8 +18,7 @@ from nlsdesign.foundation.deck import read_deck
 from nlsdesign.foundation.errors import MeasurementError, NlsError
 from nlsdesign.foundation.locations import bundled
 from nlsdesign.foundation.quantity import parse_unit
-from nlsdesign.foundation.reading import text_of
-from nlsdesign.foundation.writing import write_text
+from nlsdesign.foundation.text_files import text_of, write_text
 from tests.command_line import Run, run
 from tests.fuzz.commands import STUDIES
 from tests.fuzz.records import _RIG

@@ -16,8 +16,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSI
 HEAD = """
 import os, subprocess, sys, tempfile, time
 from pathlib import Path
-from nlsdesign.foundation.interruption import guarded
-from nlsdesign.foundation.writing import draft
+from nlsdesign.foundation.processes import guarded
+from nlsdesign.foundation.text_files import draft
 
 def begun():
     Path("begun").write_text("")

@@ -10,14 +10,15 @@ import pytest
 
 from nlsdesign.cli import overwriting
 from nlsdesign.foundation.errors import ExportError
-from nlsdesign.foundation.writing import write_table, write_text
-from nlsdesign.foundation.written_files import (
+from nlsdesign.foundation.text_files import (
     LIST_NAME,
     discard,
     file_state,
     keeping,
     listed_files,
     refuse_to_lose,
+    write_table,
+    write_text,
 )
 from tests.command_line import Run, run
 

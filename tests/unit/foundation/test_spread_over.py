@@ -18,10 +18,16 @@ from nlsdesign.design.tolerance.tolerance_result import ToleranceResult
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import UnitError, WorkSharingError
 from nlsdesign.foundation.processes import parallel_map
-from nlsdesign.foundation.work_sharing import DaskScheduler, Executor, InThisProcess, Processes, spread_over
-from nlsdesign.foundation.work_sharing.refusals import sendable
-from nlsdesign.foundation.work_sharing.spread_over import _Caller
-from nlsdesign.sweeps.design_question import QUICK
+from nlsdesign.foundation.work_sharing import (
+    DaskScheduler,
+    Executor,
+    InThisProcess,
+    Processes,
+    spread_over,
+)
+from nlsdesign.foundation.work_sharing.chunks import sendable
+from nlsdesign.foundation.work_sharing.shared_map import _Caller
+from nlsdesign.sweeps.questions import QUICK
 
 BOTH = [InThisProcess(), Processes(2)]
 CURVE = PowerTorque(coefficient=4.35, exponent=2.09, angle=0.87)

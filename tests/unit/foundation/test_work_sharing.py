@@ -27,9 +27,14 @@ from nlsdesign.foundation.work_sharing import (
     code_identity,
     shared_map,
 )
-from nlsdesign.foundation.work_sharing.chunks import Chunk, WorkerRefusal, computed_elsewhere
+from nlsdesign.foundation.work_sharing.chunks import (
+    Chunk,
+    WorkerRefusal,
+    computed_elsewhere,
+    refused,
+    sendable,
+)
 from nlsdesign.foundation.work_sharing.mpi_ranks import FuturesTeam
-from nlsdesign.foundation.work_sharing.refusals import refused, sendable
 from nlsdesign.foundation.work_sharing.shared_map import ChunkSizes
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.foundation.errors import ExportError
-from nlsdesign.foundation.writing import draft, write_bytes, write_table, write_text
+from nlsdesign.foundation.text_files import draft, write_bytes, write_table, write_text
 
 
 def test_what_was_there_stays_when_writing_fails(tmp_path: Path) -> None:

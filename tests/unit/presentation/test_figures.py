@@ -19,13 +19,10 @@ from nlsdesign.design import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.presentation import figures
 from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
-from nlsdesign.presentation.figures.cam_frames import MARKER, cam_picture
-from nlsdesign.presentation.figures.cam_motion import cam_motion
-from nlsdesign.presentation.figures.lines import thinned
-from nlsdesign.presentation.figures.number_text import significant
+from nlsdesign.presentation.figures.cam_motion import MARKER, cam_motion, cam_picture
 from nlsdesign.presentation.figures.over_angle import observer_stability
-from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look
-from nlsdesign.presentation.figures.svg import svg_text
+from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look, significant
+from nlsdesign.presentation.figures.svg import svg_text, thinned
 from tests import figure_samples as samples
 from tests.selection import quick_only
 

@@ -12,8 +12,8 @@ from nlsdesign.design import ExponentialTorque, design_cam
 from nlsdesign.design.optimisation.settings import DesignSettings
 from nlsdesign.design.tolerance.tolerance_result import QuantileEstimate
 from nlsdesign.feedback.observer.spread.spread_errors import SpreadErrors
-from nlsdesign.foundation.prefixes import prefixed, shared_prefix, without_power
 from nlsdesign.foundation.quantity import quantity
+from nlsdesign.foundation.written_numbers import prefixed, shared_prefix, without_power
 from nlsdesign.presentation.figures import torque_against_target
 from tests.sweeping import actuator
 

@@ -12,7 +12,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.model.equations import equations
 from nlsdesign.presentation import report
-from nlsdesign.presentation.report.verdict_section import VerdictSection
+from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 from tests import figure_samples as samples
 from tests.browser import Tab, browser, chromium
 

@@ -20,8 +20,7 @@ from nlsdesign.presentation.sweep_report.shown_points import MOST_KEPT, MOST_OTH
 from nlsdesign.presentation.sweep_report.sweep_page import usual_requirements
 from nlsdesign.sweeps import SmallerIsBetter
 from nlsdesign.sweeps.point_deck import point_deck_text, point_deck_texts
-from nlsdesign.sweeps.preferences import NotAbove
-from nlsdesign.sweeps.ranked_points import nondominated, rank_points
+from nlsdesign.sweeps.preferences import NotAbove, nondominated, rank_points
 from nlsdesign.sweeps.sweep_table import SweepTable
 from tests.sweep_tables import AREA, HOSTILE, INERTIA, RUBBER, spread_table, table_of
 

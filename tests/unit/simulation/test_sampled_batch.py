@@ -18,8 +18,8 @@ from nlsdesign.simulation import column_runs, sampled_batch
 from nlsdesign.simulation.buffered import Translate, as_it_is
 from nlsdesign.simulation.column_graph import ColumnGraph
 from nlsdesign.simulation.sampled_batch import SampledSystem, run_batch
-from nlsdesign.sweeps import same_bits as same_bits_module
-from nlsdesign.sweeps.same_bits import same_bits
+from nlsdesign.sweeps import run_sweep as same_bits_module
+from nlsdesign.sweeps.run_sweep import same_bits
 from tests import observed as ob
 
 DESIRED = "controller.spring.torque.desired"

@@ -7,12 +7,17 @@ import pytest
 from scipy.stats import norm
 
 from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError
-from nlsdesign.sweeps.answer_quantiles import answer_quantiles
-from nlsdesign.sweeps.answer_surface import AnswerSurface, answer_surface
-from nlsdesign.sweeps.axis_dependence import dependent_axes
-from nlsdesign.sweeps.preferences import LargerIsBetter, NearIsBetter, NotAbove, NotBelow, SmallerIsBetter
-from nlsdesign.sweeps.ranked_points import nondominated, rank_points
-from nlsdesign.sweeps.saltelli_plan import saltelli_plan
+from nlsdesign.sweeps.answer_statistics import AnswerSurface, answer_quantiles, answer_surface, dependent_axes
+from nlsdesign.sweeps.preferences import (
+    LargerIsBetter,
+    NearIsBetter,
+    NotAbove,
+    NotBelow,
+    SmallerIsBetter,
+    nondominated,
+    rank_points,
+)
+from nlsdesign.sweeps.saltelli import saltelli_plan
 from nlsdesign.sweeps.sensitivity import sensitivity
 
 NAN, INF = float("nan"), float("inf")

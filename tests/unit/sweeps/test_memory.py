@@ -19,8 +19,8 @@ from nlsdesign.foundation.quantity import quantity
 from nlsdesign.foundation.work_sharing import PointOutcome
 from nlsdesign.foundation.work_sharing.chunks import Chunk
 from nlsdesign.sweeps import GridAxis, run_sweep
-from nlsdesign.sweeps.arrow_columns import arrow_column, libraries, numpy_column, read_columns
 from nlsdesign.sweeps.run_sweep import SweepSettings, run_task, sweep_task
+from nlsdesign.sweeps.sweep_columns import arrow_column, libraries, numpy_column, read_columns
 
 INERTIA = "wheel.inertia"
 PER_POINT = 220.0

@@ -35,11 +35,11 @@ from nlsdesign.sweeps import (
     SpreadQuestion,
     Subject,
     SweepTable,
-    same_bits,
+    run_sweep,
     sweep,
 )
 from nlsdesign.sweeps.changes import changed_assembly
-from nlsdesign.sweeps.design_question import QUICK
+from nlsdesign.sweeps.questions import QUICK
 from nlsdesign.sweeps.sweep_plan import PointPlan
 from tests.sweeping import AREA, INERTIA, actuator, question
 
@@ -126,7 +126,7 @@ def test_workers_without_a_compiler_write_the_same_bytes(
     inertia = SOFT.quantities()[INERTIA].number
     machines = [inertia, 1.3 * inertia, 1.5 * inertia]
     spread_of(tmp_path / "compiled", machines, Processes(2))
-    monkeypatch.setattr(same_bits, "quickest", lambda: as_it_is)
+    monkeypatch.setattr(run_sweep, "quickest", lambda: as_it_is)
     monkeypatch.setattr(column_runs, "MANY", 2)
     column_runs._column_run.cache_clear()
     table = spread_of(tmp_path / "interpreted", machines, InThisProcess())

@@ -10,9 +10,9 @@ import pytest
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError, UnknownNameError
-from nlsdesign.sweeps.sweep_columns import STATE_COLUMNS
+from nlsdesign.sweeps.sweep_columns import STATE_COLUMNS, SweepColumn
 from nlsdesign.sweeps.sweep_parts import Parts
-from nlsdesign.sweeps.sweep_table import SweepColumn, about_text, read_sweep
+from nlsdesign.sweeps.sweep_table import about_text, read_sweep
 
 DECK = "austin2015_as_printed"
 AREA, RUBBER = "spring.rubber.area", "spring.rubber"

@@ -20,7 +20,7 @@ from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, MeasurementError
 from ....foundation.processes import parallel_map
 from ....foundation.quantity import parse_unit, with_unit
-from ....foundation.writing import write_text
+from ....foundation.text_files import write_text
 from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ....model.structure import MovingBody, body_moved_by

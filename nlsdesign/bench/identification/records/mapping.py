@@ -14,7 +14,7 @@ from typing import Any
 
 from ....foundation.errors import MeasurementError, UnitError, nearest
 from ....foundation.quantity import parse_unit, same_dimension, typeset_unit
-from ....foundation.reading import text_of
+from ....foundation.text_files import text_of
 from ....model import FlatModel
 
 _FASTEST = 1e6

@@ -24,7 +24,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, missing_library
-from ....foundation.reading import is_there
+from ....foundation.text_files import is_there
 from .csv_files import read_csv
 
 _NUMBERS = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ....foundation.arrays import Array
-from ....foundation.writing import write_table
+from ....foundation.text_files import write_table
 from ....model.roles import motor_of
 from ....simulation.buffered import Translate, as_it_is
 from ..closed_loop import ClosedLoop

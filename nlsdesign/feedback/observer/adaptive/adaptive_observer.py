@@ -28,8 +28,8 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
-from ....foundation.prefixes import prefixed
 from ....foundation.quantity import typeset_unit
+from ....foundation.written_numbers import prefixed
 from ....model import FlatModel, Table, Variable
 from ....model.roles import measured_motion, spring_torque
 from ....simulation.prior import Prior, declared_prior

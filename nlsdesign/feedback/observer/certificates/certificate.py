@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from ....foundation.errors import MeasurementError
-from ....foundation.writing import write_text
+from ....foundation.text_files import write_text
 from ....model import FlatModel
 
 FORMAT = "nlsdesign observer certificate 1"

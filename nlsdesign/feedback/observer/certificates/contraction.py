@@ -15,7 +15,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError
-from ....foundation.prefixes import shared_prefix, without_power
+from ....foundation.written_numbers import shared_prefix, without_power
 from ....model import FlatModel
 from ..scheduling.scheduled import ObserverDesign
 from ..scheduling.step import ConstantGain

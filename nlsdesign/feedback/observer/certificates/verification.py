@@ -12,8 +12,8 @@ from typing import Protocol, TypeAlias, cast
 import numpy as np
 
 from ....foundation.errors import MeasurementError, NlsError
-from ....foundation.prefixes import prefixed
-from ....foundation.reading import text_of
+from ....foundation.text_files import text_of
+from ....foundation.written_numbers import prefixed
 from ....model import FlatModel
 from ..adaptive.adaptive_observer import AdaptiveDesign
 from ..scheduling.scheduled import ObserverDesign, design_observer_with_details

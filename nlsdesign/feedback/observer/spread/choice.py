@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError, unknown_name
-from ....foundation.prefixes import prefixed
 from ....foundation.quantity import typeset_unit
+from ....foundation.written_numbers import prefixed
 from ....model import FlatModel
 from ....model.roles import measured_motion, series_spring, spring_torque
 from ....simulation.buffered import Translate, as_it_is

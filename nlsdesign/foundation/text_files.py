@@ -1,23 +1,56 @@
-"""What was written into a folder, so that nothing is replaced that somebody has changed or brought.
+"""Text files that are read and written: whole or not at all, with clear errors, known by their digests.
 
-Every folder holds a small list, name → SHA-256 of what was written. While a command runs (:func:`keeping`), a
-file that is not as it was written is not replaced: what should have taken its place is written beside it.
+Every file of the package is written here. What was written into a folder is known by its digest, so that
+nothing is replaced that somebody has changed or brought.
 """
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import hashlib
 import json
 import os
+import secrets
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
 
-from .errors import ExportError
+from .errors import ExportError, NlsError
+
+MOST_BYTES = 2**26
+"""Largest text file: 64 MiB, a thousand times a large deck. Records have a bound of their own."""
+
+
+def is_there(path: Path) -> bool:
+    """Tell whether something of that name exists; a name that no file can have does not."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # longer than a name may be, or with a zero byte
+        return False
+
+
+def text_of(path: Path, kind: type[NlsError], *, next_step: str = "give a text file in UTF-8") -> str:
+    """Return the text of a file, without the byte order mark that an editor may have put in front."""
+    try:
+        if is_there(path) and not path.is_file():
+            raise kind(str(path), "cannot be read: it is a folder or a device", next_step=next_step)
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            rule = f"has {size / 2**20:.0f} MiB, at most {MOST_BYTES // 2**20} MiB are read"
+            raise kind(str(path), rule, next_step=next_step)
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        rule = f"cannot be read: it is no text in UTF-8, {error.reason} at byte {error.start}"
+        raise kind(str(path), rule, next_step=next_step) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise kind(str(path), f"cannot be read: {reason}", next_step=next_step) from None
+
 
 LIST_NAME: Final = ".nlsdesign.json"
 """Name of the list in each folder."""
@@ -200,3 +233,86 @@ def _write_list(folder: Path, names: dict[str, str], writers: dict[str, str]) ->
         os.replace(name, folder / LIST_NAME)
     except OSError:
         Path(name).unlink(missing_ok=True)
+
+
+_drafts: set[Path] = set()
+
+
+@contextmanager
+def draft(target: Path) -> Iterator[Path]:
+    """Yield a temporary file in the same folder; it replaces the target if no error occurs.
+
+    While a command keeps what others have changed, it goes beside such a target instead.
+
+    ``target``: final path; its folder is made if it is missing.
+    """
+    # The name is noted before the file exists, so that an interrupt at any moment leaves none behind.
+    name = target.parent / f".{target.name}.{secrets.token_hex(6)}"
+    _drafts.add(name)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
+        yield name
+        # A temporary file can be read by its owner only.
+        os.chmod(name, 0o644)
+        place = place_for(target, Path(name))
+        os.replace(name, place)
+        note_written(place)
+    except OSError as error:
+        raise _not_writable(target, error) from error
+    finally:
+        with contextlib.suppress(OSError):  # where its folder could not be made
+            name.unlink(missing_ok=True)
+        _drafts.discard(name)
+
+
+def remove_drafts() -> None:
+    """Remove the drafts that an interrupt has left, in the moment before they are removed or after it."""
+    for name in list(_drafts):
+        with contextlib.suppress(OSError):
+            name.unlink(missing_ok=True)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, with those above it, where it does not exist."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(
+            str(folder), f"cannot be made ({error.strerror or error})", next_step="name another folder"
+        ) from None
+
+
+def write_text(path: Path, text: str) -> None:
+    r"""Write a text file whole or not at all, with line ends as they stand.
+
+    What is no character, as in the name of a file that is no UTF-8, is written as in JSON: ``\udcff``.
+
+    ``path``: file; its folder is made if needed.
+    """
+    with draft(path) as name:
+        name.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a binary file whole or not at all.
+
+    ``path``: file; its folder is made if needed.
+    """
+    with draft(path) as name:
+        name.write_bytes(content)
+
+
+def write_table(path: Path, rows: Iterable[Sequence[str]]) -> None:
+    """Write a table of comma-separated values whole or not at all.
+
+    ``path``: file; its folder is made if needed.
+    """
+    with draft(path) as name, name.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows(rows)
+
+
+def _not_writable(target: Path, error: OSError) -> ExportError:
+    return ExportError(
+        str(target), f"cannot be written ({error.strerror or error})", next_step="name another file or folder"
+    )

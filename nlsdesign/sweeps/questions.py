@@ -1,25 +1,34 @@
-"""Questions on the flat model of each point: over the angle, over the spread, and in a closed loop."""
+"""Questions that ask a room below: on the flat model of a point, for a cam design, and for a diagnosis."""
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
+from ..bench.discrepancy import diagnose
+from ..bench.discrepancy.effects import catalogue
+from ..bench.identification import load_records
 from ..components.assembly.named_parts import Assembly
+from ..design import DesignSettings, Goal, Limit, Target, design_cam
+from ..design.optimisation.solve import GOALS, require_designable
 from ..feedback.analysis import Chart, Observability, Stability, over_angle
 from ..feedback.control import TorqueGains, encoder_loop, loop_margins, sine_response, torque_controller
 from ..feedback.control.closed_loop import ClosedLoop
 from ..feedback.control.evaluation.linear_loop import LinearLoop
 from ..feedback.observer import CascadeGain, design_observer, observer_bench, observer_errors
-from ..foundation.errors import ArrangementError, ValueRangeError, brief
+from ..foundation.errors import ArrangementError, MeasurementError, ValueRangeError, brief, unknown_name
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
-from .axis_values import in_unit
-from .same_bits import same_bits
+from .axis_values import in_unit, si_unit
+from .changes import ASK
+from .run_sweep import same_bits
 from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer, worst
 
@@ -265,3 +274,202 @@ def _crossing(size: np.ndarray, place: int, frequencies: np.ndarray) -> float:
     high, low = math.log(size[place - 1]), math.log(size[place])
     share = (high - math.log(_HALF_POWER)) / (high - low)
     return float(frequencies[place - 1] * (frequencies[place] / frequencies[place - 1]) ** share)
+
+
+QUICK = DesignSettings(starts=4, draws=0, look_for_size_ranges=False, look_for_remedies=False)
+"""Four starts, no draws, no remedies: what a sweep of designs asks of each by default."""
+_LEVER_ARM = ".lever_arm"
+_ANSWERS = (
+    answer("met", "", "1 where the design meets its target"),
+    answer("torque_error_rms", "N*m", "rms torque error of the finished assembly"),
+    answer("torque_error_relative", "", "the same over the largest torque of the target"),
+    answer("torque_error_largest", "N*m", "largest torque error"),
+    answer("cam_radius", "m", "largest radius of the contour"),
+    answer("radius_of_curvature", "m", "smallest radius of curvature of the contour"),
+    answer("lever_arm", "m", "largest lever arm"),
+    answer("strain", "", "largest strain of the rubber"),
+    answer("cable_force", "N", "largest force in a cable"),
+    answer("energy", "N*m", "energy taken up from angle zero to the last angle"),
+    answer("rubber_volume", "m^3", "of all elements"),
+)
+
+
+@dataclass(frozen=True)
+class DesignQuestion(SweepQuestion):
+    """The cam of a spring, and what else is free, for a target; a miss is an answer, ``met`` 0.
+
+    A point whose limits contradict each other fails, with their names as its reason.
+
+    Parameters
+    ----------
+    target
+        Torque curve.
+    free
+        Full names of what may change besides the contour; ``None`` for the contour alone. Single numbers are
+        answers too, as ``designed.NAME``.
+    keep
+        Limits, besides those of the settings.
+    goals
+        What is made small, as a sum.
+    spring
+        Path of the cam spring where the structure leaves it open; empty otherwise.
+    settings
+        Of the search.
+    """
+
+    target: Target
+    free: tuple[str, ...] | None = None
+    keep: tuple[Limit, ...] = ()
+    goals: tuple[Goal, ...] = GOALS
+    spring: str = ""
+    settings: DesignSettings = QUICK
+
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
+        """Return error, sizes, strain, force and energy, and each free single number."""
+        known = assembly.quantities()
+        chosen = [n for n in self.free or () if n in known and not isinstance(known[n].value, tuple)]
+        numbers = [answer(f"designed.{n}", si_unit(known[n].unit), "chosen by the design") for n in chosen]
+        return (*_ANSWERS, *numbers)
+
+    def require_fit(self, assembly: Assembly) -> None:
+        """Refuse free names, limits and goals that the assembly does not have."""
+        require_designable(
+            assembly, target=self.target, free=self.free, keep=self.keep, goals=self.goals,
+            spring=self.spring or None, settings=self.settings,
+        )  # fmt: skip
+
+    def chosen(self, assembly: Assembly) -> frozenset[str]:
+        """Return what is free, and the numbers of a contour that is."""
+        rows = [name for name in assembly.quantities() if name.endswith(_LEVER_ARM)]
+        cams = [name.removesuffix(_LEVER_ARM) for name in rows if name.startswith(self.spring)]
+        if self.free is not None:
+            cams = [cam for cam in cams if {f"{cam}.contour", f"{cam}{_LEVER_ARM}"} & set(self.free)]
+        contours = {f"{cam}{end}" for cam in cams for end in (_LEVER_ARM, ".last_angle")}
+        return frozenset({*(self.free or ()), *contours})
+
+    def ask(self, assembly: Assembly) -> Mapping[str, float]:
+        """Return what the design is."""
+        made = design_cam(
+            assembly, target=self.target, free=self.free, keep=self.keep, goals=self.goals,
+            spring=self.spring or None, settings=self.settings,
+        )  # fmt: skip
+        values = {
+            "met": float(made.met),
+            "torque_error_rms": made.rms,
+            "torque_error_relative": made.rms / made.target.largest,
+            "torque_error_largest": made.check.largest,
+            "cam_radius": float(made.contour.radii.max()),
+            "radius_of_curvature": float(made.contour.radii_of_curvature.min()),
+            "lever_arm": float(made.contour.lever_arms.max()),
+            "strain": max((float(row.max()) for row in made.curves.strains.values()), default=float("nan")),
+            "cable_force": float(made.curves.forces.max()),
+            "energy": made.curves.energy,
+            "rubber_volume": made.rubber_volume,
+        }
+        changed = made.actuator.quantities()
+        names = [c.name.removeprefix("designed.") for c in self.answers(assembly)[len(_ANSWERS) :]]
+        return values | {f"designed.{name}": changed[name].number for name in names}
+
+
+RECORDS: Final = f"{ASK}.records"
+"""Name of the axis that lists folders of records."""
+_VERDICTS = ("none", "named", "unknown", "undecidable", "data_suspect")
+
+
+@dataclass(frozen=True)
+class DiagnosisQuestion(SweepQuestion):
+    """What the declared model lacks on a set of records.
+
+    Parameters
+    ----------
+    records
+        Folder of the records; an axis ``ask.records`` lists several, absolute where workers run elsewhere.
+    effects
+        Names of the catalogue that get a column; all by default.
+
+    Raises
+    ------
+    UnknownNameError
+        If the catalogue has no effect of a name.
+    """
+
+    records: str
+    effects: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        known = [each.__name__ for each in catalogue()]
+        for name in self._names():
+            if name not in known:
+                raise unknown_name("effect of the catalogue", name, known)
+
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
+        """Return which verdict it is, errors, and of each effect whether it is named and how probable."""
+        del assembly
+        verdicts = (answer(f"verdict.{name}", "", "1 where that is the verdict") for name in _VERDICTS)
+        effects = (
+            column
+            for name in self._names()
+            for column in (
+                answer(f"named.{name}", "", "1 where the effect is named"),
+                answer(f"probability.{name}", "", "that it is there, where it is named"),
+            )
+        )
+        figures = (
+            answer("named", "", "number of effects that are named"),
+            answer("held_out_ratio", "", "error on held-out records over the noise floor, after"),
+            answer("closed", "", "share of the held-out excess that is gone"),
+        )
+        return (*verdicts, *figures, *effects)
+
+    def ask(self, assembly: Assembly) -> Mapping[str, float]:
+        """Return the verdict in numbers."""
+        verdict = diagnose(assembly, load_records(Path(self.records), flatten(assembly)))
+        named: dict[str, float] = {}
+        for each in verdict.effects:  # one effect may be named at several places
+            named[each.name] = float(np.fmax(each.probability, named.get(each.name, math.nan)))
+        held_out = any(each.role == "held_out" and each.block == verdict.block for each in verdict.gaps)
+        values = {f"verdict.{name}": float(verdict.verdict == name) for name in _VERDICTS}
+        values |= {
+            "named": float(len(verdict.effects)),
+            "held_out_ratio": verdict.held_out_ratio if held_out else math.nan,
+            "closed": verdict.closed if held_out else math.nan,
+        }
+        for name in self._names():
+            values[f"named.{name}"] = float(name in named)
+            values[f"probability.{name}"] = named.get(name, math.nan)
+        return values
+
+    def _names(self) -> tuple[str, ...]:
+        # Functions of the catalogue are named as their effects.
+        return self.effects or tuple(dict.fromkeys(each.__name__ for each in catalogue()))
+
+    def describe(self) -> str:
+        """Return the question with a digest of the records, so that changed records are another question."""
+        return f"{super().describe()} {_content(Path(self.records))}"
+
+    def stands_for(self, name: str, text: str) -> str:
+        """Return the digest of the records in a folder that an axis lists.
+
+        Parameters
+        ----------
+        name
+            Of the axis.
+        text
+            The folder.
+
+        Raises
+        ------
+        MeasurementError
+            If there is no such folder.
+        """
+        return _content(Path(text)) if name == RECORDS else ""
+
+
+def _content(folder: Path) -> str:
+    if not folder.is_dir():
+        raise MeasurementError(str(folder), "is no folder", next_step="name the folder of the records")
+    digest = hashlib.sha256()
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        digest.update(path.relative_to(folder).as_posix().encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()

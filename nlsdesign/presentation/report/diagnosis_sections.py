@@ -1,16 +1,20 @@
-"""Sections of a report on a diagnosis: findings, errors, candidates, numbers, next experiments."""
+"""Sections on a diagnosis and on the observer that was designed again from the better model."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ...bench.discrepancy.effects.plain_names import kind_in_words, title
 from ...bench.discrepancy.reporting.circumstances import settings_of
 from ...bench.discrepancy.reporting.fitted_numbers import FittedNumber, fitted_numbers
-from ...bench.discrepancy.reporting.verdict import RecordGap, Verdict, best_forms, let_go, suspicions
-from ...foundation.quantity import typeset_unit, with_error
+from ...bench.discrepancy.reporting.verdict import Gap, RecordGap, Verdict, best_forms, let_go, suspicions
+from ...foundation.errors import unknown_name
+from ...foundation.quantity import three_digits, typeset_unit, with_error
 from ...model import FlatModel, flatten
 from ..figures import RecordError, compact, gap_bars
 from ..figures.before_after import (
@@ -20,9 +24,101 @@ from ..figures.before_after import (
     candidate_shares,
     held_out_series,
 )
-from ..figures.number_text import significant
-from .sections import Chapter, FigureSection, Section, TableSection
-from .verdict_section import VerdictSection
+from ..figures.style import significant
+from .sections import (
+    Chapter,
+    FigureSection,
+    FileSection,
+    KeyNumber,
+    NumbersSection,
+    PagePosition,
+    Section,
+    TableSection,
+)
+
+if TYPE_CHECKING:
+    # Only its type is wanted here: the module brings the compiler and fmpy along.
+    from ...regeneration import Regeneration
+
+VERDICTS = {
+    "none": "nothing is missing",
+    "named": "effect named",
+    "unknown": "an effect without a name",
+    "undecidable": "the records cannot tell",
+    "data_suspect": "data or deck are suspect",
+}
+
+_WIDTH = 100.0
+"""Width of the longer bar of the gap, in units of the drawing."""
+
+
+@dataclass(frozen=True, eq=False)
+class VerdictSection(Section):
+    """A verdict with its evidence: tables of candidates, figures of the errors.
+
+    Parameters
+    ----------
+    verdict
+        ``"none"``, ``"named"``, ``"unknown"``, ``"undecidable"`` or ``"data_suspect"``.
+    words
+        The findings, in sentences.
+    headline
+        The findings in one line.
+    gap
+        Error before and after; ``None`` where there is none to show.
+    after
+        How the model after differs from the one before.
+    parts
+        Sections with the evidence.
+    """
+
+    verdict: str
+    words: str
+    _: KW_ONLY
+    headline: str = ""
+    gap: Gap | None = None
+    after: str = "with what was added"
+    parts: tuple[Section, ...] = ()
+    template: ClassVar[str] = "verdict.html"
+
+    def __post_init__(self) -> None:
+        if self.verdict not in VERDICTS:
+            raise unknown_name("verdict", self.verdict, VERDICTS)
+
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return the verdict and the contents of its parts."""
+        parts = [
+            {
+                "title": part.title,
+                "template": part.template,
+                "key": place.inner(i).key,
+                **part.content(place.inner(i)),
+            }
+            for i, part in enumerate(self.parts, start=1)
+        ]
+        return {
+            "verdict": self.verdict,
+            "badge": VERDICTS[self.verdict],
+            "headline": self.headline,
+            "gap": None if self.gap is None else _drawn(self.gap, self.after),
+            "words": self.words,
+            "parts": parts,
+        }
+
+
+def _drawn(gap: Gap, after: str) -> Mapping[str, Any]:
+    """Return the two bars of a gap and the numbers below them."""
+    longest = max(gap.before, gap.after) or 1.0
+    bars = {n: f"{_WIDTH * getattr(gap, n) / longest:.2f}" for n in ("before", "after")}
+    records = "records that no fit has seen" if gap.role == "held_out" else "the fitted records"
+    note = (
+        f"before, the refitted declared model; after, {after}. Both filtered alike."
+        if gap.changed
+        else "the refitted declared model; nothing was added."
+    )
+    note = f"Root mean square error of `{gap.block}` on {records}: {note}"
+    return {"bars": bars if gap.changed else None, "rows": gap.rows(), "note": note, "words": gap.words()}
+
 
 _SHAPES = 2
 _EDGE = 1.0
@@ -297,3 +393,82 @@ def _list(heading: str, column: str, texts: Sequence[str], caption: str) -> list
     """Return a table of sentences; none where there are none."""
     rows = tuple((text,) for text in texts)
     return [TableSection(heading, (column,), rows, caption=caption)] if rows else []
+
+
+def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> list[Section]:
+    """Return the chapter on the observer: torque error before and after, and the files.
+
+    Parameters
+    ----------
+    result
+        From :func:`nlsdesign.regeneration.regenerate`.
+    files
+        What was written, by path.
+    """
+    sections: list[Section] = [
+        Chapter(
+            "Observer from the better model",
+            "The torque observer, designed from the declared (before) and from the better model (after). "
+            "Both read the measured signals and are compared with the torque that the records show.",
+        )
+    ]
+    if result.errors:
+        sections += [_torque_errors(result), _table(result)]
+    if result.course is not None:
+        time, torque, before, after = result.course
+        name = result.errors[0].record
+        series = HeldOut(time, torque, before, after, result.quantity, result.unit, 0.0, f"Record {name}")
+        sections.append(
+            FigureSection(
+                f"Estimated torque: {name}", held_out_series(series),
+                caption=f"Above: {result.quantity}, as measured and as both observers estimate it. "
+                "Below: the errors, unfiltered.",
+                assumed="The measured torque is what the better model says is behind the readings.",
+            )
+        )  # fmt: skip
+    if result.reasons:
+        rows = tuple((reason,) for reason in result.reasons)
+        caption = "Why something is lacking here."
+        sections.append(TableSection("Not done", ("reason",), rows, caption=caption))
+    if files:
+        sections.append(FileSection("Files", files, caption="Written beside this report."))
+    return sections
+
+
+def _torque_errors(result: Regeneration) -> NumbersSection:
+    unit = typeset_unit(result.unit)
+    before, after = (three_digits(each) for each in result.nominal)
+    numbers = [KeyNumber("torque error, nominal numbers", f"{before} → {after} {unit}", "before → after")]
+    if result.spread_before and result.spread_after:
+        before, after = (three_digits(each) for each in result.over_spread)
+        counts = f"{len(result.spread_before)} and {len(result.spread_after)} draws"
+        note = f"declared spreads → covariance of the fit, {counts}"
+        numbers.append(KeyNumber("torque error over the spread", f"{before} → {after} {unit}", note))
+    if result.adaptive:
+        before, after = (three_digits(each) for each in result.learning)
+        note = "learns on each record, begun at the numbers of its model"
+        numbers.append(KeyNumber("adaptive observer", f"{before} → {after} {unit}", note))
+    return NumbersSection("Torque error", tuple(numbers))
+
+
+def _table(result: Regeneration) -> TableSection:
+    unit = typeset_unit(result.unit)
+    rows = tuple(
+        (
+            kind,
+            e.record,
+            e.role.replace("_", " "),
+            three_digits(e.before),
+            three_digits(e.after),
+            three_digits(e.torque),
+        )
+        for kind, errors in (("cascade", result.errors), ("adaptive", result.adaptive))
+        for e in errors
+    )
+    columns = ("observer", "record", "used", f"before in {unit}", f"after in {unit}", f"torque in {unit}")
+    caption = (
+        "Root mean square error of the estimated torque, and the torque itself; the cascade with nominal "
+        "numbers, the adaptive observer begun with them."
+        + (f" Generated is the {result.chosen}." if result.chosen else "")
+    )
+    return TableSection("Torque error of each record", columns, rows, caption=caption)

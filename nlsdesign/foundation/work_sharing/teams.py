@@ -1,7 +1,7 @@
-"""Processes of this machine, each with a pipe of its own, so that a dead one loses its own chunk only.
+"""What every executor offers, and the two that need no library: this process, and processes of this machine.
 
-The pool of the standard library gives up all that is in flight when one process dies, and does not tell
-whose chunk it was; that is why these are our own.
+A team of workers takes chunks and gives back outcomes or losses. Each process has a pipe of its own, so
+that a dead one loses its own chunk only.
 """
 
 from __future__ import annotations
@@ -12,15 +12,86 @@ import os
 import pickle
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, Protocol
 
 from ..errors import ValueRangeError
 from ..processes import alone, ready_as_helper, signals_held
-from .chunks import Chunk, ChunkLoss, computed, pickled
-from .team import Finished, Team
+from .chunks import Chunk, ChunkLoss, PointOutcome, computed, pickled
+
+Finished = tuple[Chunk, list[PointOutcome] | ChunkLoss]
+
+
+class Team(Protocol):
+    """Workers that stand ready for one function."""
+
+    def free(self) -> int:
+        """Return how many more chunks can be given now."""
+        ...
+
+    def workers(self) -> int:
+        """Return the number of workers."""
+        ...
+
+    def submit(self, chunk: Chunk) -> None:
+        """Give one chunk to a worker."""
+        ...
+
+    def finished(self, seconds: float) -> list[Finished]:
+        """Return what has come to an end; an empty list after that time."""
+        ...
+
+
+class Executor(Protocol):
+    """Where work is done; chosen by the caller."""
+
+    def team(self, work: Callable[[Any], Any]) -> AbstractContextManager[Team]:
+        """Return workers for one function; they end with the block.
+
+        Parameters
+        ----------
+        work
+            Asked of each point.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class InThisProcess:
+    """No worker but this process; what a point breaks here ends the whole work."""
+
+    @contextmanager
+    def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
+        """Yield this process as the one worker.
+
+        Parameters
+        ----------
+        work
+            Asked of each point.
+        """
+        yield _Itself(work)
+
+
+class _Itself:
+    def __init__(self, work: Callable[[Any], Any]) -> None:
+        self._work = work
+        self._waiting: list[Chunk] = []
+
+    def free(self) -> int:
+        return 1 - len(self._waiting)
+
+    def workers(self) -> int:
+        return 1
+
+    def submit(self, chunk: Chunk) -> None:
+        self._waiting.append(chunk)
+
+    def finished(self, seconds: float) -> list[Finished]:
+        del seconds
+        chunks, self._waiting = self._waiting, []
+        return [(chunk, computed(self._work, chunk)) for chunk in chunks]
 
 
 @dataclass(frozen=True)

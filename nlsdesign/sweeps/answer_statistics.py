@@ -1,14 +1,66 @@
-"""An answer over two axes: a grid, an interpolation, or a polynomial where further axes vary."""
+"""Answers of a sweep: quantiles with bounds, surfaces over two axes, and whether axes are independent."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
+from itertools import combinations, combinations_with_replacement
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import Delaunay, QhullError
+from scipy.stats import binom, rankdata
 
 from ..foundation.arrays import Array
+
+SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+CONFIDENCE = 0.95
+
+
+class BoundedQuantile(NamedTuple):
+    """A quantile with the bounds of its confidence.
+
+    Parameters
+    ----------
+    share
+        Of the values that lie at or below it.
+    value
+        Of the sample, one of its values.
+    lower, upper
+        Bounds, values of the sample; not a number where the sample is too small to bound that side.
+    """
+
+    share: float
+    value: float
+    lower: float
+    upper: float
+
+
+def answer_quantiles(values: ArrayLike, shares: Sequence[float] = SHARES) -> list[BoundedQuantile]:
+    """Return quantiles, each with the order statistics that bound it with 95 % confidence.
+
+    The bounds hold for independent draws of any continuous distribution: the number of draws below a quantile
+    has a binomial distribution. Infinite values count as the largest or smallest.
+
+    ``values``: of one answer; those that are not a number are left out.
+    """
+    column = np.asarray(values, dtype=float).ravel()
+    ordered = np.sort(column[~np.isnan(column)])
+    count, tail = len(ordered), 0.5 * (1.0 - CONFIDENCE)
+    if not count:
+        return []
+    result = []
+    for share in shares:
+        low = int(binom.ppf(tail, count, share))
+        high = int(binom.ppf(1.0 - tail, count, share)) + 1
+        lower = float(ordered[low - 1]) if low >= 1 else math.nan
+        upper = float(ordered[high - 1]) if high <= count else math.nan
+        middle = min(count, max(1, math.ceil(count * share - 1e-9)))
+        result.append(BoundedQuantile(share, float(ordered[middle - 1]), lower, upper))
+    return result
+
 
 _FOLDS, _CELLS, _HIGHEST_DEGREE = 10, 41, 4
 _LEAST_EXPLAINED = 0.1
@@ -172,3 +224,48 @@ def _terms(unit: Array, degree: int) -> Array:
             np.prod(centred[:, list(c)], axis=1) for c in combinations_with_replacement((0, 1), total)
         ]
     return np.column_stack(columns)
+
+
+LEAST_CORRELATION: Final = 0.1
+_DEVIATIONS: Final = 4.0
+
+
+def codes(values: NDArray[Any]) -> Array:
+    """Return numbers as they are, and words as the numbers of their place in the alphabet."""
+    column = np.asarray(values)
+    if column.dtype.kind in "fiub":
+        return column.astype(float)
+    return np.unique(column.astype(str), return_inverse=True)[1].ravel().astype(float)
+
+
+def dependent_axes(axes: Mapping[str, NDArray[Any]]) -> str:
+    """Return which two axes depend most on each other, as text; empty where none do.
+
+    The ranks of the values are compared, and their distances from the middle rank, which shows two axes that
+    lie on a circle or a wedge. What does not show in either is not seen.
+
+    ``axes``: values of each axis, shape (n,); words too.
+    """
+    ranks = {name: rankdata(codes(values)) for name, values in axes.items()}
+    worst, words = 0.0, ""
+    for one, other in combinations(ranks, 2):
+        for first, second in _views(ranks[one], ranks[other]):
+            size = _correlation(first, second)
+            limit = max(LEAST_CORRELATION, _DEVIATIONS / np.sqrt(len(first)))
+            if size > max(limit, worst):
+                worst, words = (
+                    size,
+                    f"axes {one} and {other} depend on each other (rank correlation {size:.2f})",
+                )
+    return words
+
+
+def _views(first: Any, second: Any) -> list[tuple[Any, Any]]:
+    wide = [np.abs(each - np.median(each)) for each in (first, second)]
+    return [(first, second), (wide[0], wide[1]), (wide[0], second), (first, wide[1])]
+
+
+def _correlation(first: Any, second: Any) -> float:
+    if np.ptp(first) == 0.0 or np.ptp(second) == 0.0:
+        return 0.0
+    return float(abs(np.corrcoef(first, second)[0, 1]))
