@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet
 from nlsdesign.bench.identification.equation_error.block_noise import rate_span
 from nlsdesign.bench.identification.equation_error.evidence import Bench

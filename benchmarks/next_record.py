@@ -22,12 +22,12 @@ import numpy as np
 
 from models.test_rig import test_rig_deck
 from nlsdesign.bench.discrepancy import effects
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.planning.candidate_commands import MachineLimits
 from nlsdesign.bench.discrepancy.planning.experiment import next_experiment
-from nlsdesign.bench.discrepancy.planning.machine_limits import MachineLimits
-from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import Assembly

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from .bench.discrepancy.blocks.shown_values import shown_values
+from .bench.discrepancy.block_prediction import shown_values
 from .bench.identification import Record, RecordSet
 from .bench.identification.least_squares import Fit
 from .export import export_c, export_fmu

@@ -102,7 +102,7 @@ class _Machine:
 
     def records(self) -> None:
         """Cut the machine at what its sensors, or states where there are none, and its inputs measure."""
-        from ..bench.discrepancy.blocks.tearing import blocks_of
+        from ..bench.discrepancy.tearing import blocks_of
 
         blocks_of(self.model, self.measured)
 

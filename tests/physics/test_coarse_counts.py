@@ -12,7 +12,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from nlsdesign.bench.discrepancy import Refit, predict, refit
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet
 from nlsdesign.bench.identification.equation_error.block_noise import rate_span
 from nlsdesign.bench.identification.equation_error.evidence import Bench

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.criteria import Criteria
-from nlsdesign.bench.discrepancy.selection.excess import excesses
+from nlsdesign.bench.discrepancy.selection.hypothesis import excesses
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import Assembly

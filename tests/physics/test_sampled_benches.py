@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import block_noise
 from nlsdesign.bench.identification.equation_error.evidence import Bench

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import ALL, diagnose, predict
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.bench.discrepancy.effects.candidate import Candidate
+from nlsdesign.bench.discrepancy.effects.effect import Candidate
 from nlsdesign.bench.discrepancy.effects.unnamed_tables import EFFECT, unnamed_part
-from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components.assembly.deck_writer import declare, write_deck

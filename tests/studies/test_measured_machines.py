@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.least_squares import Fit, fit

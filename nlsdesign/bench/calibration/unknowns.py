@@ -14,7 +14,7 @@ from ...model import FlatModel
 from ...model.readings import reading_of
 from ...model.roles import driven_body
 from ...simulation import Prior, declared_prior
-from ..discrepancy.blocks.shown_values import shown_values
+from ..discrepancy.block_prediction import shown_values
 from ..identification import Record
 from ..identification.covariance import Piece
 from .bench_response import BALANCE, BenchCourse, BenchResponse, bench_response, shared_factors

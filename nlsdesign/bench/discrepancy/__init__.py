@@ -1,16 +1,16 @@
 """What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
 
-from .blocks.prediction_of_blocks import band_errors, predict, ranges_left
+from .block_prediction import band_errors, predict, ranges_left
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
+from .planning.candidate_commands import MachineLimits
 from .planning.experiment import Experiment, next_experiment, write_command
-from .planning.machine_limits import MachineLimits
 from .reporting.circumstances import DiagnosisRun, records_of_run
-from .reporting.fitted_sources import with_records_named
+from .reporting.fitted_numbers import with_records_named
 from .reporting.refit import Refit, refit
 from .reporting.verdict import Verdict
-from .reporting.verdict_frames import verdict_frames
+from .reporting.written import verdict_frames
 
 __all__ = [
     "ALL",

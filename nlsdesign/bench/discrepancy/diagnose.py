@@ -26,38 +26,33 @@ from ...model.derived_deck import derived
 from ..identification.equation_error.evidence import Bench
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
-from .blocks.tearing import blocks_of
 from .effects import Candidate
 from .effects import catalogue as known_effects
-from .effects.candidate import EffectFunction
-from .fitting.unpredictable import Key
+from .effects.effect import EffectFunction
+from .fitting import Key
 from .planning.experiment import Experiment, next_experiment
 from .reporting.advice import advice, more_excitation, where_they_differ
-from .reporting.gap import course_of, gaps_of, shapes_of
 from .reporting.named_effect import EffectEvidence
 from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
-from .reporting.verdict import NamedEffect, Verdict
+from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
 from .screening.causality import lagging_forces
-from .screening.drive_check import drive_findings
-from .screening.other_rig import other_numbers, out_of_reach
-from .screening.scale_check import scale_findings, typical_sizes
+from .screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from .screening.wrong_numbers import (
     is_explained_by_numbers,
+    other_numbers,
+    out_of_reach,
     sentence_of,
     with_numbers_let_go,
     wrong_numbers,
 )
 from .selection.comparison import Comparison
-from .selection.criteria import Criteria, is_complete
-from .selection.excess import excesses
-from .selection.hypothesis import Hypothesis
-from .selection.measures import DECLARED, Excess, Excesses, Standing
-from .selection.probability import CALIBRATION
-from .selection.search import Outcome, search
-from .selection.standing import standing_of
+from .selection.criteria import CALIBRATION, Criteria, is_complete
+from .selection.hypothesis import Hypothesis, excesses
+from .selection.measures import DECLARED, Excess, Excesses, Standing, standing_of
+from .selection.search import Outcome, search, with_what_has_no_name
 from .selection.trials import Step
-from .selection.without_name import with_what_has_no_name
+from .tearing import blocks_of
 
 _CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3

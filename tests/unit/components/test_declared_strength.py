@@ -12,8 +12,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.effects import cam_profile_error
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification.equation_error.block_response import free_in
 from nlsdesign.components import (
     TRANSLATION,

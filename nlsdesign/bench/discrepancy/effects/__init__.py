@@ -11,8 +11,7 @@ import pkgutil
 
 from ....foundation.errors import ArrangementError, unknown_name
 from ....foundation.extensions import extension_modules
-from .candidate import Candidate, Unknown
-from .effect import Edit, Effect, Form
+from .effect import Candidate, Edit, Effect, Form, Unknown
 
 
 def catalogue() -> tuple[Effect, ...]:

@@ -25,9 +25,7 @@ from ....components import (
 )
 from ....components.materials.self_heating import Heat, is_equilibrium
 from ....foundation.quantity import Quantity
-from .candidate import Unknown, free_inside, wrapped
-from .effect import Edit, Effect, Form
-from .friction import number
+from .effect import Edit, Effect, Form, Unknown, free_inside, number, wrapped
 from .places import effort_over_motion, lumped_springs, stretched, wrapping
 from .rubber import specimens
 from .sizes import LONGEST, QUICKEST

@@ -24,9 +24,7 @@ from ....components.core.domain import TRANSLATION
 from ....components.core.part import Part
 from ....components.transmission.cam_drive import Through
 from ....foundation.quantity import Quantity
-from .candidate import SOURCE, Unknown, numbers_of, wrapped
-from .effect import Edit, Effect, Form
-from .friction import number
+from .effect import SOURCE, Edit, Effect, Form, Unknown, number, numbers_of, wrapped
 from .places import effort_over_motion, laws, stretched, turning_ties, wrapping
 
 _CONTROL_VALUES = 7

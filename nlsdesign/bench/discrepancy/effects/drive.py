@@ -20,9 +20,7 @@ from ....components.core.domain import Domain
 from ....components.mechanics.bodies import Free
 from ....components.mechanics.drive_faults import CURRENT, command_domain
 from ....foundation.quantity import same_dimension
-from .candidate import Unknown, free_inside
-from .effect import Edit, Effect, Form, Places
-from .friction import number
+from .effect import Edit, Effect, Form, Places, Unknown, free_inside, number
 from .sizes import LONGEST, QUICKEST
 
 _FALLS_AT = (0.2, 1.5)

@@ -25,10 +25,9 @@ from ....components import (
 )
 from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity
-from ..fitting.strategies import Continuation, PlainButLong
-from .candidate import Unknown, free_name, wrapped
-from .effect import Edit, Effect, Form
-from .friction import number, tied
+from ..fitting import Continuation, Plain
+from .effect import Edit, Effect, Form, Unknown, free_name, number, wrapped
+from .friction import tied
 from .places import (
     domain_of,
     restoring_ties,
@@ -187,7 +186,9 @@ def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
     assert isinstance(part, Tie)
     edited, body, unknowns = _shaft(assembly, driver, (4.0,))
     ends = tuple(body if end == driver else end for end in part.between)
-    yield Edit(edited.with_part(name, replace(part, between=ends)), unknowns, {"strategy": PlainButLong()})
+    yield Edit(
+        edited.with_part(name, replace(part, between=ends)), unknowns, {"strategy": Plain(takes_long=True)}
+    )
 
 
 torque_ripple = Effect(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ....components import (
     Assembly,
@@ -20,9 +20,7 @@ from ....components import (
 )
 from ....components.core.domain import Domain
 from ....components.mechanics.bodies import Free
-from ....foundation.quantity import Quantity
-from .candidate import SOURCE, Unknown, free_name, numbers_of, wrapped
-from .effect import Edit, Effect, Form
+from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, numbers_of, wrapped
 from .places import (
     beside,
     domain_of,
@@ -35,14 +33,6 @@ from .places import (
 )
 from .sizes import efforts_on
 
-Law = Callable[[Domain], Element]
-"""From a domain to a law, its numbers at some value."""
-
-
-def number(value: float, unit: str) -> Quantity:
-    """Return a number that a fit is going to change."""
-    return Quantity(value, unit, SOURCE)
-
 
 def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[Assembly, str]:
     """Return the assembly with one more element on a body, and the element's name."""
@@ -50,43 +40,36 @@ def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[As
     return assembly.with_part(part, tie(element, body)), part
 
 
-@dataclass(frozen=True)
-class _Surroundings:
+def _with_law(
+    assembly: Assembly, place: str, wanted: str, law: Callable[[Domain], Element]
+) -> tuple[Assembly, str]:
+    """Return the assembly with a law on a body that moves freely or beside a strained piece, and its path.
+
+    The law is made for the domain of the place.
+    """
+    if isinstance(assembly[place], Free):
+        return tied(assembly, wanted, place, law(domain_of(assembly, place)))
+    return beside(assembly, place, wanted, law(assembly.element(place).domain))
+
+
+class _Signals(NamedTuple):
     """Signals around a place, in which numbers of friction there are counted.
 
-    Parameters
-    ----------
-    effort
-        The largest effort on a body, or the effort of a tie.
-    motion, speed
-        Of the body, or of that which drives the tie.
+    The effort is the largest one on a body, or that of a tie; motion and speed are those of the body, or of
+    what drives the tie.
     """
 
     effort: str
     motion: str
     speed: str
 
-    @classmethod
-    def of(cls, assembly: Assembly, place: str) -> _Surroundings:
-        """Return the signals around a body that moves freely, or around a tie with no such body at an end."""
-        on_body = isinstance(assembly[place], Free)
-        body = place if on_body else driving_end(assembly, place)
-        effort = efforts_on(place) if on_body else f"{place}.{assembly.element(place).domain.effort}"
-        own = assembly[body].motion_names  # type: ignore[attr-defined]
-        motion, speed = (f"{body}.{each}" for each in own)
-        return cls(effort, motion, speed)
 
-
-class Placed:
-    """A law of friction put on a body, or beside what a prescribed motion strains."""
-
-    def __init__(self, assembly: Assembly, place: str, name: str, law: Law) -> None:
-        if isinstance(assembly[place], Free):
-            self.assembly, self.path = tied(assembly, name, place, law(domain_of(assembly, place)))
-        else:
-            self.assembly, self.path = beside(assembly, place, name, law(assembly.element(place).domain))
-        around = _Surroundings.of(assembly, place)
-        self.effort, self.motion, self.speed = around.effort, around.motion, around.speed
+def _signals_at(assembly: Assembly, place: str) -> _Signals:
+    on_body = isinstance(assembly[place], Free)
+    body = place if on_body else driving_end(assembly, place)
+    effort = efforts_on(place) if on_body else f"{place}.{assembly.element(place).domain.effort}"
+    motion, speed = assembly[body].motion_names  # type: ignore[attr-defined]
+    return _Signals(effort, f"{body}.{motion}", f"{body}.{speed}")
 
 
 def _coulomb(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -94,8 +77,9 @@ def _coulomb(assembly: Assembly, place: str) -> Iterator[Edit]:
         level = number(0.01, domain.effort_unit)
         return CoulombFriction(sliding_effort=level, domain=domain).smooth()
 
-    put = Placed(assembly, place, "dry_friction", law)
-    yield Edit(put.assembly, (Unknown(f"{put.path}.sliding_effort", (0.05,), 1e-4, 2.0, put.effort),))
+    edited, path = _with_law(assembly, place, "dry_friction", law)
+    around = _signals_at(assembly, place)
+    yield Edit(edited, (Unknown(f"{path}.sliding_effort", (0.05,), 1e-4, 2.0, around.effort),))
 
 
 def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -105,13 +89,14 @@ def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
             sliding_effort=level, breakaway=level, stribeck_speed=speed, domain=domain
         ).smooth()
 
-    put = Placed(assembly, place, "dry_friction", law)
+    edited, path = _with_law(assembly, place, "dry_friction", law)
+    around = _signals_at(assembly, place)
     unknowns = (
-        Unknown(f"{put.path}.sliding_effort", (0.05,), 1e-4, 2.0, put.effort),
-        Unknown(f"{put.path}.breakaway", (0.05,), 1e-4, 2.0, put.effort),
-        Unknown(f"{put.path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, put.speed, null=None),
+        Unknown(f"{path}.sliding_effort", (0.05,), 1e-4, 2.0, around.effort),
+        Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
+        Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
     )
-    yield Edit(put.assembly, unknowns, {"simpler": ("coulomb_friction",)})
+    yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
 
 
 def _even_friction(assembly: Assembly, place: str) -> str | None:
@@ -152,7 +137,7 @@ def _falling(assembly: Assembly, place: str) -> Iterator[Edit]:
     """Let declared friction fall with speed: its level is that of fast sliding."""
     path = _declared_friction(assembly, place)
     if path is not None:
-        even, around = assembly.element(path), _Surroundings.of(assembly, place)
+        even, around = assembly.element(path), _signals_at(assembly, place)
         more, speed = number(0.01, even.domain.effort_unit), number(0.2, even.domain.rate_unit)
         falling = StribeckFriction(**numbers_of(even), breakaway=more, stribeck_speed=speed)
         unknowns = (
@@ -197,9 +182,10 @@ def _drag(assembly: Assembly, place: str) -> Iterator[Edit]:
         unit = domain.unit("{effort}*s^2/{motion}^2")
         return QuadraticDrag(drag=number(1e-3, unit), domain=domain)
 
-    put = Placed(assembly, place, "drag", law)
-    of = f"{put.effort} / {put.speed} / {put.speed}"
-    yield Edit(put.assembly, (Unknown(f"{put.path}.drag", (0.05,), 1e-6, 10.0, of),))
+    edited, path = _with_law(assembly, place, "drag", law)
+    around = _signals_at(assembly, place)
+    of = f"{around.effort} / {around.speed} / {around.speed}"
+    yield Edit(edited, (Unknown(f"{path}.drag", (0.05,), 1e-6, 10.0, of),))
 
 
 def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -208,13 +194,14 @@ def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
         width = number(0.1, domain.motion_unit)
         return SpotFriction(sliding_effort=level, place=at, width=width, domain=domain).smooth()
 
-    put = Placed(assembly, place, "rubbing", law)
+    edited, path = _with_law(assembly, place, "rubbing", law)
+    around = _signals_at(assembly, place)
     unknowns = (
-        Unknown(f"{put.path}.sliding_effort", (0.1,), 1e-4, 5.0, put.effort),
-        Unknown(f"{put.path}.place", (-0.7, -0.35, 0.0, 0.35, 0.7), -1.2, 1.2, put.motion, null=None),
-        Unknown(f"{put.path}.width", (0.15,), 0.01, 3.0, put.motion, null=None),
+        Unknown(f"{path}.sliding_effort", (0.1,), 1e-4, 5.0, around.effort),
+        Unknown(f"{path}.place", (-0.7, -0.35, 0.0, 0.35, 0.7), -1.2, 1.2, around.motion, null=None),
+        Unknown(f"{path}.width", (0.15,), 0.01, 3.0, around.motion, null=None),
     )
-    yield Edit(put.assembly, unknowns)
+    yield Edit(edited, unknowns)
 
 
 def _wavy(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -229,12 +216,15 @@ def _wavy(assembly: Assembly, body: str) -> Iterator[Edit]:
     yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
 
 
-def _forms(
-    edits: Callable[[Assembly, str], Iterator[Edit]], words: str, source: str, brings: str
-) -> Iterator[Form]:
-    """Yield the forms of friction on a body that moves freely, and beside what is strained from outside."""
-    for places, where in ((moving_bodies, ""), (driven_ties, " in the reading of a piece under test")):
-        yield Form(places, edits, words + where, source, brings)
+def _on_bodies_and_strained_pieces(
+    edits: Callable[[Assembly, str], Iterator[Edit]], signature: str, source: str, brings: str
+) -> tuple[Form, Form]:
+    """Return the forms of friction on a body that moves freely, and beside what is strained from outside."""
+    strained = f"{signature} in the reading of a piece under test"
+    return (
+        Form(moving_bodies, edits, signature, source, brings),
+        Form(driven_ties, edits, strained, source, brings),
+    )
 
 
 _DRY = "Coulomb 1785; Armstrong-Hélouvry 1991"
@@ -243,13 +233,11 @@ coulomb_friction = Effect(
     "coulomb_friction",
     "Dry friction on a body that turns or slides, or in a piece that is strained from outside.",
     10,
-    tuple(
-        _forms(
-            _coulomb,
-            "a constant effort against the motion, that jumps where the speed changes sign",
-            _DRY,
-            "dry friction",
-        )
+    _on_bodies_and_strained_pieces(
+        _coulomb,
+        "a constant effort against the motion, that jumps where the speed changes sign",
+        _DRY,
+        "dry friction",
     ),
 )
 stribeck_friction = Effect(
@@ -257,7 +245,7 @@ stribeck_friction = Effect(
     "Dry friction that falls with speed, on a body that turns or slides.",
     20,
     (
-        *_forms(
+        *_on_bodies_and_strained_pieces(
             _stribeck,
             "an effort against the motion that is largest just off standstill",
             "Stribeck 1902; Armstrong-Hélouvry 1991",
@@ -289,13 +277,11 @@ quadratic_drag = Effect(
     "quadratic_drag",
     "Drag that grows with the square of the speed, on a body that turns or slides.",
     40,
-    tuple(
-        _forms(
-            _drag,
-            "an effort against the motion that grows with the square of the speed",
-            "Newton 1687, book II; Batchelor 1967",
-            "drag",
-        )
+    _on_bodies_and_strained_pieces(
+        _drag,
+        "an effort against the motion that grows with the square of the speed",
+        "Newton 1687, book II; Batchelor 1967",
+        "drag",
     ),
 )
 asymmetric_friction = Effect(

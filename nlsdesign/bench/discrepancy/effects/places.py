@@ -26,7 +26,7 @@ from ....components.core.domain import ROTATION, TRANSLATION, Domain
 from ....components.core.springs import Elastic
 from ....components.mechanics.bodies import Body, Free
 from ....components.transmission.cam_drive import Through
-from .candidate import free_inside, wrapped
+from .effect import free_inside, wrapped
 
 
 def law(part: Part) -> Part:

@@ -22,9 +22,7 @@ from ....components import (
     series,
 )
 from ....foundation.quantity import Quantity
-from .candidate import SOURCE, Unknown
-from .effect import Edit, Effect, Form
-from .friction import number
+from .effect import SOURCE, Edit, Effect, Form, Unknown, number
 from .places import beside, effort_over_motion, laws, lumped_springs_without
 from .sizes import LONGEST
 

@@ -23,8 +23,7 @@ from ....components import (
 )
 from ....components.core.domain import Domain
 from ....foundation.quantity import Quantity
-from .candidate import SOURCE, Unknown, free_name
-from .effect import Edit, Effect, Form, Places
+from .effect import Edit, Effect, Form, Places, Unknown, free_name, number
 from .places import turning_bodies, turns_per_turn
 from .sizes import LONGEST, QUICKEST
 
@@ -82,14 +81,14 @@ def _gain(assembly: Assembly, name: str) -> Iterator[Edit]:
 
 
 def _delay(assembly: Assembly, name: str) -> Iterator[Edit]:
-    delay = TransportDelay(of=assembly.sensors()[name].of, delay=Quantity(1e-3, "s", SOURCE))
+    delay = TransportDelay(of=assembly.sensors()[name].of, delay=number(1e-3, "s"))
     edited, fault = _with_fault(assembly, name, "delay", delay)
     unknown = Unknown(f"{fault}.delay", (0.1,), 1e-3, 6.0, QUICKEST)
     yield Edit(edited, (unknown,), {"explains_lag": True})
 
 
 def _clock(assembly: Assembly, name: str) -> Iterator[Edit]:
-    clock = ClockDrift(of=assembly.sensors()[name].of, rate=Quantity(0.0, "1", SOURCE))
+    clock = ClockDrift(of=assembly.sensors()[name].of, rate=number(0.0, "1"))
     edited, fault = _with_fault(assembly, name, "clock", clock)
     unknown = Unknown(f"{fault}.rate", (-0.1, 0.1), -2.0, 2.0, f"{QUICKEST} / {LONGEST}")
     yield Edit(edited, (unknown,), {"explains_lag": True})
@@ -98,7 +97,7 @@ def _clock(assembly: Assembly, name: str) -> Iterator[Edit]:
 def _drift(assembly: Assembly, name: str) -> Iterator[Edit]:
     cell = assembly.sensors()[name]
     kind = _domain(cell)
-    drift = Drift(of=cell.of, drift=Quantity(0.0, kind.unit("{effort}/s"), SOURCE), domain=kind)
+    drift = Drift(of=cell.of, drift=number(0.0, kind.unit("{effort}/s")), domain=kind)
     edited, fault = _with_fault(assembly, name, "drift", drift)
     yield Edit(edited, (Unknown(f"{fault}.drift", (0.0,), -1.0, 1.0, f"{name}.reading / {LONGEST}"),))
 
@@ -106,7 +105,7 @@ def _drift(assembly: Assembly, name: str) -> Iterator[Edit]:
 def _nonlinearity(assembly: Assembly, name: str) -> Iterator[Edit]:
     cell = assembly.sensors()[name]
     unit = Quantity(1.0, _domain(cell).effort_unit, "definition: the gain is told per unit of load")
-    law = LoadNonlinearity(of=cell.of, nonlinearity=Quantity(0.0, "1", SOURCE), full_scale=unit)
+    law = LoadNonlinearity(of=cell.of, nonlinearity=number(0.0, "1"), full_scale=unit)
     edited, fault = _with_fault(assembly, name, "nonlinearity", law)
     yield Edit(edited, (Unknown(f"{fault}.nonlinearity", (0.0,), -0.45, 2.0, f"1 / {name}.reading"),))
 
@@ -114,7 +113,7 @@ def _nonlinearity(assembly: Assembly, name: str) -> Iterator[Edit]:
 def _eccentric_disc(assembly: Assembly, name: str) -> Iterator[Edit]:
     encoder = assembly.sensors()[name]
     for order in _disc_orders(assembly, assembly.measured(encoder.of)[0]):
-        zero, largest = Quantity(0.0, "rad", SOURCE), 0.2 / max(order.number, 1.0)
+        zero, largest = number(0.0, "rad"), 0.2 / max(order.number, 1.0)
         disc = Eccentricity(of=encoder.of, sine=zero, cosine=zero, order=order)
         edited, fault = _with_fault(assembly, name, "eccentricity", disc)
         yield Edit(

@@ -35,9 +35,9 @@ from ...identification.filters import derivative
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter
 from ...identification.records.measurement import Record
-from ..blocks.shown_values import shown_values
-from ..blocks.tearing import blocks_of
-from .candidate import Candidate, Unknown, wrapped
+from ..block_prediction import shown_values
+from ..tearing import blocks_of
+from .effect import Candidate, Unknown, wrapped
 from .friction import tied
 from .places import stretched
 

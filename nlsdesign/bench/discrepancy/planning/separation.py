@@ -28,7 +28,7 @@ from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter, box
 from ...identification.records.measurement import Record
-from ..effects.candidate import Unknown
+from ..effects.effect import Unknown
 from ..selection.hypothesis import Hypothesis
 
 Values = Mapping[str, float]

@@ -18,7 +18,7 @@ from ...identification.filters import derivative
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.residuals import Loop, loop_of
-from ..blocks.shown_values import shown_values
+from ..block_prediction import shown_values
 
 _QUICK_OVER_SLOW = 3.0
 _SPANS = 50

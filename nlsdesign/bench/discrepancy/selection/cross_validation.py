@@ -28,7 +28,7 @@ from ...identification.equation_error.evidence import Evidence
 from ...identification.least_squares import ENOUGH, Fit, StackedRows, minimise
 from ...identification.parameters import box
 from ...identification.residuals import effective_size
-from ..fitting.unpredictable import Key, Tally
+from ..fitting import Key, Tally
 
 SEGMENTS = 6
 """Pieces of a record whose sums of squares are kept apart: their scatter is the standard error of a sum."""

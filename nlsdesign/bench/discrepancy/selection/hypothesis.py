@@ -1,4 +1,4 @@
-"""A hypothesis about what is missing: an assembly with effects, fitted to the records."""
+"""A hypothesis about what is missing: an assembly with effects, fitted to records; what it leaves over."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from dataclasses import dataclass, field, replace
 
 from ....components.assembly.named_parts import Assembly
 from ....foundation.quantity import to_resolution
+from ...identification.equation_error.evidence import Bench
 from ...identification.least_squares import Fit
-from ..effects.candidate import Candidate, Unknown
-from ..fitting.unpredictable import Key, Tally, like_the_others
+from ..effects.effect import Candidate, Unknown
+from ..fitting import Key, Tally, like_the_others
+from .criteria import Criteria
+from .measures import DECLARED, Excess
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,3 +94,38 @@ class Hypothesis:
     def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
         """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do."""
         return replace(self, tallies=like_the_others(tallies, self.unpredictable))
+
+
+def excesses(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> dict[str, Excess]:
+    """Return the excess of each block, and of the declared numbers."""
+    names = dict.fromkeys(block for block, _ in hypothesis.tallies)
+    result = {name: _block_excess(hypothesis, bench, name, criteria) for name in names}
+    prior, count = hypothesis.prior, sum(len(f.prior_z_scores()) for f in hypothesis.fits.values())
+    # What scatters the residuals of an open block is not noise, and excuses no number.
+    closed = not any(each.open for each in result.values())
+    expected = hypothesis.expected_prior if closed else float(count)
+    typical, beyond = math.sqrt(prior / max(count, 1)), criteria.is_beyond_prior(prior, expected)
+    result[DECLARED] = Excess(
+        DECLARED, "1", 1.0, typical, typical, prior, count, float(max(count, 1)), beyond
+    )
+    return result
+
+
+def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Criteria) -> Excess:
+    tallies = {record: t for (b, record), t in hypothesis.tallies.items() if b == block}
+    rows = sum(t.rows for t in tallies.values())
+    effective = sum(t.effective_size for t in tallies.values())
+    fitted, predicted = sum(t.squares for t in tallies.values()), sum(t.predicted for t in tallies.values())
+    floor = bench.typical_floor(block)
+    return Excess(
+        block,
+        bench.units[block],
+        floor,
+        floor * math.sqrt(fitted / max(rows, 1)),
+        floor * math.sqrt(predicted / max(rows, 1)),
+        predicted,
+        rows,
+        effective,
+        criteria.is_beyond_noise(predicted / max(rows, 1), effective, bench.known_from(block)),
+        {record: t.segments or (t.squares,) for record, t in tallies.items()},
+    )

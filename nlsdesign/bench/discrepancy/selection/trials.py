@@ -8,23 +8,11 @@ from dataclasses import dataclass, field, replace
 
 from ....foundation.errors import ConvergenceError
 from ....foundation.processes import parallel_map
-from ..effects.candidate import Candidate, EffectFunction
+from ..effects.effect import Candidate, EffectFunction
 from .comparison import Comparison
-from .criteria import (
-    Criteria,
-    Rival,
-    choose,
-    imitates,
-    is_undecided,
-    objections,
-    objections_of_numbers,
-    predicts_records,
-)
-from .excess import excesses
-from .hypothesis import Hypothesis
-from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record, total_excess
-from .probability import distance_to_next
-from .standing import standing_of
+from .criteria import Change, Criteria, Rival, choose, distance_to_next, imitates
+from .hypothesis import Hypothesis, excesses
+from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record, standing_of, total_excess
 
 _LOOKED_AT_TWICE = 4
 """So many of the best are judged on all samples where the coarse look sees nothing open."""
@@ -244,7 +232,7 @@ class Trials:
         newest = chosen.newest
         try:
             fits = self.comparison.polished(chosen).fits.values()
-            why = objections_of_numbers(self.criteria, standing_of(newest.unknowns, fits))
+            why = self.criteria.objections_of_numbers(standing_of(newest.unknowns, fits))
         except ConvergenceError as error:
             why = [error.rule]  # it cannot be named, but others may
         if why:
@@ -259,7 +247,7 @@ class Trials:
                 again = self.comparison.without_whole_records(each)
                 self.on_other_records[each] = self.excesses_of(again)
         before, after = self.on_other_records[present], self.on_other_records[chosen]
-        return predicts_records(self.criteria, before, after)
+        return Change(self.criteria, before, after).predicts_records
 
     def _chosen(self, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str) -> Step | None:
         """Return the best of some hypotheses, by what each leaves."""
@@ -291,11 +279,11 @@ def account(trials: Trials, present: Hypothesis, tried: Sequence[Hypothesis]) ->
     for each in tried:
         after = trials.excesses_of(each)
         rival = rival_of(each, after)
-        words = objections(trials.criteria, before, rival)
+        words = rival.objections(trials.criteria, before)
         if each in trials.on_other_records and not trials.predicts_records(present, each):
             words = (*words, "it does not predict records that are left out as a whole")
         share = 1.0 - total_excess(after) / whole
-        every.append(Tried(each, share, words, is_undecided(trials.criteria, before, rival)))
+        every.append(Tried(each, share, words, rival.is_undecided(trials.criteria, before)))
     return tuple(sorted(every, key=lambda each: -each.share))
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from nlsdesign import components as c
-from nlsdesign.bench.discrepancy.blocks.balance_scale import BalanceTerms, scaled_balance
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import BalanceTerms, blocks_of, scaled_balance
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.least_squares import fit

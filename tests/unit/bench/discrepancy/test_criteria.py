@@ -11,19 +11,12 @@ import pytest
 from scipy.stats import chi2, norm
 
 from nlsdesign.bench.discrepancy.selection.criteria import (
+    Change,
     Criteria,
     Rival,
     choose,
-    is_beyond_noise,
-    is_beyond_prior,
     is_complete,
-    is_far_from_closed,
-    is_superfluous,
-    is_undecided,
     lacking,
-    objections,
-    records_made_worse,
-    unexplained,
 )
 from nlsdesign.bench.discrepancy.selection.measures import (
     DECLARED,
@@ -95,27 +88,27 @@ def test_every_number_of_the_rule_has_a_meaning_and_none_can_be_changed_in_place
 
 def test_a_mean_square_is_open_beyond_what_filters_and_noise_leave() -> None:
     many = 1e6
-    assert not is_beyond_noise(RULE, 1.0 + 0.99 * RULE.least_excess, many)
-    assert is_beyond_noise(RULE, 1.0 + 1.01 * RULE.least_excess, many)
+    assert not RULE.is_beyond_noise(1.0 + 0.99 * RULE.least_excess, many)
+    assert RULE.is_beyond_noise(1.0 + 1.01 * RULE.least_excess, many)
     edge = 1.0 + RULE.significant * math.sqrt(2.0 / 50.0)
     assert edge > 1.0 + RULE.least_excess
-    assert not is_beyond_noise(RULE, 0.99 * edge, 50.0)
-    assert is_beyond_noise(RULE, 1.01 * edge, 50.0)
-    assert not is_beyond_noise(RULE, 5.0, 0.0), "what is equivalent to no sample says nothing"
+    assert not RULE.is_beyond_noise(0.99 * edge, 50.0)
+    assert RULE.is_beyond_noise(1.01 * edge, 50.0)
+    assert not RULE.is_beyond_noise(5.0, 0.0), "what is equivalent to no sample says nothing"
 
 
 def test_a_floor_that_is_known_from_few_squares_opens_a_block_later() -> None:
     """The ratio of two mean squares scatters by what both do, 1 + 5·√(2/50 + 2/200) = 2.12."""
-    assert is_beyond_noise(RULE, 2.1, 50.0)
-    assert not is_beyond_noise(RULE, 2.1, 50.0, 200.0)
-    assert is_beyond_noise(RULE, 2.2, 50.0, 200.0)
-    assert is_beyond_noise(RULE, 2.1, 50.0, math.inf)
+    assert RULE.is_beyond_noise(2.1, 50.0)
+    assert not RULE.is_beyond_noise(2.1, 50.0, 200.0)
+    assert RULE.is_beyond_noise(2.2, 50.0, 200.0)
+    assert RULE.is_beyond_noise(2.1, 50.0, math.inf)
 
 
 def test_numbers_are_beyond_their_prior_if_they_all_pass_the_edge_of_their_range() -> None:
     edge = 3.0  # (√3)²: the edge of a uniform range in its standard deviations
-    assert not is_beyond_prior(RULE, 4 * edge, 4)
-    assert is_beyond_prior(RULE, 4 * edge + 0.01, 4)
+    assert not RULE.is_beyond_prior(4 * edge, 4)
+    assert RULE.is_beyond_prior(4 * edge + 0.01, 4)
 
 
 def test_an_excess_is_never_negative() -> None:
@@ -134,8 +127,8 @@ def test_shares_are_those_of_what_is_left_in_open_blocks() -> None:
 
 
 def test_an_effect_that_explains_less_than_the_least_share_may_not_be_named() -> None:
-    assert not objections(RULE, FIRST, rival("a", 1, 0.99e5))
-    (words,) = objections(RULE, FIRST, rival("a", 1, 1.1e5))
+    assert not rival("a", 1, 0.99e5).objections(RULE, FIRST)
+    (words,) = rival("a", 1, 1.1e5).objections(RULE, FIRST)
     assert words == "it explains 45 % of what is left, less than 50 %"
 
 
@@ -143,26 +136,26 @@ def test_a_share_counts_of_what_is_left_however_small_a_part_of_the_first_that_i
     """A hundredth of what was lacking at first, but half of what is left and far above the noise."""
     before = with_left(2e3, motor=0.0)
     assert before["spring"].open
-    assert not objections(RULE, before, Rival("b", "b", 1, with_left(0.9e3, 0.0), standing()))
+    assert not Rival("b", "b", 1, with_left(0.9e3, 0.0), standing()).objections(RULE, before)
 
 
 def test_an_effect_that_spoils_the_whole_may_not_be_named() -> None:
-    assert not objections(SHARES_ONLY, FIRST, rival("a", 1, 4e4, motor=1e5))
-    assert objections(SHARES_ONLY, FIRST, rival("a", 1, 4e4, motor=2e5))
+    assert not rival("a", 1, 4e4, motor=1e5).objections(SHARES_ONLY, FIRST)
+    assert rival("a", 1, 4e4, motor=2e5).objections(SHARES_ONLY, FIRST)
 
 
 def test_a_gain_that_noise_can_give_names_nothing() -> None:
     before = {"spring": excess(27.0, is_open=True)}
     after = {"spring": excess(0.0)}
-    (words,) = objections(RULE, before, Rival("a", "a", 1, after, standing()))
+    (words,) = Rival("a", "a", 1, after, standing()).objections(RULE, before)
     assert "squares of the noise" in words
-    assert not objections(replace(RULE, noise_margin=20.0), before, Rival("a", "a", 1, after, standing()))
+    assert not Rival("a", "a", 1, after, standing()).objections(replace(RULE, noise_margin=20.0), before)
 
 
 def test_coloured_residuals_count_for_less() -> None:
     before, after = {"spring": excess(2e3, colour=100.0)}, {"spring": excess(0.0, colour=1.0)}
     assert gain(before, after).value == pytest.approx(20.0)
-    assert objections(RULE, before, Rival("a", "a", 1, after, standing()))
+    assert Rival("a", "a", 1, after, standing()).objections(RULE, before)
 
 
 # --- clause 2: a gain that does not rest on a single piece ----------------------------------------
@@ -181,9 +174,9 @@ def test_a_gain_in_one_piece_of_all_is_no_effect_and_one_in_a_whole_record_is() 
     first, *others = quiet.pieces["slow"]
     pieces = {**quiet.pieces, "slow": (first + 1e5, *others)}
     struck = {"spring": replace(quiet, chi2=1e5 + ROWS, pieces=pieces)}
-    (words,) = objections(RULE, struck, Rival("a", "a", 1, after, standing()))
+    (words,) = Rival("a", "a", 1, after, standing()).objections(RULE, struck)
     assert words == "without its best piece of a record the prediction gains 0 squares of the noise"
-    assert not objections(RULE, {"spring": excess(1e5, 0.0)}, Rival("a", "a", 1, after, standing()))
+    assert not Rival("a", "a", 1, after, standing()).objections(RULE, {"spring": excess(1e5, 0.0)})
 
 
 # --- clause 3: numbers that exclude no effect -----------------------------------------------------
@@ -192,7 +185,7 @@ def test_a_gain_in_one_piece_of_all_is_no_effect_and_one_in_a_whole_record_is() 
 @pytest.mark.parametrize(("distance", "allowed"), [(0.41, True), (0.39, False), (-0.41, True)])
 def test_numbers_must_exclude_no_effect_by_four_standard_errors(distance: float, allowed: bool) -> None:
     candidate = replace(rival("a", 1, 1e3), standing=standing(distance))
-    assert (not objections(RULE, FIRST, candidate)) == allowed
+    assert (not candidate.objections(RULE, FIRST)) == allowed
 
 
 def test_several_numbers_exclude_no_effect_together_at_the_same_probability() -> None:
@@ -208,16 +201,16 @@ def test_a_number_that_only_shapes_an_effect_excludes_nothing_but_must_be_known(
     shape = EffectNumber("a.time", 0.0, False, 0.5, False)
     both = Standing((standing().numbers[0], shape), standing().covariance)
     assert both.exclusion == pytest.approx(10.0)
-    assert not objections(RULE, FIRST, replace(rival("a", 2, 1e3), standing=both))
+    assert not replace(rival("a", 2, 1e3), standing=both).objections(RULE, FIRST)
     open_shape = Standing((standing().numbers[0], shape._replace(error=1.1)), standing().covariance)
-    assert objections(RULE, FIRST, replace(rival("a", 2, 1e3), standing=open_shape)) == (
+    assert replace(rival("a", 2, 1e3), standing=open_shape).objections(RULE, FIRST) == (
         "a.time is not known",
     )
 
 
 def test_a_number_at_the_bound_of_its_search_names_nothing() -> None:
     bounded = replace(rival("a", 1, 1e3), standing=standing(at_bound=True))
-    assert objections(RULE, FIRST, bounded) == ("a.size is at a bound of the search",)
+    assert bounded.objections(RULE, FIRST) == ("a.size is at a bound of the search",)
 
 
 # --- clause 4: no record worse --------------------------------------------------------------------
@@ -226,17 +219,17 @@ def test_a_number_at_the_bound_of_its_search_names_nothing() -> None:
 def test_a_record_that_is_predicted_worse_refuses_an_effect_however_much_the_others_gain() -> None:
     before = {"spring": excess(1e5, 1e3), "motor": excess(0.0)}
     after = {"spring": excess(1e2, 4e3), "motor": excess(0.0)}
-    (words,) = objections(RULE, before, Rival("a", "a", 1, after, standing()))
+    (words,) = Rival("a", "a", 1, after, standing()).objections(RULE, before)
     assert words.startswith("record 'quick' is predicted worse")
-    assert records_made_worse(RULE, before, after).keys() == {"quick"}
+    assert Change(RULE, before, after).records_made_worse().keys() == {"quick"}
 
 
 def test_a_record_may_grow_by_what_noise_does_and_is_judged_over_all_blocks() -> None:
     before = {"spring": excess(1e5, 1e3), "motor": excess(0.0, 5e3)}
     moved = {"spring": excess(1e2, 4e3), "motor": excess(0.0, 1e3)}
-    assert not records_made_worse(RULE, before, moved), "as much is won in the motor"
+    assert not Change(RULE, before, moved).records_made_worse(), "as much is won in the motor"
     grown = {"spring": excess(1e2, 1e3 + 0.9 * RULE.noise_margin), "motor": excess(0.0, 5e3)}
-    assert not records_made_worse(RULE, before, grown)
+    assert not Change(RULE, before, grown).records_made_worse()
 
 
 # --- when the search is done ----------------------------------------------------------------------
@@ -247,18 +240,18 @@ def test_a_block_counts_as_explained_when_closed_or_by_three_quarters() -> None:
         return {"spring": excess(left, is_open=is_open)}
 
     first = {"spring": excess(1e4)}
-    assert not unexplained(RULE, first, last(2.4e3))
-    assert unexplained(RULE, first, last(2.6e3)) == ["spring"]
-    assert not unexplained(RULE, first, last(9e3, is_open=False))
+    assert not Change(RULE, first, last(2.4e3)).unexplained()
+    assert Change(RULE, first, last(2.6e3)).unexplained() == ["spring"]
+    assert not Change(RULE, first, last(9e3, is_open=False)).unexplained()
 
 
 def test_what_explains_but_has_numbers_that_are_not_known_is_undecided() -> None:
     unknown = replace(rival("a", 1, 1e3), standing=standing(0.1))
-    assert is_undecided(RULE, FIRST, unknown)
-    assert not is_undecided(RULE, FIRST, rival("a", 1, 1e3)), "nothing speaks against it"
-    assert not is_undecided(RULE, FIRST, replace(unknown, excesses=with_left(0.6e5))), "explains too little"
+    assert unknown.is_undecided(RULE, FIRST)
+    assert not rival("a", 1, 1e3).is_undecided(RULE, FIRST), "nothing speaks against it"
+    assert not replace(unknown, excesses=with_left(0.6e5)).is_undecided(RULE, FIRST), "explains too little"
     spoiling = replace(unknown, excesses={"spring": excess(1e3), "motor": excess(3e5)})
-    assert not is_undecided(RULE, FIRST, spoiling), "more than its numbers speaks against it"
+    assert not spoiling.is_undecided(RULE, FIRST), "more than its numbers speaks against it"
 
 
 def test_complete_is_what_leaves_no_block_open() -> None:
@@ -268,19 +261,19 @@ def test_complete_is_what_leaves_no_block_open() -> None:
 
 def test_declared_numbers_decide_only_where_no_block_is_open() -> None:
     alone = {DECLARED: STRAINED}
-    assert unexplained(RULE, alone, alone) == [DECLARED]
+    assert Change(RULE, alone, alone).unexplained() == [DECLARED]
     first, last = ({"spring": excess(e), DECLARED: STRAINED} for e in (1e4, 1e3))
-    assert not unexplained(RULE, first, last)
+    assert not Change(RULE, first, last).unexplained()
     assert lacking({**FIRST, DECLARED: STRAINED}) == ["spring", "motor"]
     assert lacking({"spring": excess(0.0), DECLARED: STRAINED}) == [DECLARED]
 
 
 def test_an_effect_is_superfluous_if_prediction_loses_little_without_it() -> None:
     with_it = with_left(1e3, motor=0.0)
-    assert is_superfluous(RULE, with_left(1.9e3, motor=0.0), with_it), "less than twice"
-    assert not is_superfluous(RULE, with_left(2.1e3, motor=0.0), with_it)
+    assert Change(RULE, with_left(1.9e3, motor=0.0), with_it).is_superfluous(), "less than twice"
+    assert not Change(RULE, with_left(2.1e3, motor=0.0), with_it).is_superfluous()
     noise = with_left(0.0, motor=0.0)
-    assert is_superfluous(RULE, with_left(0.9 * RULE.noise_margin, motor=0.0), noise)
+    assert Change(RULE, with_left(0.9 * RULE.noise_margin, motor=0.0), noise).is_superfluous()
 
 
 # --- which effect is taken ------------------------------------------------------------------------
@@ -339,13 +332,13 @@ def test_of_several_forms_of_one_effect_the_best_is_told() -> None:
 def test_what_gains_in_another_block_is_not_near_the_best_in_this_one() -> None:
     """Both may be named; the simpler one leaves 15 times as much here, and closes the other block."""
     elsewhere = rival("elsewhere", 1, 1.5e4, 100.0)
-    assert not objections(RULE, FIRST, elsewhere)
+    assert not elsewhere.objections(RULE, FIRST)
     assert taken(rival("here", 3, 1e3), elsewhere) == ("here",)
 
 
 def test_what_only_imitates_a_better_effect_whose_numbers_are_not_known_is_not_named() -> None:
     unknown = replace(rival("better", 2, 100.0), standing=standing(0.3))
-    assert objections(RULE, FIRST, unknown)
+    assert unknown.objections(RULE, FIRST)
     assert taken(rival("imitates", 1, 1e4), unknown) is None
     assert taken(rival("as good", 1, 190.0), unknown) == ("as good",), "not twice as much"
     assert taken(rival("as good", 1, 110.0), unknown) == ("as good",)
@@ -355,8 +348,8 @@ def test_what_only_imitates_a_better_effect_whose_numbers_are_not_known_is_not_n
 
 def test_what_an_inexact_form_leaves_is_near_to_closed() -> None:
     first = excess(1e5)
-    assert is_far_from_closed(RULE, first, excess(1.02 * RULE.inexact * 1e5))
-    assert not is_far_from_closed(RULE, first, excess(0.98 * RULE.inexact * 1e5))
+    assert RULE.is_far_from_closed(first, excess(1.02 * RULE.inexact * 1e5))
+    assert not RULE.is_far_from_closed(first, excess(0.98 * RULE.inexact * 1e5))
 
 
 def test_an_effect_that_drives_declared_numbers_out_of_their_ranges_may_not_be_named() -> None:
@@ -366,7 +359,7 @@ def test_an_effect_that_drives_declared_numbers_out_of_their_ranges_may_not_be_n
         now = replace(STRAINED, chi2=squares, fit=math.sqrt(squares / 10.0), open=squares > 30.0)
         before = {**FIRST, DECLARED: replace(STRAINED, chi2=first, open=first > 30.0)}
         one = replace(rival("a", 1, 100.0), excesses={**with_left(100.0), DECLARED: now})
-        return objections(RULE, before, one)
+        return one.objections(RULE, before)
 
     assert not with_strain(59.0)
     assert with_strain(61.0) == (

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.bench.discrepancy import ALL, Verdict, diagnose
-from nlsdesign.bench.discrepancy.effects.candidate import Candidate
+from nlsdesign.bench.discrepancy.effects.effect import Candidate
 from nlsdesign.bench.identification import load_records
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_template import load_template

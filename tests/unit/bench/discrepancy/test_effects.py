@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.effects import (
     ALL,
     Candidate,
@@ -22,9 +21,10 @@ from nlsdesign.bench.discrepancy.effects import (
     self_heating,
     stress_softening,
 )
-from nlsdesign.bench.discrepancy.effects.candidate import EffectFunction, wrapped
+from nlsdesign.bench.discrepancy.effects.effect import EffectFunction, wrapped
 from nlsdesign.bench.discrepancy.effects.places import stretched
 from nlsdesign.bench.discrepancy.selection.comparison import moved_numbers
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.components import (
     ROTATION,
     TRANSLATION,

@@ -12,7 +12,7 @@ import pytest
 from nlsdesign.bench.discrepancy.effects import ALL, Candidate, Unknown
 from nlsdesign.bench.discrepancy.effects.places import turns_per_turn
 from nlsdesign.bench.discrepancy.effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on
-from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import (

@@ -11,14 +11,16 @@ from typing import cast
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.effects.candidate import Candidate, Unknown
-from nlsdesign.bench.discrepancy.fitting.unpredictable import Tally
-from nlsdesign.bench.discrepancy.screening.other_rig import numbers_explain, other_numbers
-from nlsdesign.bench.discrepancy.screening.wrong_numbers import with_numbers_let_go
+from nlsdesign.bench.discrepancy.effects.effect import Candidate, Unknown
+from nlsdesign.bench.discrepancy.fitting import Tally
+from nlsdesign.bench.discrepancy.screening.wrong_numbers import (
+    numbers_explain,
+    other_numbers,
+    with_numbers_let_go,
+)
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.criteria import Criteria
-from nlsdesign.bench.discrepancy.selection.excess import excesses
-from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis, excesses
 from nlsdesign.bench.discrepancy.selection.measures import DECLARED
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.evidence import Bench

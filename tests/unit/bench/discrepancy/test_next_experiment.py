@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import effects
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.bench.discrepancy.planning.candidate_commands import commands
+from nlsdesign.bench.discrepancy.planning.candidate_commands import MachineLimits, commands, limits_seen
 from nlsdesign.bench.discrepancy.planning.experiment import Experiment, next_experiment, write_command
-from nlsdesign.bench.discrepancy.planning.machine_limits import MachineLimits, limits_seen
 from nlsdesign.bench.discrepancy.planning.separation import BlockResponse, ReadyHypothesis, apart
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench

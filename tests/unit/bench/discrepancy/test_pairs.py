@@ -9,8 +9,7 @@ import pytest
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.criteria import Criteria
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
-from nlsdesign.bench.discrepancy.selection.revision import Revision
-from nlsdesign.bench.discrepancy.selection.search import _Search
+from nlsdesign.bench.discrepancy.selection.search import Revision, _Search
 from nlsdesign.bench.discrepancy.selection.trials import Step, Trials
 from nlsdesign.components import Fixed
 from nlsdesign.components.assembly.named_parts import assembly

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from nlsdesign.bench.discrepancy.selection.probability import CALIBRATION, Calibration
+from nlsdesign.bench.discrepancy.selection.criteria import CALIBRATION, Calibration
 
 
 def test_the_probability_is_the_logistic_curve_of_ratio_and_completeness() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from nlsdesign.bench.discrepancy.effects.unnamed_tables import unnamed_part
 from nlsdesign.bench.discrepancy.reporting.advice import advice, experiment
-from nlsdesign.bench.discrepancy.reporting.sparse_formula import sparse_formula
+from nlsdesign.bench.discrepancy.reporting.remainder import sparse_formula
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.components.assembly.deck_writer import declare

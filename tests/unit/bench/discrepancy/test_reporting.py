@@ -8,15 +8,14 @@ from typing import cast
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.reporting.advice import where_they_differ
-from nlsdesign.bench.discrepancy.reporting.gap import course_of, gaps_of
-from nlsdesign.bench.discrepancy.reporting.refit import refit
+from nlsdesign.bench.discrepancy.reporting.refit import fitted_over_windows, refit, window_gaps, wiring_of
 from nlsdesign.bench.discrepancy.reporting.remainder import Remainder, remainder_of
-from nlsdesign.bench.discrepancy.reporting.window_refit import fitted_over_windows, window_gaps, wiring_of
-from nlsdesign.bench.discrepancy.screening.acting_effort import Acting
+from nlsdesign.bench.discrepancy.reporting.verdict import course_of, gaps_of
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import Acting
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison, Judged
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
 from nlsdesign.bench.identification.filters import smoothing

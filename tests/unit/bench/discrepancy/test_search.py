@@ -10,9 +10,8 @@ from typing import Any, ClassVar, cast
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.effects.candidate import Candidate, EffectFunction, Unknown
-from nlsdesign.bench.discrepancy.fitting.strategies import Continuation, Plain
-from nlsdesign.bench.discrepancy.fitting.unpredictable import Tally
+from nlsdesign.bench.discrepancy.effects.effect import Candidate, EffectFunction, Unknown
+from nlsdesign.bench.discrepancy.fitting import Continuation, Plain, Tally
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.criteria import Criteria
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
@@ -336,7 +335,7 @@ def test_a_richer_form_whose_numbers_do_not_stand_does_not_take_its_place(
     def standing(unknowns: Sequence[Unknown], fits: Any) -> Standing:
         return weak if len(unknowns) == 4 else Standing()
 
-    monkeypatch.setattr("nlsdesign.bench.discrepancy.selection.revision.standing_of", standing)
+    monkeypatch.setattr("nlsdesign.bench.discrepancy.selection.search.standing_of", standing)
     found = outcome(TableOfForms(left), forms("branch", one=2, two=4), effect("b"))
     assert [len(c.unknowns) for c in found.last.added] == [2, 1]
 
@@ -365,7 +364,7 @@ def test_an_effect_whose_numbers_fail_on_all_samples_is_dropped_and_said(
     def standing(unknowns: Sequence[Unknown], fits: Any) -> Standing:
         return weak if unknowns[0].name == "a.0" else Standing()
 
-    monkeypatch.setattr("nlsdesign.bench.discrepancy.selection.revision.standing_of", standing)
+    monkeypatch.setattr("nlsdesign.bench.discrepancy.selection.search.standing_of", standing)
     found = outcome(table, effect("a"), effect("b"))
     assert names(found) == ["b"]
     assert [s.reason for s in found.skipped] == [

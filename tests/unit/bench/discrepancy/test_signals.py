@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nlsdesign import components as c
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.filters import smoothing

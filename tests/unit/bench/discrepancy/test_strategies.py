@@ -10,28 +10,27 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from nlsdesign.bench.discrepancy import fitting as strategies
 from nlsdesign.bench.discrepancy.effects import backlash
-from nlsdesign.bench.discrepancy.effects.candidate import Candidate, Unknown
-from nlsdesign.bench.discrepancy.fitting import strategies
-from nlsdesign.bench.discrepancy.fitting.strategies import (
-    EXPENSIVE_STEP,
-    LONG_STEP,
-    MOST_STARTS,
+from nlsdesign.bench.discrepancy.effects.effect import Candidate, Unknown
+from nlsdesign.bench.discrepancy.fitting import (
+    BUDGET,
     Continuation,
     FitProblem,
+    Key,
     Limits,
     Plain,
     RobustOverFreeFlight,
     Smooth,
     Start,
     Strategy,
+    Tally,
     best_fit,
     method_for,
     refusal,
 )
-from nlsdesign.bench.discrepancy.fitting.unpredictable import Key, Tally
+from nlsdesign.bench.discrepancy.selection.comparison import FreeBlock, GroupFit, HypothesisFit
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
-from nlsdesign.bench.discrepancy.selection.hypothesis_fit import FreeBlock, GroupFit, HypothesisFit
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.block import Drive
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Evidence
@@ -122,12 +121,12 @@ def test_a_first_look_ends_earlier_than_a_fit_to_all_samples() -> None:
     assert problem().cost_before == 0.5 * 4 * 2100.0
     assert problem(coarse=False).limits == Limits(40, 2e-5, 0.0)
     assert problem(coarse=False, effects=0).limits == Limits(40, 0.0, 0.0)
-    assert problem(size=LONG_STEP + 1).limits.evaluations == 6
-    assert problem(size=LONG_STEP + 1, effects=0).limits.evaluations == 20
+    assert problem(size=BUDGET.long_step + 1).limits.evaluations == 6
+    assert problem(size=BUDGET.long_step + 1, effects=0).limits.evaluations == 20
 
 
 def test_only_a_further_effect_can_be_too_expensive() -> None:
-    long, many = EXPENSIVE_STEP + 1, tuple(start(0.1 * k) for k in range(MOST_STARTS + 1))
+    long, many = BUDGET.expensive_step + 1, tuple(start(0.1 * k) for k in range(BUDGET.most_starts + 1))
     assert refusal(problem(size=long)) == ""
     assert "100001 operations per step" in refusal(problem(size=long, effects=2))
     assert refusal(problem(effects=2, starts=many)) == ""
@@ -345,7 +344,7 @@ def test_a_group_comes_back_with_what_it_leaves_over(notebook: Notebook) -> None
 def test_an_expensive_further_effect_and_one_without_a_response_come_back_as_errors(
     notebook: Notebook,
 ) -> None:
-    bench = cast(Bench, BenchOfOne(EXPENSIVE_STEP + 1))
+    bench = cast(Bench, BenchOfOne(BUDGET.expensive_step + 1))
     twice = Hypothesis(BLANK, (candidate(GAP), candidate(SIZE)))
     refused = HypothesisFit(bench, {}).fitted(twice, group(), (SIZE,))
     assert isinstance(refused, ConvergenceError)

@@ -11,14 +11,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.fitting.unpredictable import (
-    Key,
-    Tally,
-    diverges,
-    like_the_others,
-    quickest,
-    unpredictable,
-)
+from nlsdesign.bench.discrepancy.fitting import Key, Tally, diverges, like_the_others, quickest, unpredictable
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.block import Drive
 from nlsdesign.bench.identification.equation_error.evidence import Evidence

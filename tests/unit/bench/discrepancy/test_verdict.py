@@ -8,8 +8,7 @@ from typing import Any, cast
 import pytest
 
 from nlsdesign.bench.discrepancy.reporting.refit import FittedNumber, Refit
-from nlsdesign.bench.discrepancy.reporting.remainder import Remainder
-from nlsdesign.bench.discrepancy.reporting.sparse_formula import Formula
+from nlsdesign.bench.discrepancy.reporting.remainder import Formula, Remainder
 from nlsdesign.bench.discrepancy.reporting.verdict import Course, NamedEffect, RecordGap, Verdict
 from nlsdesign.components import Fixed
 from nlsdesign.components.assembly.named_parts import assembly

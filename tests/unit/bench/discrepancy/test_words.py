@@ -21,10 +21,9 @@ from nlsdesign.bench.discrepancy.effects.plain_names import (
     title,
 )
 from nlsdesign.bench.discrepancy.reporting.circumstances import DiagnosisRun, RecordOfRun, settings_of
-from nlsdesign.bench.discrepancy.reporting.named_effect import EffectEvidence, NamedEffect
-from nlsdesign.bench.discrepancy.reporting.suspicion import as_sentence
+from nlsdesign.bench.discrepancy.reporting.named_effect import EffectEvidence, NamedEffect, as_sentence
 from nlsdesign.bench.discrepancy.reporting.verdict import Course, RecordGap
-from nlsdesign.bench.discrepancy.screening.scale_check import _hint
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import _hint
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.selection.measures import DECLARED, Excess
 from nlsdesign.bench.discrepancy.selection.trials import Skipped

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.prediction_of_blocks import band_errors, predict
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.block_prediction import band_errors, predict
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import evidence
 from nlsdesign.bench.identification.equation_error.between_samples import on_clock, refined

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import lsq_linear
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.measurement import Record, cut_in_time

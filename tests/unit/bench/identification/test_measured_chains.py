@@ -11,8 +11,8 @@ import pytest
 
 from nlsdesign.bench.discrepancy import refit
 from nlsdesign.bench.discrepancy.screening.causality import lagging_forces
-from nlsdesign.bench.discrepancy.screening.other_rig import out_of_reach
-from nlsdesign.bench.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
+from nlsdesign.bench.discrepancy.screening.wrong_numbers import out_of_reach
 from nlsdesign.bench.identification import Record, RecordSet, load_records
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import (

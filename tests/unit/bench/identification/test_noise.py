@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
 from nlsdesign.bench.identification.equation_error.noise import (

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import ALL, diagnose, write_verdict
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.effects import backlash
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench

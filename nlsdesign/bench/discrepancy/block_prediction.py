@@ -1,4 +1,4 @@
-"""What a model predicts of a measured record, block by block."""
+"""What a model predicts of a measured record, block by block, and what a signal shows of the model."""
 
 from __future__ import annotations
 
@@ -7,16 +7,38 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....components.assembly.named_parts import Assembly
-from ....foundation.errors import unknown_name
-from ....foundation.symbolic import depends
-from ....model import flatten
-from ....simulation import RangeWarning, Trace, range_warnings, simulate
-from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_noise import measured_inputs
-from ...identification.equation_error.evidence import Bench
-from ...identification.records.measurement import Record, RecordSet
+from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array
+from ...foundation.errors import unknown_name
+from ...foundation.symbolic import depends
+from ...model import FlatModel, flatten
+from ...model.readings import reading_of
+from ...simulation import RangeWarning, Trace, range_warnings, simulate
+from ..identification.equation_error.block import Block
+from ..identification.equation_error.block_noise import measured_inputs
+from ..identification.equation_error.evidence import Bench
+from ..identification.records.measurement import Record, RecordSet
 from .tearing import blocks_of
+
+
+def shown_values(model: FlatModel, record: Record, signal: str) -> Array:
+    """Return the values behind the readings of a signal, with the numbers that the model has.
+
+    The inverse of each sensor of the chain, the last one first, earlier by the sum of their delays. States of
+    sensors, such as a drift so far, are taken as they start.
+    """
+    reading, values = reading_of(model.readings, signal), np.asarray(record.trace[signal])
+    if not reading.sensors:
+        return values
+    numbers = {v.name: ca.SX(v.start) for v in (*model.parameters, *model.states)}
+    symbol = ca.SX.sym("reading")
+    behind = ca.Function("behind", [symbol], [reading.inferred(symbol, numbers)])
+    shown: Array = behind.map(len(values))(values[None, :]).full().ravel()
+    delay = sum(model.values[name] for name in reading.delays)
+    stretch = sum(model.values[name] for name in reading.stretches)
+    time = record.trace.time
+    late = delay + stretch * (time - time[0])
+    return np.interp(time + late, time, shown) if delay or stretch else shown
 
 
 class BandError(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.bench.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.bench.discrepancy.effects import current_sensor_bias, force_sensor_delay, force_sensor_gain
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.filters import smoothing
