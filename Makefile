@@ -7,7 +7,7 @@ OUT := out/$(STUDY)
 WORKERS := 2
 # Kernels of OpenBLAS that x86-64 processors with AVX2 can run.
 KERNELS := Haswell Prescott Zen
-PLACES := nlsdesign/model nlsdesign/observer nlsdesign/discrepancy nlsdesign/export
+PLACES := nlsdesign/model nlsdesign/feedback/observer nlsdesign/bench/discrepancy nlsdesign/export
 MUTANTS := 200
 SEED := 1
 UV := uv==0.13.8
@@ -31,7 +31,7 @@ help:
 	@echo 'make docs       the documentation site, into out/docs; warnings and dead links are errors'
 	@echo 'make gallery    run all studies and keep some of their figures for the site (minutes)'
 	@echo 'make masters    our FMUs in foreign masters: docs/fmi_masters.md'
-	@echo 'make targets    generated C on Cortex-M4F and M7 in an emulator: docs/targets.md'
+	@echo 'make targets    generated C on processors of controllers in an emulator: docs/targets.md'
 	@echo 'make tutorial   run the tutorial and write its numbers, figures and notebook anew'
 	@echo 'make wheels     build wheel and sdist, install and try each on every Python that is here'
 	@echo 'make lock       write requirements/locked.txt anew (newest versions: make lock UPGRADE=--upgrade)'

@@ -9,7 +9,7 @@ from itertools import cycle, islice, zip_longest
 
 import numpy as np
 
-from nlsdesign.discrepancy.effects import ALL
+from nlsdesign.bench.discrepancy.effects import ALL
 from tests.rig import ACTUATORS, COUNTS, EFFECTS, LATER_EFFECTS, OUTSIDE_ANY_CATALOGUE, Conditions
 from tests.rig.machines import MACHINES
 

@@ -16,11 +16,11 @@ from benchmarks._score_cases import NOISES, Case
 from benchmarks._score_truth import covered, true_numbers
 from benchmarks._score_yardsticks import YARDSTICKS, MissingError, table_of
 from models.test_rig import test_rig_deck
+from nlsdesign.bench.discrepancy import Verdict, diagnose
+from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy import Verdict, diagnose
-from nlsdesign.identification import RecordSet, load_records
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from tests.rig import ACTUATORS, THREE_RECORDS, make_records, mistaken, write_set
 from tests.rig.commands import RECORDS

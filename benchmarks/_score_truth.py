@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from benchmarks._score_cases import Case
-from nlsdesign.discrepancy import Verdict
+from nlsdesign.bench.discrepancy import Verdict
 from tests.rig import ACTUATORS, Hidden, truth
 from tests.rig.machines import MACHINES, true_numbers_of_machine
 

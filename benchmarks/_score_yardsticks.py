@@ -12,21 +12,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
+from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import RecordSet
+from nlsdesign.bench.identification.equation_error.block_noise import rate_span
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.filters import derivative
+from nlsdesign.bench.identification.records.measurement import Record
 from nlsdesign.components import Assembly
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.identification import RecordSet
-from nlsdesign.identification.equation_error.evidence import Bench
-from nlsdesign.identification.equation_error.filter_choice import rate_span
-from nlsdesign.identification.records.measurement import Record
-from nlsdesign.identification.statistics.filters import derivative
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.model import flatten
-
-Array = NDArray[np.float64]
 
 OPEN = 1.4
 """Mean square over the floor from which BIC and pysindy take a block to lack something."""

@@ -14,8 +14,14 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 import nlsdesign as nls
-from nlsdesign.analysis import EstimateDeviation, NoiseAssumptions, Observability, Stability, rest_points
-from nlsdesign.analysis.noise_assumptions import declared_deviation
+from nlsdesign.feedback.analysis import (
+    EstimateDeviation,
+    NoiseAssumptions,
+    Observability,
+    Stability,
+    rest_points,
+)
+from nlsdesign.feedback.analysis.kalman import declared_deviation
 from nlsdesign.model.linear import jacobian_function
 
 COUNT, LAST, STEP, HORIZON = 2001, 0.9, 1e-3, 0.1

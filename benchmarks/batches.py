@@ -22,9 +22,9 @@ from scipy.integrate import solve_ivp
 
 import nlsdesign as nls
 from benchmarks.closed_loop import published_loop
-from nlsdesign.control import ClosedLoop
 from nlsdesign.export import natively
-from nlsdesign.observer import CascadeGain, observer_bench, observer_errors
+from nlsdesign.feedback.control import ClosedLoop
+from nlsdesign.feedback.observer import CascadeGain, observer_bench, observer_errors
 from nlsdesign.simulation import Sine, declared_prior, simulate, simulate_batch
 from nlsdesign.simulation.sampled_batch import PLANT, run_batch
 

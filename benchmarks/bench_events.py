@@ -19,13 +19,13 @@ import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from nlsdesign.components import ROTATION, Backlash, CoulombFriction, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Sine, simulate
 
@@ -33,7 +33,6 @@ DECK = "austin2015_figure_consistent"
 LADDER = (1e-6, 1e-7, 1e-8, 1e-9)
 PEERS = ("DOP853", "RK45", "LSODA")
 CURRENT = Sine(2.0, 2.0)
-Array = NDArray[np.float64]
 
 
 def bench() -> FlatModel:

@@ -20,11 +20,11 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 
@@ -36,7 +36,6 @@ PEERS = {
     "RK45": (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11),
     "DOP853": (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11),
 }
-Array = NDArray[np.float64]
 
 
 def current(t: float) -> float:

@@ -26,7 +26,6 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import BFGS, Bounds, NonlinearConstraint, minimize
 
 import nlsdesign as nls
@@ -42,8 +41,7 @@ from nlsdesign.design.optimisation.program import Rows
 from nlsdesign.design.optimisation.solve import GOALS, USUAL, Wanted
 from nlsdesign.design.optimisation.starts import starts
 from nlsdesign.export.compilation.cross_compiler import BASELINE
-
-Floats = NDArray[np.float64]
+from nlsdesign.foundation.arrays import Array
 
 FEASIBLE = 1e-6
 """Largest miss of a row, each scaled to about 1, at which a cost counts."""
@@ -233,19 +231,19 @@ class PeerProblem:
         self.last = names.index("last_direction") if self.equal else None
         self.starts = [problem.at(start)[: self.count] for start in starts(USUAL.starts, USUAL.seed, [])]
 
-    def at(self, point: Floats) -> Floats:
+    def at(self, point: Array) -> Array:
         """Return cost and rows at points, shape (1 + rows,) or (1 + rows, points)."""
         found = np.array(self.values(point), dtype=float)
         return np.nan_to_num(found[:, 0] if point.ndim == 1 else found, nan=1e6, posinf=1e6, neginf=-1e6)
 
-    def with_slopes(self, point: Floats) -> tuple[Floats, Floats]:
+    def with_slopes(self, point: Array) -> tuple[Array, Array]:
         """Return cost and rows at a point, and their forward differences, from one call."""
         steps = _STEP * np.maximum(1.0, np.abs(point))
         found = np.array(self.batch(np.column_stack([point, point[:, None] + np.diag(steps)])), dtype=float)
         found = np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6)
         return found[:, 0], (found[:, 1:] - found[:, :1]) / steps
 
-    def missed(self, values: Floats) -> Floats:
+    def missed(self, values: Array) -> Array:
         """Return the sum over the rows of what each is missed by, and the largest: shape (2, ...)."""
         above, equal = values[1 : 1 + self.above], values[1 + self.above :]
         each = np.concatenate([np.maximum(-above, 0.0), np.abs(equal)])
@@ -259,7 +257,7 @@ class _Point:
         self.problem, self.watch = problem, watch
         self.point = self.values = self.slopes = np.zeros(0)
 
-    def __call__(self, point: Floats) -> _Point:
+    def __call__(self, point: Array) -> _Point:
         if not np.array_equal(point, self.point):
             self.point = point.copy()
             self.values, self.slopes = self.problem.with_slopes(point)
@@ -267,7 +265,7 @@ class _Point:
         return self
 
 
-def slsqp(problem: PeerProblem, start: Floats, limit: float) -> Reached:
+def slsqp(problem: PeerProblem, start: Array, limit: float) -> Reached:
     """SLSQP of SciPy from one start."""
     watch = Watch(limit)
     at, many = _Point(problem, watch), 1 + problem.above
@@ -284,7 +282,7 @@ def slsqp(problem: PeerProblem, start: Floats, limit: float) -> Reached:
     return watch.reached()
 
 
-def trust_constr(problem: PeerProblem, start: Floats, limit: float) -> Reached:
+def trust_constr(problem: PeerProblem, start: Array, limit: float) -> Reached:
     """Interior point method ``trust-constr`` of SciPy from one start."""
     watch = Watch(limit)
     at = _Point(problem, watch)
@@ -301,7 +299,7 @@ def trust_constr(problem: PeerProblem, start: Floats, limit: float) -> Reached:
     return watch.reached()
 
 
-def cma_es(problem: PeerProblem, start: Floats, limit: float, penalty: float) -> Reached:
+def cma_es(problem: PeerProblem, start: Array, limit: float, penalty: float) -> Reached:
     """CMA-ES of the package ``cma`` from one start, with an exact penalty for rows that are missed."""
     cma = importlib.import_module("cma")
     watch, free = Watch(limit), np.delete(np.arange(problem.count), [problem.last] if problem.equal else [])
@@ -326,7 +324,7 @@ def cma_es(problem: PeerProblem, start: Floats, limit: float, penalty: float) ->
     return watch.reached()
 
 
-def _solve_last(problem: PeerProblem, points: Floats) -> None:
+def _solve_last(problem: PeerProblem, points: Array) -> None:
     """Put the last direction into points, shape (unknowns, points), at which the equation holds."""
     if problem.last is None:
         return
@@ -346,8 +344,8 @@ class Ours:
     multiplier of a row."""
 
     set_up: float
-    costs: Floats
-    seconds: Floats
+    costs: Array
+    seconds: Array
     price: float
 
     @property

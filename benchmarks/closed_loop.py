@@ -18,7 +18,8 @@ import control
 import numpy as np
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.control import (
+from nlsdesign.export import natively
+from nlsdesign.feedback.control import (
     ClosedLoop,
     TorqueGains,
     encoder_loop,
@@ -26,10 +27,9 @@ from nlsdesign.control import (
     sine_response,
     torque_controller,
 )
-from nlsdesign.deck import load_deck
-from nlsdesign.export import natively
+from nlsdesign.feedback.observer import CascadeGain, design_observer
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
-from nlsdesign.observer import CascadeGain, design_observer
 
 AMPLITUDE, FREQUENCIES = 0.8, np.geomspace(0.1, 11.0, 20)
 PEER_SAMPLES = 1500

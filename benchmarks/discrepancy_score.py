@@ -28,7 +28,8 @@ from typing import Any
 from benchmarks._score_cases import TIERS, Case, cases, sample
 from benchmarks._score_run import run
 from benchmarks._score_table import Result, table
-from nlsdesign.work_sharing import ChunkSizes, DaskScheduler, PointOutcome, Processes, shared_map
+from nlsdesign.foundation.work_sharing import DaskScheduler, PointOutcome, Processes, shared_map
+from nlsdesign.foundation.work_sharing.shared_map import ChunkSizes
 
 
 def main() -> None:

@@ -11,17 +11,15 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
+from nlsdesign.bench.identification import Record, Shots, Weights, fit_by_simulation, free_parameter
 from nlsdesign.components import TRANSLATION, CoulombFriction, Dashpot, Mass, Regularised, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.identification import Record, Shots, Weights, fit_by_simulation, free_parameter
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace
-
-Array = NDArray[np.float64]
 
 STEP, SECONDS, NOISE, CREEP = 0.01, 8.0, 2e-3, 0.05
 TRUE = {

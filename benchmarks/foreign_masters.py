@@ -25,9 +25,9 @@ import fmpy
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.deck import load_deck
 from nlsdesign.export import write_reference
-from nlsdesign.locations import version
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.locations import version
 from nlsdesign.model.flat import FlatModel
 
 DECK = "austin2015_figure_consistent"

@@ -15,8 +15,11 @@ import time
 
 import numpy as np
 
-from nlsdesign.errors import NlsError
-from nlsdesign.live import ChangeLimit, LiveDesign, LiveEdit, MovePoint, gallery_question, to_json
+from nlsdesign.foundation.errors import NlsError
+from nlsdesign.live.answers import to_json
+from nlsdesign.live.edits import ChangeLimit, LiveEdit, MovePoint
+from nlsdesign.live.gallery import gallery_question
+from nlsdesign.live.live_design import LiveDesign
 
 DECKS = (
     "cam-actuator",

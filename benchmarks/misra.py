@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks._tools import run_tool
 from benchmarks.targets import DECK, models, replaced
 from nlsdesign.export import export_c
-from nlsdesign.export.c.controller_code import CSource
+from nlsdesign.export.c.writer import CSource
 
 PAGE = Path(__file__).parents[1] / "docs" / "misra.md"
 

@@ -21,17 +21,17 @@ from typing import Any
 import numpy as np
 
 from models.test_rig import test_rig_deck
+from nlsdesign.bench.discrepancy import effects
+from nlsdesign.bench.discrepancy.planning.candidate_commands import MachineLimits
+from nlsdesign.bench.discrepancy.planning.experiment import next_experiment
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
+from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import RecordSet
+from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import Assembly
-from nlsdesign.discrepancy import effects
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.planning.experiment import next_experiment
-from nlsdesign.discrepancy.planning.machine_limits import MachineLimits
-from nlsdesign.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
-from nlsdesign.errors import ConvergenceError
-from nlsdesign.identification import RecordSet
-from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.foundation.errors import ConvergenceError
 from nlsdesign.model import flatten
 from tests.rig import ACTUATORS, write_declaration, write_records
 from tests.rig.commands import STEP, Command, command_of, sines
@@ -208,7 +208,7 @@ def load_whole(folder: Path, model: Any) -> RecordSet:
 
 def load_record_of(file: Path, model: Any) -> RecordSet:
     """Return one record."""
-    from nlsdesign.identification.records.measurement import load_record
+    from nlsdesign.bench.identification.records.measurement import load_record
 
     return load_record(file, model)
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks._tools import run_tool
 from nlsdesign.export import export_c
-from nlsdesign.export.c.controller_code import CSource
+from nlsdesign.export.c.writer import CSource
 from nlsdesign.export.compilation.cross_compiler import BASELINE, compiler
 from nlsdesign.model.flat import FlatModel, Variable
 from tests.hand_built import observer

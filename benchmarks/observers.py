@@ -23,7 +23,7 @@ from scipy.optimize import minimize
 
 import nlsdesign as nls
 from nlsdesign.export import natively
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     CascadeGain,
     CertifiedGain,
     ObserverBench,
@@ -33,8 +33,8 @@ from nlsdesign.observer import (
     observer_errors,
     verify,
 )
-from nlsdesign.observer.certificates import co_design
-from nlsdesign.observer.certificates.semidefinite import Inequality, minimised
+from nlsdesign.feedback.observer.certificates import co_design
+from nlsdesign.feedback.observer.certificates.co_design import Inequality, minimised
 from nlsdesign.simulation.sampled_batch import PLANT
 
 DECKS = ("austin2015_figure_consistent", "austin2015_as_printed")

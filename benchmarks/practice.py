@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks._tools import run_tool
-from nlsdesign.discrepancy.effects import ALL
+from nlsdesign.bench.discrepancy.effects import ALL
 
 CATALOGUE = {effect.__name__ for effect in ALL}
 COMMAND = (sys.executable, "-m", "nlsdesign")

@@ -14,15 +14,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign import design as design_room
 from nlsdesign.design import CamDesign, DesignSettings, Limit
 from nlsdesign.design.optimisation.loosening import Freed, Give
-from nlsdesign.errors import NlsError
-
-Floats = NDArray[np.float64]
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.errors import NlsError
 
 DECKS = ("austin2015_figure_consistent", "austin2015_as_printed")
 FREE = ("spring.cam.contour", "spring.pretension", "spring.rubber.area")
@@ -67,7 +65,7 @@ def random_target(seed: int) -> design_room.TabulatedTorque:
     )
 
 
-def _stiffness(shape: int, share: Floats, draw: np.random.Generator) -> Floats:
+def _stiffness(shape: int, share: Array, draw: np.random.Generator) -> Array:
     if shape == 0:
         waves = [draw.normal(0.0, 0.5 / k) * np.cos(np.pi * k * share) for k in (1, 2, 3)]
         return np.exp(np.sum(waves, axis=0))

@@ -127,7 +127,7 @@ def asked(points: int) -> dict[str, Any]:
 def read_again(made: Any) -> Mapping[str, float]:
     """Return numbers of an assembly that was written as a deck and read back: a cheap point."""
     from nlsdesign.components.assembly.deck_writer import deck_text, declare
-    from nlsdesign.deck import read_deck
+    from nlsdesign.foundation.deck import read_deck
 
     back = declare(read_deck(deck_text(made), Path("point.toml")))
     numbers = back.quantities()
@@ -136,7 +136,7 @@ def read_again(made: Any) -> Mapping[str, float]:
 
 def yardstick(points: int, _: Path) -> dict[str, Any]:
     """Return the processor time of a point, one after the other, without the engine."""
-    from nlsdesign.sweeps import sweep_task
+    from nlsdesign.sweeps.run_sweep import sweep_task
 
     given = asked(points)
     task = sweep_task(given["actuator"], axes=given["axes"], ask=given["ask"])
@@ -150,14 +150,14 @@ def yardstick(points: int, _: Path) -> dict[str, Any]:
 
 def processes(points: int, out: Path) -> dict[str, Any]:
     """Return what a sweep over processes costs."""
-    from nlsdesign.work_sharing import Processes
+    from nlsdesign.foundation.work_sharing import Processes
 
     return run_of(points, out, Processes(WORKERS), children)
 
 
 def dask(points: int, out: Path) -> dict[str, Any]:
     """Return what a sweep over a scheduler costs; starting scheduler and workers is no part of it."""
-    from nlsdesign.work_sharing import DaskScheduler
+    from nlsdesign.foundation.work_sharing import DaskScheduler
 
     with cluster(out.parent / "scheduler.json") as (file, numbers):
         started = sum(map(processor_of, numbers()))
@@ -191,7 +191,7 @@ def run_of(points: int, out: Path, executor: Any, others: Callable[[], float]) -
 def memory_of_driver(points: int, out: Path) -> dict[str, Any]:
     """Return the memory of a driver over many cheap points."""
     import nlsdesign as nls
-    from nlsdesign.quantity import quantity
+    from nlsdesign.foundation.quantity import quantity
 
     wheel = nls.assembly("wheel", wheel=nls.Inertia(inertia=quantity(1e-3, "kg*m^2", source="assumed")))
     begin = time.perf_counter()

@@ -17,16 +17,15 @@ import casadi as ca
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import joined
-from nlsdesign.export import CORTEX_M4F, CORTEX_M7, Processor, TargetMeasurement, export_c, measure_on_target
+from nlsdesign.export import CORTEX_M4F, PROCESSORS, Processor, TargetMeasurement, export_c, measure_on_target
+from nlsdesign.feedback.control import joined
+from nlsdesign.feedback.observer import design_observer_with_details
 from nlsdesign.model import FlatModel, Variable
-from nlsdesign.observer import design_observer_with_details
 from tests.unguarded import unguarded
 
 DECK = "austin2015_figure_consistent"
 PAGE = Path(__file__).parents[1] / "docs" / "targets.md"
 BEGIN, END = "<!-- begin: {} -->", "<!-- end: {} -->"
-PROCESSORS = (CORTEX_M4F, CORTEX_M7)
 FUNCTIONS = ("exp", "expm1", "log", "log1p", "tanh", "erf", "sin", "atan", "sqrt")
 
 
@@ -120,7 +119,7 @@ def one_function(name: str) -> FlatModel:
 
 def functions() -> list[str]:
     lines = ["| | " + " | ".join(f"{p.name}, {r}" for p in PROCESSORS for r in ("float", "double")) + " |"]
-    lines.append("| --- |" + " ---: |" * 4)
+    lines.append("| --- |" + " ---: |" * 2 * len(PROCESSORS))
     usual = {
         (name, processor.name, real): np.median(_instructions(one_function(name), real, processor))
         for name in ("", *FUNCTIONS)

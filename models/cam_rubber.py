@@ -22,7 +22,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import Deck
+from nlsdesign.foundation.deck import Deck
 
 
 def cam_rubber_actuator(deck: Deck) -> Assembly:
@@ -41,7 +41,7 @@ def cam_rubber_actuator(deck: Deck) -> Assembly:
 
     Examples
     --------
-    >>> from nlsdesign.deck import load_deck
+    >>> from nlsdesign.foundation.deck import load_deck
     >>> [name for name, _ in cam_rubber_actuator(load_deck("austin2015_as_printed")).parts]
     ['motor', 'load', 'spring', 'bearing', 'dry_friction', 'motor_encoder']
     """

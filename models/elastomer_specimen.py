@@ -19,7 +19,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import Deck
+from nlsdesign.foundation.deck import Deck
 
 _RUBBER = "strip.rubber"
 
@@ -42,7 +42,7 @@ def elastomer_specimen(deck: Deck) -> Assembly:
 
     Examples
     --------
-    >>> from nlsdesign.deck import load_deck
+    >>> from nlsdesign.foundation.deck import load_deck
     >>> [name for name, _ in elastomer_specimen(load_deck("vhb4910_specimen")).parts]
     ['grip', 'clamp', 'strip', 'load_cell']
     """

@@ -14,7 +14,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import Deck
+from nlsdesign.foundation.deck import Deck
 
 
 def linear_spring_actuator(deck: Deck) -> Assembly:

@@ -28,7 +28,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import Deck
+from nlsdesign.foundation.deck import Deck
 
 RUBBER = "spring.cable.rope.rubber"
 
@@ -51,7 +51,7 @@ def one_sided_cable_drive(deck: Deck) -> Assembly:
 
     Examples
     --------
-    >>> from nlsdesign.deck import load_deck
+    >>> from nlsdesign.foundation.deck import load_deck
     >>> [name for name, _ in one_sided_cable_drive(load_deck("one_sided_cable_drive")).parts][:5]
     ['motor', 'drum', 'gear', 'load', 'spring']
     """

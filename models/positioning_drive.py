@@ -5,7 +5,7 @@ from __future__ import annotations
 from nlsdesign.components import Assembly, ConstantLoad, CoulombFriction, Dashpot, LinearDrive, tie
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import Deck
+from nlsdesign.foundation.deck import Deck
 
 
 def positioning_drive(deck: Deck) -> Assembly:
@@ -23,7 +23,7 @@ def positioning_drive(deck: Deck) -> Assembly:
 
     Examples
     --------
-    >>> from nlsdesign.deck import load_deck
+    >>> from nlsdesign.foundation.deck import load_deck
     >>> [name for name, _ in positioning_drive(load_deck("janot2019_positioning_drive")).parts]
     ['carriage', 'guide', 'dry_friction', 'offset']
     """

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nlsdesign.bench.identification.records.quality import check_columns
+from nlsdesign.bench.identification.records.table_files import read_table
 from nlsdesign.components import (
     ROTATION,
     Assembly,
@@ -31,11 +33,9 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import DeckError, brief, nearest
-from nlsdesign.identification.records.quality import check_columns
-from nlsdesign.identification.records.table_files import read_table
-from nlsdesign.quantity import Quantity, quantity, significant
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import DeckError, brief, nearest
+from nlsdesign.foundation.quantity import Quantity, quantity, significant
 
 _CONTROL_VALUES = 80
 _CHANGEOVER = 2e-5  # rad; at 15 mm lever arm 0.3 µm of extension
@@ -45,28 +45,7 @@ _SPREAD, _SPREAD_OF_VISCOSITY, _SPREAD_OF_BEARING = 0.06, 0.3, 0.6
 
 
 def test_rig_deck(rig_toml: Path, cam_csv: Path) -> Assembly:
-    """Return the rig as its makers declare it.
-
-    Parameters
-    ----------
-    rig_toml
-        Tables ``rubber``, ``drivetrain`` and ``sensors``, units in the names of the fields.
-    cam_csv
-        Columns ``theta_rad, delta_m, lever_arm_m`` for θ ≥ 0.
-
-    Returns
-    -------
-    Assembly
-        With the spreads that the file states in words: 6 % on the moduli, the inertia and the torque constant
-        (of the product gear_ratio·kT), a factor of 1.3 on the viscosity and of 1.6 on the bearing.
-
-    Raises
-    ------
-    DeckError
-        If a field is missing, or is no number.
-    MeasurementError
-        If the table of the cam cannot be read.
-    """
+    """Return the rig as its makers declare it."""
     numbers = _Numbers(load_deck(rig_toml).tables, rig_toml.name)
     return assembly(
         "test_rig",

@@ -14,37 +14,23 @@ import importlib
 from pathlib import Path
 from types import ModuleType
 
-from .errors import nearest
-from .locations import bundled, version
-from .quantity import quantity as quantity  # the function; a later import of the module leaves it in place
+from .foundation.errors import nearest
+from .foundation.locations import bundled, version
+from .foundation.quantity import (
+    quantity as quantity,  # the function; a later import of the module leaves it in place
+)
 
 
 def __getattr__(name: str) -> object:
-    """Return a public name from its module.
-
-    Parameters
-    ----------
-    name
-        For instance ``"flatten"``.
-
-    Raises
-    ------
-    AttributeError
-        If it is not public here; the message names its module, or the nearest public name.
-    """
+    """Return a public name from its module."""
     if name == "__version__":
         return version()
     if name.startswith("_"):
         raise AttributeError(name)
     if name not in _homes():
         raise AttributeError(_advice(name))
-    home = _homes()[name]
-    if home == "models":
-        value: object = bundled("models")
-    elif home == "":
-        value = importlib.import_module(f".{name}", __name__)
-    else:
-        value = getattr(importlib.import_module(f".{home}", __name__), name)
+    home, inner = _homes()[name]
+    value: object = bundled("models") if home == "models" else _value(home, inner)
     globals()[name] = value
     return value
 
@@ -54,25 +40,33 @@ def __dir__() -> list[str]:
 
 
 @functools.cache
-def _homes() -> dict[str, str]:
-    """Return the module of each public name, below this package; "" for the modules of the package itself."""
+def _homes() -> dict[str, tuple[str, str]]:
+    """Return the module of each public name, relative to this package, and the name that it has there."""
     import ast
 
     stub = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-    homes = {a.name: a.name for node in stub.body if isinstance(node, ast.Import) for a in node.names}
+    homes = {a.name: (a.name, "") for node in stub.body if isinstance(node, ast.Import) for a in node.names}
     for node in stub.body:
         if isinstance(node, ast.ImportFrom):
-            homes |= {a.name: node.module or "" for a in node.names}
+            homes |= {a.asname or a.name: (f".{node.module or ''}", a.name) for a in node.names}
     return homes
+
+
+def _value(home: str, inner: str) -> object:
+    """Return what a module calls by that name: what it defines or imports, else a room in it."""
+    value = None if home == "." else getattr(importlib.import_module(home, __name__), inner, None)
+    return importlib.import_module(f"{home.rstrip('.')}.{inner}", __name__) if value is None else value
 
 
 def _advice(name: str) -> str:
     """Return the message for a name that is not public here."""
     homes = _homes()
     text = f"nlsdesign has no name '{name}'"
-    for room in dict.fromkeys(home or one for one, home in homes.items() if home != "models"):
-        if name in _public(importlib.import_module(f".{room}", __name__)):
-            return f"{text}; it is nlsdesign.{room}.{name}"
+    for home, inner in (place for place in homes.values() if place[0] != "models"):
+        value = _value(home, inner)
+        module = value if isinstance(value, ModuleType) else importlib.import_module(home, __name__)
+        if name in _public(module):
+            return f"{text}; it is {module.__name__}.{name}"
     from .components.assembly.renamed import renamed  # here, as components take time to load
 
     old = renamed(name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .interruption import guarded
+from .foundation.processes import guarded
 
 
 def main() -> None:

@@ -17,18 +17,12 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from .discrepancy.blocks.shown_values import shown_values
-from .errors import MeasurementError, NlsError
+from .bench.discrepancy.block_prediction import shown_values
+from .bench.identification import Record, RecordSet
+from .bench.identification.least_squares import Fit
 from .export import export_c, export_fmu
-from .identification import Record, RecordSet
-from .identification.estimation.least_squares import Fit
-from .model import FlatModel
-from .model.readings import reading_of
-from .model.roles import measured_motion, series_spring
-from .model.structure import SpringNames
-from .observer import (
+from .feedback.observer import (
     AdaptiveDesign,
     FixedGrid,
     Grid,
@@ -37,12 +31,16 @@ from .observer import (
     design_observer_with_details,
     observe,
 )
-from .observer.scheduling.scheduled import whole_contour
-from .processes import parallel_map
-from .quantity import three_digits, with_unit
+from .feedback.observer.scheduling.scheduled import whole_contour
+from .foundation.arrays import Array
+from .foundation.errors import MeasurementError, NlsError
+from .foundation.processes import parallel_map
+from .foundation.quantity import three_digits, with_unit
+from .model import FlatModel
+from .model.readings import reading_of
+from .model.roles import measured_motion, series_spring
+from .model.structure import SpringNames
 from .simulation import Trace
-
-Array = NDArray[np.float64]
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
@@ -209,23 +207,9 @@ def regenerate(
 ) -> Regeneration:
     """Design the observer again, and compare it with the one from the declared model.
 
-    Parameters
-    ----------
-    declared, better
-        Model as declared, and as a diagnosis left it.
-    records
-        Bench records; those that no fit has seen are compared, or all where there are none.
-    fits
-        Of the better model, for the spread of its numbers.
-    choice
-        What is estimated; by default the torque of the series spring, every millisecond.
-    progress
-        Told what is being done.
-
-    Returns
-    -------
-    Regeneration
-        With reasons in words where no observer can be designed or nothing can be compared.
+    ``records``: bench records; those that no fit has seen are compared, or all where there are none.
+    ``choice``: what is estimated; by default the torque of the series spring, every millisecond. Result: with
+    reasons in words where no observer can be designed or nothing can be compared.
     """
     choice = choice or ObserverChoice()
     progress("designing the observer of the better model")
@@ -457,20 +441,7 @@ def _failures(spread: Sequence[float]) -> tuple[str, ...]:
 
 
 def write_regeneration(result: Regeneration, folder: Path) -> tuple[dict[Path, str], tuple[str, ...]]:
-    """Write the observer as C and FMU, and the plant of the better model as FMU.
-
-    Parameters
-    ----------
-    result
-        From :func:`regenerate`.
-    folder
-        Is made where it does not exist.
-
-    Returns
-    -------
-    tuple
-        What was written, by path, and in words what could not be written, with the reason.
-    """
+    """Write the observer as C and FMU, and the plant of the better model as FMU."""
     written: dict[Path, str] = {}
     reasons = []
     for name, model in {"observer": result.observer, "plant": result.plant}.items():

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 import nlsdesign as nls
-from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.report import FileSection, Section
+from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult, write_part
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.presentation.report import FileSection, Section
 
 INSPECTED = 8  # rows of the torque table on the drawing
 DRAWINGS = {
@@ -25,17 +23,7 @@ DRAWINGS = {
 
 @dataclass(frozen=True, eq=False)
 class MadeCam:
-    """The designed cam as it is made.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    part
-        Edge, holes and base under the cable.
-    files
-        Drawings that were written.
-    """
+    """The designed cam as it is made."""
 
     design: CamDesign
     part: CamPart
@@ -48,13 +36,7 @@ class MadeCam:
 
 
 def tolerance_of(design: CamDesign) -> ToleranceResult:
-    """Return the tolerance analysis of a design.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is none, with the reason that the design gives.
-    """
+    """Return the tolerance analysis of a design."""
     if design.tolerance is None:
         raise ValueRangeError("design", "; ".join(design.remarks) or "has no tolerance analysis")
     return design.tolerance
@@ -66,12 +48,7 @@ def with_machined_contour(actuator: nls.Assembly, anchor: nls.Quantity | None = 
     The spread of a deck's lever arm is that of the published figure that it was computed from; the errors of
     a machined contour are counted by the tolerance analysis itself.
 
-    Parameters
-    ----------
-    actuator
-        As declared.
-    anchor
-        Place of the cable's anchor in the new design; as declared if it is left out.
+    ``anchor``: place of the cable's anchor in the new design; as declared if it is left out.
     """
     arm = actuator.quantities()["spring.cam.lever_arm"]
     values = {"spring.cam.lever_arm": replace(arm, spread=0.0)}
@@ -82,29 +59,11 @@ def with_machined_contour(actuator: nls.Assembly, anchor: nls.Quantity | None = 
 
 def make_cam(design: CamDesign, machined: MachinedCam, folder: Path, *, title: str) -> MadeCam:
     """Write the edge for the machine and the page for the workshop, and return the part."""
-    part = machined.part(design.contour)
-    files = nls.write_drawings(folder, design.contour, machined=machined, note=f"design {design.fingerprint}")
-    block = nls.figures.TitleBlock(
-        title=title, deck=design.actuator.name, fingerprint=design.fingerprint, material="EN AW-7075"
+    pictures = nls.figures.DesignPictures(
+        deck=design.actuator.name, title=title, material="EN AW-7075", sheet="sheet", inspected=INSPECTED
     )
-    page = nls.figures.workshop_drawing(part, title=block, rows=inspection_rows(design))
-    files += nls.figures.write_figures(folder, {"sheet": page})
-    files += nls.figures.write_figures(folder, {"sheet": page}, suffix=".pdf")
-    return MadeCam(design, part, tuple(files))
-
-
-def inspection_rows(design: CamDesign) -> list[nls.figures.InspectionRow]:
-    """Return torque, lever arm and cable tension at a few angles, to be measured on the finished spring."""
-    curves, check, contour = design.curves, design.check, design.contour
-    return [
-        nls.figures.InspectionRow(
-            angle=float(angle),
-            torque=float(np.interp(angle, check.angles, check.torques)),
-            lever_arm=float(np.interp(angle, contour.angles, contour.lever_arms)),
-            tension=float(np.interp(angle, curves.angles, curves.forces)),
-        )
-        for angle in np.linspace(0.0, design.target.last_angle, INSPECTED)
-    ]
+    files = write_part(design, machined, folder, pictures=pictures)
+    return MadeCam(design, machined.part(design.contour), tuple(files))
 
 
 def drawing_section(cam: MadeCam) -> Section:

@@ -6,19 +6,14 @@ import os
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.discrepancy import Verdict
-from nlsdesign.report import Chapter
+from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.presentation.report import Chapter
 
 
 def data_folder(name: str, given: Path | None) -> Path | None:
     """Return the folder of a set of measurements, or ``None`` if it is not on this machine.
 
-    Parameters
-    ----------
-    name
-        Of the set, for instance ``"emps"``.
-    given
-        Path that the caller names; otherwise ``measured/NAME`` below the folder in NLSDESIGN_SHARED.
+    ``given``: path that the caller names; otherwise ``measured/NAME`` below the folder in NLSDESIGN_SHARED.
     """
     above = os.environ.get("NLSDESIGN_SHARED")
     folder = given or (Path(above) / "measured" / name if above else None)

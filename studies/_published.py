@@ -11,14 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import CurrentSensor, ForceSensor, InextensibleCable, Through
 from nlsdesign.components.assembly.deck_writer import deck_digest
-from nlsdesign.deck import ParentDeck
-
-Array = NDArray[np.float64]
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.deck import ParentDeck
 
 FIG6_SAMPLE = 0.4e-3  # s; distance of the points of Fig. 6 on its time axis
 _HERE = Path(__file__).parent

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 import nlsdesign as nls
-from nlsdesign.discrepancy import Verdict
-from nlsdesign.identification import Shots, Weights, coloured_sigma
-from nlsdesign.report import PublishedNumber, TableSection, comparison_table, verdict_sections
+from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.bench.identification import Shots, Weights, coloured_sigma
+from nlsdesign.presentation.report import PublishedNumber, TableSection, comparison_table, verdict_sections
 
 from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
 
@@ -88,19 +88,8 @@ class Results:
 def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | None:
     """Diagnose the drive without dry friction and offset, refit it with what is named, and judge both.
 
-    Parameters
-    ----------
-    out
-        Folder for ``report.html``, the verdict and the better deck.
-    fast
-        Without effect: no shorter way is needed.
-    data
-        Folder with ``emps.csv``; see :func:`data_folder`.
-
-    Returns
-    -------
-    Results or None
-        ``None`` where the measurements are not on this machine.
+    ``data``: folder with ``emps.csv``; see :func:`data_folder`. Result: ``None`` where the measurements are
+    not on this machine.
     """
     folder = data_folder("emps", data)
     if folder is None:

@@ -20,7 +20,7 @@ from nlsdesign.components import (
     TwoSidedCam,
 )
 from nlsdesign.design import CamDesign, DesignSettings, Limit
-from nlsdesign.report import Chapter, TableSection, design_sections
+from nlsdesign.presentation.report import Chapter, TableSection, design_sections
 
 from ._published import declared_actuator
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.analysis import (
+from nlsdesign.feedback.analysis import (
     Chart,
     EmpiricalGramian,
     EstimateDeviation,
@@ -27,7 +27,14 @@ from nlsdesign.analysis import (
     rest_points,
 )
 from nlsdesign.model.paper_form import GEOMETRIC, PaperFormNames, paper_form
-from nlsdesign.report import Chapter, FigureSection, Section, TableSection, TextSection, write_report
+from nlsdesign.presentation.report import (
+    Chapter,
+    FigureSection,
+    Section,
+    TableSection,
+    TextSection,
+    write_report,
+)
 
 DECKS = {"as printed": "austin2015_as_printed", "figure-consistent": "austin2015_figure_consistent"}
 LAST = nls.degrees(50.0)

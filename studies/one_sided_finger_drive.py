@@ -11,14 +11,9 @@ from pathlib import Path
 
 import nlsdesign as nls
 from nlsdesign.design import DesignSettings, FerruleSeat, MachinedOneSidedCam, RestLengthRange
-from nlsdesign.report import Chapter, design_sections, tolerance_sections
+from nlsdesign.presentation.report import Chapter, design_sections, tolerance_sections
 
-from ._designed import (
-    MadeCam,
-    drawing_section,
-    make_cam,
-    with_machined_contour,
-)
+from ._designed import MadeCam, drawing_section, make_cam, with_machined_contour
 
 RUBBER = "spring.cable.rope.rubber"
 FREE = ("spring.cam.contour", f"{RUBBER}.area", f"{RUBBER}.rest_length")

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign import figures
 from nlsdesign.components import Assembly, Cable, Fixed, GearedMotor, TwoSidedCam, material
 from nlsdesign.design import (
     CamDesign,
@@ -21,6 +20,7 @@ from nlsdesign.design import (
     Trim,
     tolerance_analysis,
 )
+from nlsdesign.presentation import figures
 
 TARGET = nls.ExponentialTorque(maximum=5.0, angle=nls.degrees(53.0), shape=1.0)
 """Schepelmann, Geberth and Geyer, ICRA 2014."""

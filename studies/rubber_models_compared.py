@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
+from nlsdesign.bench.identification import Agreement, Shots, agreement, noise_of
 from nlsdesign.components import (
     TRANSLATION,
     Driven,
@@ -28,17 +29,10 @@ from nlsdesign.components import (
     kelvin_voigt,
     maxwell,
 )
-from nlsdesign.identification import Agreement, Shots, agreement, noise_of
-from nlsdesign.report import FigureSection, TableSection
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.presentation.report import FigureSection, TableSection
 
-from ._published import (
-    FIG6_SAMPLE,
-    Array,
-    bench_records,
-    declared_actuator,
-    element_loop,
-    with_bench_sensors,
-)
+from ._published import FIG6_SAMPLE, bench_records, declared_actuator, element_loop, with_bench_sensors
 
 EXTENSION, FORCE = "grip.position", "rubber.force"
 FITTED = ("modulus", "viscosity", "c1", "c2", "c3")
@@ -94,15 +88,7 @@ class Results:
 
 
 def main(out: Path, fast: bool = False) -> Results:
-    """Fit every law to both sets, print the table and draw it.
-
-    Parameters
-    ----------
-    out
-        Folder for ``report.html``.
-    fast
-        Without effect: no shorter way is needed.
-    """
+    """Fit every law to both sets, print the table and draw it."""
     steps, actuator = nls.progress.Steps(), declared_actuator()
     sets = (fig6_stretches(), bench_stretches(actuator))
     comparisons = []

@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign import figures
 from nlsdesign.components import Rounded, StrainStiffening
 from nlsdesign.design import (
     CamDesign,
@@ -35,7 +34,8 @@ from nlsdesign.design import (
     scan_gear_ratio,
     walking_task,
 )
-from nlsdesign.report import (
+from nlsdesign.presentation import figures
+from nlsdesign.presentation.report import (
     Chapter,
     FigureSection,
     TableSection,

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
+from nlsdesign.bench.discrepancy import Verdict
 from nlsdesign.components import FlowingChains, NeoHooke
-from nlsdesign.deck import Deck
-from nlsdesign.discrepancy import Verdict
-from nlsdesign.report import TableSection, verdict_sections
+from nlsdesign.foundation.deck import Deck
+from nlsdesign.presentation.report import TableSection, verdict_sections
 
 from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
 
@@ -72,19 +72,8 @@ class Results:
 def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | None:
     """Diagnose the elastic strip with the tests at the slowest and the fastest rate.
 
-    Parameters
-    ----------
-    out
-        Folder for ``report.html``, the verdict and the better deck.
-    fast
-        Without effect: no shorter way is needed.
-    data
-        Folder that holds ``loading_unloading``; see :func:`data_folder`.
-
-    Returns
-    -------
-    Results or None
-        ``None`` where the measurements are not on this machine.
+    ``data``: folder that holds ``loading_unloading``; see :func:`data_folder`. Result: ``None`` where the
+    measurements are not on this machine.
     """
     folder = data_folder("vhb4910", data)
     if folder is None:

@@ -13,18 +13,16 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 import nlsdesign as nls
 from nlsdesign.components import Assembly, LoadFriction, tie
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import FlatModel
-from nlsdesign.quantity import Quantity
-from nlsdesign.report import TableSection
+from nlsdesign.presentation.report import TableSection
 
 from ._measured import data_folder, write_skipped
-
-Array = NDArray[np.float64]
 
 MAPPING = Path(__file__).with_name("xl330_records.toml")
 GAIN_PER_KP = 8.517 / 400.0  # V/rad for each unit of kp
@@ -72,19 +70,8 @@ class Results:
 def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | None:
     """Fit the closed loop with and without what the linear model lacks, one gain held out at a time.
 
-    Parameters
-    ----------
-    out
-        Folder for ``report.html`` and the better deck.
-    fast
-        Without effect.
-    data
-        Folder with the logs; see :func:`data_folder`.
-
-    Returns
-    -------
-    Results or None
-        ``None`` where the measurements are not on this machine.
+    ``data``: folder with the logs; see :func:`data_folder`. Result: ``None`` where the measurements are not
+    on this machine.
     """
     folder = data_folder("xl330", data)
     if folder is None:

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from nlsdesign.calibration import (
+from nlsdesign.bench.calibration import (
     CalibrationRecords,
     CalibrationTest,
-    Estimate,
     FreeRunTest,
     HungWeightTest,
     LoadCellTest,
     load_calibration,
 )
+from nlsdesign.bench.calibration.estimate import Estimate
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from tests.rig.calibration_bench import (
     Logger,
     Machine,

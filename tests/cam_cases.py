@@ -25,8 +25,8 @@ from nlsdesign.components.core.element import MATERIAL, Scope
 from nlsdesign.components.core.part import parameter
 from nlsdesign.components.core.springs import Elastic
 from nlsdesign.design import ExponentialTorque, MaximumCamRadius, MaximumStrain, MinimumRadiusOfCurvature
-from nlsdesign.quantity import Quantity, degrees, quantity
-from nlsdesign.symbolic import Expression
+from nlsdesign.foundation.quantity import Quantity, degrees, quantity
+from nlsdesign.foundation.symbolic import Expression
 
 CONTOUR = ["spring.cam.contour"]
 PRETENSION = [*CONTOUR, "spring.pretension"]

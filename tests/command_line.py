@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli import main
-from nlsdesign.written_files import LIST_NAME
+from nlsdesign.foundation.text_files import LIST_NAME
 
 Run = Callable[..., tuple[int, str, str]]
 

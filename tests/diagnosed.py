@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from models.test_rig import test_rig_deck
+from nlsdesign.bench.discrepancy import Verdict, diagnose
+from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.components import Assembly, InextensibleCable
-from nlsdesign.discrepancy import Verdict, diagnose
-from nlsdesign.identification import RecordSet, load_records
 from nlsdesign.model import flatten
 from tests.rig import ACTUATORS, make_records, write_set
 

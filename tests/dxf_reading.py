@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from nlsdesign.foundation.arrays import Array
 
 
 @dataclass
@@ -23,7 +22,7 @@ class Entity:
     def layer(self) -> str:
         return self.values[8][0]
 
-    def numbers(self, code: int) -> Floats:
+    def numbers(self, code: int) -> Array:
         return np.array([float(value) for value in self.values.get(code, [])])
 
 
@@ -53,7 +52,7 @@ def entities_of(text: str) -> list[Entity]:
     return [item for item in found if 8 in item.values]
 
 
-def polylines_of(text: str, layer: str) -> list[Floats]:
+def polylines_of(text: str, layer: str) -> list[Array]:
     """Vertices and bulges of the polylines of a layer, each of shape (n, 3).
 
     A bulge is written only where it is not zero, in the vertex that it follows.
@@ -80,7 +79,7 @@ def polylines_of(text: str, layer: str) -> list[Floats]:
     return found
 
 
-def offset_points(outline: Floats, distance: float, *, step: float = 1e-3) -> Floats:
+def offset_points(outline: Array, distance: float, *, step: float = 1e-3) -> Array:
     """Points at a distance outside a closed clockwise outline of lines and arcs, shape (k, 2)."""
     points = []
     for (x0, y0, bulge), (x1, y1, _) in pairwise([*outline, outline[0]]):
@@ -100,7 +99,7 @@ def offset_points(outline: Floats, distance: float, *, step: float = 1e-3) -> Fl
     return np.array(points)
 
 
-def hull_of(points: Floats) -> Floats:
+def hull_of(points: Array) -> Array:
     """Corners of the convex hull, clockwise (Andrew's monotone chain)."""
     ordered = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
     chains = []
@@ -123,8 +122,8 @@ class TautString:
     The hull of the offset of an edge is where the centre line of a thick string runs that is laid around it.
     """
 
-    points: Floats
-    start: Floats
+    points: Array
+    start: Array
 
     def __post_init__(self) -> None:
         corners = hull_of(np.vstack([self.points, self.start]))

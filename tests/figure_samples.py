@@ -8,21 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from nlsdesign import figures
-from nlsdesign.analysis import Chart
-from nlsdesign.control import (
-    CoupledStability,
-    LinearLoop,
-    LoopMargins,
-    LoopVerdict,
-    OutputImpedance,
-    SaturationLine,
-    SineResponse,
-    SlidingPlant,
-)
 from nlsdesign.design import (
     ExponentialTorque,
-    FrontPoint,
     MotorAndGear,
     ParetoFront,
     Task,
@@ -32,9 +19,42 @@ from nlsdesign.design import (
     curve_for_task,
     tolerance_analysis,
 )
+from nlsdesign.design.optimisation.front import FrontPoint
+from nlsdesign.feedback.analysis import Chart
+from nlsdesign.feedback.control import (
+    LoopMargins,
+    LoopVerdict,
+    OutputImpedance,
+    SaturationLine,
+    SineResponse,
+    SlidingPlant,
+)
+from nlsdesign.feedback.control.evaluation.linear_loop import LinearLoop
+from nlsdesign.feedback.control.evaluation.margins import CoupledStability
+from nlsdesign.feedback.observer import ErrorStability
+from nlsdesign.foundation.quantity import degrees
 from nlsdesign.model import Variable
-from nlsdesign.observer import ErrorStability
-from nlsdesign.quantity import degrees
+from nlsdesign.presentation import figures
+from nlsdesign.presentation.figures.before_after import (
+    CandidateShare,
+    HeldOut,
+    binned_errors,
+    candidate_shares,
+    held_out_series,
+)
+from nlsdesign.presentation.figures.cam_motion import cam_motion
+from nlsdesign.presentation.figures.over_angle import observer_stability
+from nlsdesign.presentation.figures.sweep_figures import (
+    MarkedQuantile,
+    PointKinds,
+    ShownColumn,
+    SurfacePanel,
+    VarianceShare,
+    answer_histograms,
+    answers_against,
+    response_surfaces,
+    sensitivity_bars,
+)
 from nlsdesign.simulation import Trace
 from tests import cam_cases
 
@@ -48,7 +68,7 @@ def motion() -> figures.CamMotion:
     contour = contour_from_curvature(
         nodes, np.linspace(9e-3, 4e-3, 14), first_slope=5e-3, anchor_distance=25e-3
     )
-    return figures.cam_motion(
+    return cam_motion(
         contour, lambda e: 9e3 * e + 6e5 * e**2, elements=2.0, rest_length=12.5e-3, pretension=4e-3, count=41
     )
 
@@ -104,10 +124,10 @@ def closed_loop() -> figures.ClosedLoopRun:
     )
 
 
-def held_out() -> figures.HeldOut:
+def held_out() -> HeldOut:
     noise = 0.08 * np.random.default_rng(7).standard_normal(len(TIME))
     force = 20.0 * torque()
-    return figures.HeldOut(TIME, force + noise, force + np.sign(force), 1.001 * force, "force", "N", 0.08)
+    return HeldOut(TIME, force + noise, force + np.sign(force), 1.001 * force, "force", "N", 0.08)
 
 
 RECORDS = (
@@ -116,9 +136,9 @@ RECORDS = (
     figures.RecordError("slow sine", 0.9, 0.11, 0.08, False),
 )
 SHARES = (
-    figures.CandidateShare("second_relaxation", 0.31),
-    figures.CandidateShare("coulomb_friction", 0.97, True),
-    figures.CandidateShare("force_sensor_delay", -0.02),
+    CandidateShare("second_relaxation", 0.31),
+    CandidateShare("coulomb_friction", 0.97, True),
+    CandidateShare("force_sensor_delay", -0.02),
 )
 STABILITY = ErrorStability(np.linspace(-0.9, 0.9, 31), np.full(31, 0.97), False, True)
 
@@ -210,43 +230,41 @@ def made_springs() -> ToleranceResult:
 BESIDE = (np.array([1.0, 2.0, 5.0]), np.array([0.1, np.nan, 0.3]))
 
 
-def sweep_points() -> tuple[list[figures.ShownColumn], figures.PointKinds]:
+def sweep_points() -> tuple[list[ShownColumn], PointKinds]:
     """Two axes and two answers of 40 points, of which two failed, four are misses and one is on the front."""
     x, y = np.random.default_rng(3).uniform(1.0, 2.0, (2, 40))
     masks = [np.isin(np.arange(40), chosen) for chosen in ([7], [1, 2, 3, 4], [5, 6])]
     columns = [("area", "mm^2", x), ("inertia", "kg*m^2", y), ("error", "N*m", x * y), ("mass", "kg", x - y)]
-    kinds = figures.PointKinds(np.arange(40), *masks)
-    return [figures.ShownColumn(*each) for each in columns], kinds
+    kinds = PointKinds(np.arange(40), *masks)
+    return [ShownColumn(*each) for each in columns], kinds
 
 
 def surfaces() -> figures.Figure:
     (x, y, error, _), kinds = sweep_points()
     nodes = np.linspace(1.0, 2.0, 9)
-    panel = figures.SurfacePanel(error.label, x, y, kinds, (nodes, nodes), np.outer(nodes, nodes))
-    return figures.response_surfaces(
-        [panel], words="Error over area and inertia, larger where both are large."
-    )
+    panel = SurfacePanel(error.label, x, y, kinds, (nodes, nodes), np.outer(nodes, nodes))
+    return response_surfaces([panel], words="Error over area and inertia, larger where both are large.")
 
 
 def distributions() -> figures.Figure:
     columns = sweep_points()[0][2:]
-    marks = [figures.MarkedQuantile(0.5, 1.1, 0.9, 1.3), figures.MarkedQuantile(0.95, 1.4, 1.2, math.nan)]
-    return figures.answer_histograms(
+    marks = [MarkedQuantile(0.5, 1.1, 0.9, 1.3), MarkedQuantile(0.95, 1.4, 1.2, math.nan)]
+    return answer_histograms(
         columns, [marks, marks], words="Error and mass of 40 points, two quantiles each."
     )
 
 
 def shares() -> figures.Figure:
     rows = [
-        figures.VarianceShare("area", 0.6, 0.1, 0.7, 0.1),
-        figures.VarianceShare("inertia", 0.2, 0.1, 0.3, 0.1),
+        VarianceShare("area", 0.6, 0.1, 0.7, 0.1),
+        VarianceShare("inertia", 0.2, 0.1, 0.3, 0.1),
     ]
-    return figures.sensitivity_bars({"error": rows}, words="Area causes 60 % of the variance of the error.")
+    return sensitivity_bars({"error": rows}, words="Area causes 60 % of the variance of the error.")
 
 
 def front_of_sweep() -> figures.Figure:
     columns, kinds = sweep_points()
-    return figures.answers_against(
+    return answers_against(
         columns[2:],
         kinds,
         wanted=[None, 0.1],
@@ -266,14 +284,14 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         {"F_M": chart(), "published": chart(3.0, rank=4)}
     ),
     "stability": lambda: figures.stability_over_angle({"model": chart()}),
-    "observer_stability": lambda: figures.observer_stability({"F_M": STABILITY}, sample_time=1e-3),
+    "observer_stability": lambda: observer_stability({"F_M": STABILITY}, sample_time=1e-3),
     "observer_error": lambda: figures.observer_error(TIME, torque(), {"F_M": torque() + 0.01}),
     "closed_loop": lambda: figures.closed_loop(
         closed_loop(), differences={"torque": 1e-8 * TIME}, bound=1e-6
     ),
     "gap_bars": lambda: figures.gap_bars(RECORDS, unit="N"),
-    "held_out_series": lambda: figures.held_out_series(held_out()),
-    "binned_errors": lambda: figures.binned_errors(
+    "held_out_series": lambda: held_out_series(held_out()),
+    "binned_errors": lambda: binned_errors(
         (TIME[::200], torque()[::200]),
         (TIME[::200], 0.1 * torque()[::200]),
         across="motor.angle in rad",
@@ -292,7 +310,7 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         across="frequency in Hz",
         words="Two curves, one of them with points, at 1 to 5 Hz; one value is missing.",
     ),
-    "candidate_shares": lambda: figures.candidate_shares(SHARES),
+    "candidate_shares": lambda: candidate_shares(SHARES),
     "response_surfaces": surfaces,
     "answer_histograms": distributions,
     "sensitivity_bars": shares,

@@ -86,7 +86,7 @@ def _targets(node: ast.AST, package: str, known: dict[str, Path]) -> Iterator[st
             if alias.asname is None and "." in alias.name:
                 yield alias.name.partition(".")[0]  # this is the name that the statement binds
     elif isinstance(node, ast.ImportFrom):
-        base = _absolute("." * node.level + (node.module or ""), package)
+        base = absolute("." * node.level + (node.module or ""), package)
         for alias in node.names:
             inner = f"{base}.{alias.name}"
             yield inner if inner in known else base
@@ -94,10 +94,10 @@ def _targets(node: ast.AST, package: str, known: dict[str, Path]) -> Iterator[st
         name = getattr(node.func, "attr", getattr(node.func, "id", ""))
         argument = node.args[0]
         if name in ("import_module", "__import__") and isinstance(argument, ast.Constant):
-            yield _absolute(str(argument.value), package)
+            yield absolute(str(argument.value), package)
 
 
-def _absolute(name: str, package: str) -> str:
+def absolute(name: str, package: str) -> str:
     """Resolve leading dots: one stands for the package of the module, each further one for its parent."""
     tail = name.lstrip(".")
     dots = len(name) - len(tail)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import ast
+import bisect
 import builtins
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
-MOST_LINES_IN_FILE = 500
-MOST_LINES_IN_FUNCTION = 70
+# Lines of code: docstrings, comments, blank lines and imports cost a reader little and do not count.
+MOST_LINES_IN_FILE = 400
+MOST_LINES_IN_FUNCTION = 50
 MOST_ARGUMENTS = 7
 MOST_METHODS = 12
+SECTIONS = ("Parameters", "Returns", "Yields", "Raises", "Warns", "Attributes")
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,38 @@ class Definition:
     line: int
 
 
+@dataclass(frozen=True)
+class Lines:
+    """Numbers of the lines of a module by what stands there; a string that is a statement is a docstring."""
+
+    total: int
+    docstrings: frozenset[int]
+    imports: frozenset[int]
+    code: tuple[int, ...]
+
+    def code_of(self, node: ast.AST) -> int:
+        """Count the lines of code of a definition, from ``def`` or ``class`` on, inner ones included."""
+        first, last = node.lineno, node.end_lineno  # type: ignore[attr-defined]
+        return bisect.bisect_right(self.code, last) - bisect.bisect_left(self.code, first)
+
+
 def parse(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+
+
+def lines_of(file: Path, nodes: Iterable[ast.AST] | None = None) -> Lines:
+    """Sort the lines of a file; with its nodes (imports and expressions) where it was read already."""
+    text = file.read_text(encoding="utf-8").splitlines()
+    docstrings: set[int] = set()
+    imported: set[int] = set()
+    for node in ast.walk(parse(file)) if nodes is None else nodes:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            imported.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+        elif isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
+            docstrings.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+    filled = (n for n, line in enumerate(text, 1) if line.strip() and not line.lstrip().startswith("#"))
+    code = tuple(n for n in filled if n not in docstrings and n not in imported)
+    return Lines(len(text), frozenset(docstrings), frozenset(imported), code)
 
 
 def is_private(name: str) -> bool:
@@ -71,15 +104,20 @@ def untyped(file: Path) -> Iterator[str]:
 
 def misshapen(file: Path) -> Iterator[str]:
     """Files, functions, argument lists and classes that have outgrown the limits above."""
-    lines = len(file.read_text(encoding="utf-8").splitlines())
-    if lines > MOST_LINES_IN_FILE:
-        yield f"the file has {lines} lines, limit {MOST_LINES_IN_FILE}"
-    for node in ast.walk(parse(file)):
+    nodes = list(ast.walk(parse(file)))
+    yield from outgrown(nodes, lines_of(file, nodes))
+
+
+def outgrown(nodes: Iterable[ast.AST], lines: Lines) -> Iterator[str]:
+    """Say the same of a file that was read already: of its functions and classes."""
+    if len(lines.code) > MOST_LINES_IN_FILE:
+        yield f"line 1: the file has {len(lines.code)} lines of code, limit {MOST_LINES_IN_FILE}"
+    for node in nodes:
         if isinstance(node, Function):
-            length = (node.end_lineno or node.lineno) - node.lineno + 1
-            count = len(arguments(node))
+            length, count = lines.code_of(node), len(arguments(node))
             if length > MOST_LINES_IN_FUNCTION:
-                yield f"line {node.lineno}: {node.name} has {length} lines, limit {MOST_LINES_IN_FUNCTION}"
+                most = f"limit {MOST_LINES_IN_FUNCTION}"
+                yield f"line {node.lineno}: {node.name} has {length} lines of code, {most}"
             if count > MOST_ARGUMENTS:
                 yield f"line {node.lineno}: {node.name} has {count} arguments, limit {MOST_ARGUMENTS}"
         elif isinstance(node, ast.ClassDef):
@@ -134,11 +172,12 @@ def headings(document: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in found}
 
 
-def mismatched(file: Path, exceptions: Mapping[str, str]) -> Iterator[str]:
+def mismatched(file: Path, exceptions: Mapping[str, str], exported: Container[str]) -> Iterator[str]:
     """Docstrings of public definitions that disagree with the code about parameters or exceptions.
 
-    Parameters are compared where a docstring has the section: the same names in the same order. ``Raises``
-    must list every class that the body itself raises, and only classes that exist.
+    An exported function documents its parameters, the same names in the same order; classes and methods,
+    many of which do what their base says, are compared where they have the section. What is exported lists
+    below ``Raises`` every class that the body itself raises, and only classes that exist.
 
     Parameters
     ----------
@@ -146,15 +185,21 @@ def mismatched(file: Path, exceptions: Mapping[str, str]) -> Iterator[str]:
         Module.
     exceptions
         What may be raised: name of a class, or of a function that returns an exception, and the class.
+    exported
+        Functions and classes of the module that users are offered.
     """
     for definition in public_definitions(parse(file)):
         text = ast.get_docstring(definition.node)
         if not text or _speaks_for_another(definition.node) or _is_command(definition.node):
             continue
         where = f"line {definition.line}: {definition.name}"
+        offered = definition.name.partition(".")[0] in exported
         written, actual = documented(text, "Parameters"), signature(definition.node)
-        if written and written != actual:
+        asked = definition.name in exported and isinstance(definition.node, Function)
+        if written != actual and (written or asked):
             yield f"{where} documents the parameters {written}, the signature has {actual}"
+        if not offered:
+            continue
         listed, raised = documented(text, "Raises"), raises(definition.node, exceptions)
         for name in raised:
             if name not in listed:
@@ -162,6 +207,31 @@ def mismatched(file: Path, exceptions: Mapping[str, str]) -> Iterator[str]:
         for name in listed:
             if name not in exceptions.values():
                 yield f"{where} lists {name}, which is no exception"
+
+
+def overdocumented(file: Path, exported: Container[str]) -> Iterator[str]:
+    """Docstrings with sections that only what is exported has; of any class the fields may be documented."""
+    for name, node in definitions(parse(file)):
+        first, *inner = name.split(".")
+        if (first in exported and not any(map(is_private, inner))) or _is_command(node):
+            continue
+        found = re.findall(
+            rf"^({'|'.join(SECTIONS)})\n-+$", ast.get_docstring(node) or "", flags=re.MULTILINE
+        )
+        for section in found:
+            if section not in ("Parameters", "Attributes") or not isinstance(node, ast.ClassDef):
+                yield f"line {node.lineno}: {name} is not exported and has a section {section}"
+
+
+def definitions(tree: ast.AST, within: str = "") -> Iterator[tuple[str, Function | ast.ClassDef]]:
+    """All functions and classes with their dotted names; those inside a function stand below ``_``."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, Function | ast.ClassDef):
+            yield within + node.name, node
+            inside = "" if isinstance(node, ast.ClassDef) else "_."
+            yield from definitions(node, f"{within}{node.name}.{inside}")
+        else:
+            yield from definitions(node, within)
 
 
 def documented(text: str, section: str) -> list[str]:

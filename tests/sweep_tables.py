@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.sweeps.sweep_columns import STATE_COLUMNS, SweepColumn
 from nlsdesign.sweeps.sweep_table import SweepTable
 

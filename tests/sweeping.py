@@ -16,16 +16,10 @@ import pyarrow.parquet as pq
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import Assembly
-from nlsdesign.deck import load_deck
-from nlsdesign.sweeps import (
-    FunctionQuestion,
-    GridAxis,
-    SobolSample,
-    SweepSettings,
-    SweepTable,
-    sweep,
-)
-from nlsdesign.work_sharing import DaskScheduler, Executor, InThisProcess, Processes
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.work_sharing import DaskScheduler, Executor, InThisProcess, Processes
+from nlsdesign.sweeps import FunctionQuestion, GridAxis, SobolSample, SweepTable, sweep
+from nlsdesign.sweeps.run_sweep import SweepSettings
 
 ROOT = Path(__file__).parent.parent
 AREA, INERTIA = "spring.rubber.area", "motor.inertia"
@@ -134,6 +128,6 @@ if __name__ == "__main__":
 
     place, points, where = sys.argv[1:]
     chosen: Executor = DaskScheduler(where) if "://" in where else Processes(int(where))
-    from nlsdesign.interruption import guarded
+    from nlsdesign.foundation.processes import guarded
 
     guarded(lambda: print(len(same_run(Path(place), int(points), chosen))))

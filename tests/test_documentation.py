@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import re
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+import nlsdesign as nls
+from nlsdesign.components import component_classes
 from tests import source
+from tests.import_graph import modules
 
 PRODUCT = ("nlsdesign", "models", "studies")
 TEXTS = (*PRODUCT, "tests", "docs", "examples", "benchmarks", "requirements", ".ci")
@@ -93,14 +100,49 @@ def test_everything_public_is_typed(root: Path) -> None:
     expect_none(root, public_files(root), source.untyped)
 
 
+def exported(root: Path) -> dict[Path, set[str]]:
+    """Functions and classes that users are offered, by file.
+
+    They stand in the ``__all__`` of a room, at the front door or in a room of it without ``__all__``, or are
+    laws, which are found by being there; and so is what such a class inherits from.
+    """
+    named = [
+        n for n, file in modules(root / "nlsdesign").items() if "\n__all__ = [" in file.read_text("utf-8")
+    ]
+    front = [getattr(nls, name) for name in dir(nls)]
+    rooms = [*map(importlib.import_module, named), *filter(inspect.ismodule, front)]
+    offered = [getattr(room, name) for room in rooms for name in public_names(room)]
+    offered += [*front, *component_classes().values()]
+    found: dict[Path, set[str]] = {}
+    for thing in (kind for each in offered for kind in (each.__mro__ if inspect.isclass(each) else [each])):
+        module = sys.modules.get(getattr(thing, "__module__", ""))
+        if hasattr(thing, "__qualname__") and getattr(module, "__file__", None):
+            found.setdefault(Path(module.__file__), set()).add(thing.__qualname__)
+    return found
+
+
+def public_names(room: ModuleType) -> list[str]:
+    """Names in ``__all__``, or else those without an underscore that are defined there."""
+    own = [n for n, thing in vars(room).items() if getattr(thing, "__module__", None) == room.__name__]
+    return getattr(room, "__all__", [n for n in own if not source.is_private(n)])
+
+
 def test_docstrings_agree_with_signatures_and_exceptions(root: Path) -> None:
-    exceptions = source.exceptions_of(python_files(root, "nlsdesign"))
+    exceptions, offered = source.exceptions_of(python_files(root, "nlsdesign")), exported(root)
     assert exceptions["unknown_name"] == "UnknownNameError"
-    expect_none(root, python_files(root, *PRODUCT), lambda file: source.mismatched(file, exceptions))
+    expect_none(
+        root,
+        python_files(root, *PRODUCT),
+        lambda file: source.mismatched(file, exceptions, offered.get(file, ())),
+    )
 
 
-def test_nothing_has_outgrown_its_shape(root: Path) -> None:
-    expect_none(root, python_files(root, *PRODUCT), source.misshapen)
+def test_only_what_is_exported_has_sections(root: Path) -> None:
+    offered = exported(root)
+    assert "flatten" in offered[root / "nlsdesign" / "model" / "flatten.py"]
+    expect_none(
+        root, python_files(root, *PRODUCT), lambda file: source.overdocumented(file, offered.get(file, ()))
+    )
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
@@ -121,7 +163,7 @@ def test_each_claim_names_its_test(root: Path) -> None:
 
 def test_no_path_of_a_machine(root: Path) -> None:
     texts = dict(text_files(root))
-    assert {"Makefile", "pyproject.toml", ".ci/run", "nlsdesign/errors.py"} <= set(texts)
+    assert {"Makefile", "pyproject.toml", ".ci/run", "nlsdesign/foundation/errors.py"} <= set(texts)
     found = [line for name, text in texts.items() for line in machine_paths(name, text)]
     assert not found, "\n" + "\n".join(found)
 
@@ -247,16 +289,45 @@ def test_a_docstring_that_disagrees_is_caught(
 ) -> None:
     assert old in DOCUMENTED
     sample.write_text(DOCUMENTED.replace(old, new, 1), encoding="utf-8")
-    exceptions = source.exceptions_of([root / "nlsdesign" / "errors.py"])
-    caught = [line.partition(": ")[2] for line in source.mismatched(sample, exceptions)]
+    exceptions = source.exceptions_of([root / "nlsdesign" / "foundation" / "errors.py"])
+    caught = [line.partition(": ")[2] for line in source.mismatched(sample, exceptions, {"Law", "force"})]
     assert [line[: len(complaint)] for line in caught] == [complaint] if complaint else caught == []
+
+
+def test_an_exported_function_documents_its_parameters(sample: Path) -> None:
+    sample.write_text('def force(a):\n    """Force."""\n    raise ValueError("a")\n', encoding="utf-8")
+    exceptions = {"ValueError": "ValueError"}
+    assert list(source.mismatched(sample, exceptions, ())) == []
+    assert list(source.mismatched(sample, exceptions, {"force"})) == [
+        "line 1: force documents the parameters [], the signature has ['a']",
+        "line 1: force raises ValueError, which its docstring does not list",
+    ]
+
+
+def test_a_section_of_what_is_not_exported_is_caught(sample: Path) -> None:
+    sample.write_text(DOCUMENTED, encoding="utf-8")
+    assert list(source.overdocumented(sample, {"Law", "force"})) == []
+    assert [line.partition(": ")[2] for line in source.overdocumented(sample, ())] == [
+        "Law is not exported and has a section Raises",
+        *(f"force is not exported and has a section {name}" for name in ("Parameters", "Returns", "Raises")),
+    ]
+    section = "Do.\n\n      Returns\n      -------\n      int"
+    within = f'class Law:\n  def _force(self):\n    def inner():\n      """{section}"""\n'
+    sample.write_text(within, encoding="utf-8")
+    assert list(source.overdocumented(sample, {"Law"})) == [
+        "line 3: Law._force._.inner is not exported and has a section Returns"
+    ]
 
 
 @pytest.mark.parametrize(
     ("fits", "outgrown", "complaint"),
     [
-        ("x = 1\n" * 500, "x = 1\n" * 501, "the file has 501 lines"),
-        ("def f():\n" + "    x = 1\n" * 69, "def f():\n" + "    x = 1\n" * 70, "f has 71 lines"),
+        ('"""A."""\nimport a\n\n# b\n' + "x = 1\n" * 400, "x = 1\n" * 401, "has 401 lines of code"),
+        (
+            'def f():\n    """F."""\n\n    # why\n' + "    x = 1\n" * 49,
+            "def f():\n" + "    x = 1\n" * 50,
+            "f has 51 lines of code",
+        ),
         (
             "class A:\n  def f(self, a, b, c, *, d, e, f, **g): ...",
             "class A:\n  def f(self, a, b, c, *d, e, f, g, h): ...",

@@ -14,25 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.errors import UnitError
-from nlsdesign.quantity import parse_unit
+from nlsdesign.foundation.errors import UnitError
+from nlsdesign.foundation.quantity import parse_unit
 
 ROOMS = (
-    *(
-        "analysis",
-        "cli",
-        "components",
-        "control",
-        "design",
-        "discrepancy",
-        "export",
-        "figures",
-    ),
-    *("identification", "live", "model", "observer", "report", "simulation", "sweep_report", "sweeps"),
-    "work_sharing",
-    "top",
-    "models",
-    "studies",
+    *("foundation", "components", "model", "simulation", "design", "feedback", "bench", "export"),
+    *("sweeps", "presentation", "live", "cli", "top", "models", "studies"),
 )
 """The rooms of the package; ``top`` are the modules beside them, ``models`` and ``studies`` other folders."""
 
@@ -66,7 +53,7 @@ SAME_NAME = {
     # A command has the name of the room or module that it runs.
     "cli": {"cosimulate", "design", "diagnose", "export", "materials", "sweep"},
     # An effect of the catalogue has the name of the part that it adds.
-    "discrepancy/effects": {"friction"},
+    "bench/discrepancy/effects": {"friction"},
 }
 """Files that may have the name of another file or room: the same thing, seen by another room."""
 

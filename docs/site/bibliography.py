@@ -6,7 +6,7 @@ import re
 from html import escape
 from pathlib import Path
 
-from nlsdesign.bibliography import Reference, cited, origins, references
+from nlsdesign.foundation.bibliography import Reference, cited, origins, references
 
 from . import markup
 
@@ -24,7 +24,8 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
     )
     rows = [[escape(name), escape(meaning)] for name, meaning in origins().items()]
     text = (
-        "# Bibliography\n\nMade from `nlsdesign/bibliography.toml`. A DOI stands where it was checked.\n\n"
+        "# Bibliography\n\nMade from `nlsdesign/foundation/bibliography.toml`. "
+        "A DOI stands where it was checked.\n\n"
         f'<dl class="bibliography">\n{entries}</dl>\n\n## Origins that are no publication\n\n'
         + markup.table(("origin", "meaning"), rows, caption="What a source may begin with instead")
     )

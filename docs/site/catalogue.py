@@ -11,9 +11,9 @@ from html import escape
 from pathlib import Path
 
 import nlsdesign.design as design
+from nlsdesign.bench.discrepancy.effects import ALL, Effect
+from nlsdesign.bench.discrepancy.effects.plain_names import capitalised, title
 from nlsdesign.design.jobs.job_file import kinds
-from nlsdesign.discrepancy.effects import ALL, Effect, Ranked
-from nlsdesign.discrepancy.effects.plain_names import capitalised, title
 
 from . import bibliography, markup
 
@@ -116,11 +116,8 @@ def _effects() -> str:
     return text + "".join(_effect(row) for row in ALL)
 
 
-def _effect(row: Effect | Ranked) -> str:
+def _effect(row: Effect) -> str:
     head = markup.anchor(row.__name__) + f"## {capitalised(title(row.__name__))}\n\n"
-    if isinstance(row, Ranked):
-        written = markup.sections(row.function)[""]
-        return head + f"<p><code>{row.__name__}</code></p>\n\n" + markup.prose(written)
     rows = [[markup.inline(form.signature), markup.inline(form.source)] for form in row.forms]
     columns = ("what it leaves in records", "source")
     brings = "; ".join(dict.fromkeys(escape(form.brings) for form in row.forms if form.brings))

@@ -20,9 +20,9 @@ from html import unescape
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-from nlsdesign import locations
 from nlsdesign.cli.studies import study_names
-from nlsdesign.writing import write_text
+from nlsdesign.foundation import locations
+from nlsdesign.foundation.text_files import write_text
 
 GALLERY = Path(__file__).resolve().parents[1] / "gallery"
 _FIGURE = re.compile(r"<figure.*?(?P<svg><svg.*?</svg>)(?P<rest>.*?)</figure>", re.S)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from nlsdesign import locations
-from nlsdesign.figures.style import TONES
+from nlsdesign.foundation import locations
+from nlsdesign.presentation.figures.style import TONES
 
 FONTS = {"font-stack": "system-ui, sans-serif", "font-stack--monospace": "ui-monospace, monospace"}
 

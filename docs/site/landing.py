@@ -6,8 +6,8 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.design import contour_of_cam
-from nlsdesign.figures import cam_motion_of, cam_positions
-from nlsdesign.figures.svg import inline_svg
+from nlsdesign.presentation.figures import cam_motion_of, cam_positions
+from nlsdesign.presentation.figures.svg import inline_svg
 
 from . import markup
 

@@ -19,9 +19,9 @@ from nlsdesign.components import (
     through,
     tie,
 )
-from nlsdesign.figures import Figure
-from nlsdesign.figures.curves import curves
 from nlsdesign.model import FlatModel, flatten
+from nlsdesign.presentation.figures import Figure
+from nlsdesign.presentation.figures.curves import curves
 from nlsdesign.simulation import simulate
 
 _AMPLITUDES = {"rotation": 0.5, "translation": 5e-3, "material": 0.5}

@@ -13,9 +13,9 @@ from nlsdesign.components import Part
 from nlsdesign.components.assembly.deck_reader import component_classes
 from nlsdesign.components.assembly.deck_writer import deck_text
 from nlsdesign.components.core.part_numbers import readings, templates
-from nlsdesign.errors import NlsError
-from nlsdesign.figures.svg import inline_svg
-from nlsdesign.quantity import Quantity, typeset_unit
+from nlsdesign.foundation.errors import NlsError
+from nlsdesign.foundation.quantity import Quantity, typeset_unit
+from nlsdesign.presentation.figures.svg import inline_svg
 from tests.parts import examples
 from tests.parts.systems import around
 

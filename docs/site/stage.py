@@ -10,7 +10,18 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from . import api, bibliography, catalogue, commands, diagrams, gallery, landing, listings, materials, parts
+from . import (
+    api,
+    bibliography,
+    catalogue,
+    commands,
+    diagrams,
+    gallery,
+    landing,
+    listings,
+    materials,
+    parts,
+)
 
 _LINK = re.compile(r"(?<!!)\[(?P<text>[^\]\n]+)\]\((?P<address>[^)\s]+)\)")
 _FENCE = re.compile(r"^(?P<mark>```+|~~~+)(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=mark)[ \t]*$", re.M | re.S)

@@ -10,7 +10,7 @@ import rubber_lab
 from rubber_lab.laws import WireBundle
 
 import nlsdesign as nls
-from nlsdesign.extensions import extended_by
+from nlsdesign.foundation.extensions import extended_by
 
 
 def main(folder: Path) -> None:

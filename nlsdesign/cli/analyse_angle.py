@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..quantity import typeset_unit
-from ..writing import make_folder
+from ..foundation.quantity import typeset_unit
+from ..foundation.text_files import make_folder
 from .output import (
     deck_option,
     examples,
@@ -23,7 +23,7 @@ from .range_remarks import check_angles, range_remarks, swept_angle, usual_last,
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..analysis import Chart, RankDrops, SensorRanking
+    from ..feedback.analysis import Chart, RankDrops, SensorRanking
     from ..model import FlatModel, Variable
 
 _HEADINGS = {
@@ -69,14 +69,14 @@ def analyse_angle(
     """Poles sliding and stuck, exact angles that hide a state, and which sensor would help most."""
     import numpy as np
 
-    from ..analysis import Observability, Stability, View, over_angle, rank_drops
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..figures import observability_over_angle, stability_over_angle, write_figures
+    from ..feedback.analysis import Observability, Stability, View, over_angle, rank_drops
+    from ..foundation.deck import load_deck
     from ..model import flatten
     from ..model.roles import series_spring
     from ..model.transform import with_outputs
-    from ..report import write_analysis_report
+    from ..presentation.figures import observability_over_angle, stability_over_angle, write_figures
+    from ..presentation.report import write_analysis_report
 
     declared = declare(load_deck(deck_name))
     model = flatten(declared)
@@ -117,8 +117,8 @@ def analyse_angle(
 
 def _ranking(model: FlatModel, angles: Any, measured: str, torque: str) -> tuple[SensorRanking | None, str]:
     """Return the ranked sensors, or why there are none; the rest of the analysis does not need them."""
-    from ..analysis import rank_sensors
-    from ..errors import NlsError
+    from ..feedback.analysis import rank_sensors
+    from ..foundation.errors import NlsError
 
     try:
         return rank_sensors(model, angles=angles, angle=measured, estimate=torque), ""
@@ -127,7 +127,7 @@ def _ranking(model: FlatModel, angles: Any, measured: str, torque: str) -> tuple
 
 
 def _deviation(torque: str) -> Any:
-    from ..analysis import EstimateDeviation
+    from ..feedback.analysis import EstimateDeviation
 
     return EstimateDeviation(estimate=torque)
 

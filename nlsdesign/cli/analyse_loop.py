@@ -3,80 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .loop_findings import stretches
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
 from .range_remarks import check_angles, range_remarks, usual_last, warn
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..control import ClosedLoop, LimitCycleOnset, LoopMargins, SineResponse
-    from ..control.evaluation.impedance import CoupledStability, OutputImpedance
-    from ..control.evaluation.responses import HeldTorque, ZeroTorque
-    from ..control.evaluation.saturation import SaturationLine
+    from ..feedback.control import ClosedLoop, LoopEvaluation
 
 GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
 """Number of the controller whose onset of limit cycling is looked for, by law."""
 _GAINS = ("proportional", "integral", "derivative")
 _FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "coupled_stability.svg")
-_FREQUENCIES = (0.1, 11.0, 20)
-_BIAS = 1.25
-"""Offset of a sine of torque over its amplitude, where the spring gives one sign only."""
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """What is evaluated."""
-
-    amplitudes: tuple[float, ...]
-    last: float
-    inertias: tuple[float, ...]
-    load_amplitude: float
-    gain: str
-
-
-@dataclass(frozen=True, eq=False)
-class _Evaluation:
-    """All results of the command."""
-
-    asked: _Asked
-    responses: tuple[SineResponse, ...]
-    held: HeldTorque
-    onsets: tuple[LimitCycleOnset, ...]
-    line: SaturationLine
-    margins: tuple[LoopMargins, ...]
-    impedance: OutputImpedance
-    coupled: CoupledStability
-    zero: ZeroTorque
-    resolution: Any
-
-    @property
-    def findings(self) -> list[str]:
-        """Sentences on what does not hold; empty for a loop that is stable wherever it was looked at."""
-        import numpy as np
-
-        result = []
-        for response in self.responses:
-            for where, words in stretches(response.frequency.tolist(), response.verdicts):
-                result.append(f"sine of {_sine(response)} at {where}: {words}")
-        for torque, verdict in zip(self.held.torque, self.held.verdicts, strict=True):
-            if not verdict.holds:
-                result.append(f"{torque:g} N·m held: {verdict}")
-        for where, words in stretches(self.zero.frequency.tolist(), self.zero.verdicts):
-            result.append(f"no torque wanted, load moved at {where}: {words}")
-        linear = self.margins[0].linear
-        lost = np.degrees(linear.angles[linear.reached & ~linear.stable()])
-        if len(lost):
-            result.append(f"the linear loop is unstable from {lost[0]:.3g}° on, {linear.mode}")
-        if result:
-            result += [str(onset) for onset in self.onsets]
-        return result
 
 
 @click.command(
@@ -127,38 +70,40 @@ def loop(
     if a sine moves no torque. The observer is the cascade, with the numbers of the deck for the machine
     as well.
     """
-    from ..progress import Steps
+    from ..export import quickest
+    from ..feedback.control import LoopRange, evaluate_loop
+    from ..foundation.progress import Steps
 
     fixed, moved = _loops(deck_name, _law(options), options["delay"], options["sample_time"])
-    names = ("amplitudes", "last", "inertias", "load_amplitude")
     if options["last"] is None:
         options["last"] = usual_last(fixed.plant)
     check_angles(0.0, options["last"])
-    asked = _Asked(**{name: options[name] for name in names}, gain=GAINS[options["law"]])
+    names = ("last", "amplitudes", "inertias", "load_amplitude")
+    over = LoopRange(**{name: options[name] for name in names})
     with Steps().step("evaluation of the loop"):
-        result = _evaluated(fixed, moved, asked)
+        result = evaluate_loop(fixed, moved, GAINS[options["law"]], over, translate=quickest())
     files = _written(result, out)
-    remarks = _remarks(deck_name, asked.last)
+    remarks = _remarks(deck_name, options["last"])
     warn(remarks)
     if as_json:
-        show_json(_content(result, files) | {"warnings": remarks})
+        show_json(result.content() | {"files": files, "warnings": remarks})
     else:
         _shown(result)
         for path in files:
             click.echo(f"written: {path}")
-    ctx.exit(1 if result.findings else 0)
+    ctx.exit(0 if result.stable else 1)
 
 
 def _remarks(deck_name: str, last: float) -> list[str]:
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..foundation.deck import load_deck
 
     return range_remarks(declare(load_deck(deck_name)), last=last)
 
 
 def _law(options: dict[str, Any]) -> dict[str, Any]:
     """Return what the controller is made of, as arguments of its function."""
-    from ..control import ScheduledTorque, TorqueGains
+    from ..feedback.control import ScheduledTorque, TorqueGains
 
     gains = {name: options[name] for name in _GAINS if options[name] is not None}
     if options["law"] == "scheduled":
@@ -177,12 +122,12 @@ def _loops(
     """Return the loop with the load fixed, and with the load moved; one observer and controller for both."""
     from ..components.assembly.deck_writer import declare
     from ..components.assembly.moved_load import with_moved_load
-    from ..control import encoder_loop, torque_controller
-    from ..deck import load_deck
+    from ..feedback.control import encoder_loop, torque_controller
+    from ..feedback.observer import CascadeGain, design_observer
+    from ..foundation.deck import load_deck
     from ..model import flatten
     from ..model.roles import measured_motion, series_spring
     from ..model.transform import with_outputs
-    from ..observer import CascadeGain, design_observer
 
     assembly = declare(load_deck(deck_name))
     plants = []
@@ -200,56 +145,9 @@ def _loops(
     return fixed, moved
 
 
-def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluation:
-    import numpy as np
-
-    from .. import control as ctl
-    from ..export import quickest
-    from ..model.roles import motor_of
-
-    translate = quickest()
-    reach = ctl.largest_torque(fixed.plant)
-    side = ctl.only_side(fixed.plant)
-    shares = (0.1, 0.3) if side else (0.2, 0.6)
-    amplitudes = asked.amplitudes or tuple(float(f"{share * reach:.2g}") for share in shares)
-    largest = [a * (side * (1.0 + _BIAS) or 1.0) for a in amplitudes]
-    inertia = fixed.plant.values[motor_of(fixed.plant)[1].inertia]
-    inertias = np.array(asked.inertias) if asked.inertias else inertia * np.geomspace(0.1, 1e3, 13)
-    frequencies = np.geomspace(*_FREQUENCIES)
-    angles = np.linspace(0.0, asked.last, 41)
-    responses = tuple(
-        ctl.sine_response(
-            fixed, amplitude=a, frequencies=frequencies, offset=side * _BIAS * a, translate=translate
-        )
-        for a in amplitudes
-    )
-    held = ctl.held_torque(fixed, largest, translate=translate)
-    gain = fixed.controller.values[asked.gain]
-    onsets = tuple(
-        ctl.onset_of_limit_cycling(
-            fixed, asked.gain, between=(0.1 * gain, 5.0 * gain), amplitude=a, translate=translate
-        )
-        for a in (largest if gain > 0.0 else ())
-    )
-    speed = fixed.controller.values["controller.speed_limit"]
-    line = ctl.saturation_line(fixed, frequencies, largest_angle=asked.last, speed_limit=speed)
-    margins = tuple(ctl.loop_margins(fixed, angles, opening=o) for o in (None, fixed.desired))
-    coupled = ctl.coupled_stability(
-        moved, angle=0.5 * asked.last, inertias=np.sort(inertias),
-        stiffnesses=np.array([0.0, *np.geomspace(0.1, 1e3, 12)]),
-    )  # fmt: skip
-    zero = ctl.zero_torque(moved, amplitude=asked.load_amplitude, frequencies=(0.5, 1.0, 2.0, 5.0, 9.0),
-                           translate=translate)  # fmt: skip
-    return _Evaluation(
-        replace(asked, amplitudes=amplitudes, inertias=tuple(inertias)), responses, held, onsets, line,
-        margins, ctl.output_impedance(moved, angles[::5]), coupled, zero,
-        ctl.torque_resolution(fixed, angles),
-    )  # fmt: skip
-
-
-def _written(result: _Evaluation, out: Path) -> list[Path]:
-    from .. import figures
-    from ..writing import make_folder, write_table
+def _written(result: LoopEvaluation, out: Path) -> list[Path]:
+    from ..foundation.text_files import make_folder
+    from ..presentation import figures
 
     make_folder(out)
     drawn = {
@@ -258,70 +156,13 @@ def _written(result: _Evaluation, out: Path) -> list[Path]:
         "margins": figures.margins_over_angle(result.margins),
         "coupled_stability": figures.coupled_stability_map(result.coupled),
     }
-    rows = [
-        [*(f"{x + 0.0:.9g}" for x in (r.amplitude, r.offset, f, db, phase, d, v.saturated)), str(v)]
-        for r in result.responses
-        for f, db, phase, d, v in zip(
-            r.frequency, r.decibel, r.phase_degrees, r.distortion, r.verdicts, strict=True
-        )
-    ]
-    units = {"amplitude": "N*m", "offset": "N*m", "frequency": "Hz", "magnitude": "dB", "phase": "deg",
-             "distortion": "1", "saturated": "1"}  # fmt: skip
-    heads = [*(f"{name} [{unit}]" for name, unit in units.items()), "verdict"]
-    write_table(out / "responses.csv", [heads, *rows])
-    return [*figures.write_figures(out, drawn), out / "responses.csv"]
+    return [*figures.write_figures(out, drawn), *result.write(out)]
 
 
-def _content(result: _Evaluation, files: list[Path]) -> dict[str, Any]:
-    linear = result.margins[0].linear
-    return {
-        "stable": not result.findings,
-        "findings": result.findings,
-        "responses": [
-            {
-                "amplitude_Nm": r.amplitude, "offset_Nm": r.offset, "frequency_Hz": _plain(r.frequency),
-                "magnitude_dB": _plain(r.decibel), "phase_deg": _plain(r.phase_degrees),
-                "saturated": _plain(r.saturated), "verdicts": [str(v) for v in r.verdicts],
-            }
-            for r in result.responses
-        ],
-        "onset": [
-            {"gain": o.gain, "amplitude_Nm": o.amplitude, "value": _number(o.value),
-             "linear": _number(o.linear), "words": str(o)}
-            for o in result.onsets
-        ],
-        "saturation_Nm": _plain(result.line.torque),
-        "margins": [
-            {"opening": m.opening, "gain_dB": _plain(m.gain), "phase_deg": _plain(m.phase),
-             "delay_s": _plain(m.delay)}
-            for m in result.margins
-        ],
-        "angle_rad": _plain(linear.angles), "mode": str(linear.mode),
-        "resolution_Nm": _plain(result.resolution),
-        "impedance": {"angle_rad": _plain(result.impedance.linear.angles),
-                      "active_from_Hz": _plain(result.impedance.first_active())},
-        "coupled": {"inertia_kgm2": _plain(result.coupled.inertias),
-                    "stiffness_Nm_rad": _plain(result.coupled.stiffnesses),
-                    "stable": result.coupled.stable.tolist()},
-        "zero_torque": {"frequency_Hz": _plain(result.zero.frequency), "rms_Nm": _plain(result.zero.rms),
-                        "energy_J": _plain(result.zero.energy)},
-        "files": files,
-    }  # fmt: skip
-
-
-def _number(value: float) -> float | str | None:
-    """Return a number that JSON can hold: nothing for what is none, a word for what is infinite."""
-    if math.isnan(value):
-        return None
-    return value + 0.0 if math.isfinite(value) else "infinite" if value > 0.0 else "minus infinite"
-
-
-def _plain(values: Any) -> list[float | str | None]:
-    return [_number(float(v)) for v in values]
-
-
-def _shown(result: _Evaluation) -> None:
+def _shown(result: LoopEvaluation) -> None:
     import numpy as np
+
+    from ..feedback.control.evaluation.whole_evaluation import BIAS
 
     rows = [
         [
@@ -339,7 +180,7 @@ def _shown(result: _Evaluation) -> None:
     heads = ("± N·m", "about N·m", "Hz", "dB", "degrees", "% at limit", "verdict")
     show_table("Desired to actual torque, simulated with counts", heads, rows)
     if any(r.offset for r in result.responses):
-        click.echo(f"the spring gives torque of one sign only: each sine swings about {_BIAS:g} amplitudes")
+        click.echo(f"the spring gives torque of one sign only: each sine swings about {BIAS:g} amplitudes")
     linear, torque = result.margins[0].linear, result.margins[0].linear.torque
     table = []
     for k in range(0, len(linear.angles), 5):
@@ -357,7 +198,7 @@ def _shown(result: _Evaluation) -> None:
         for f, t, e, v in zip(moved.frequency, moved.rms, moved.energy, moved.verdicts, strict=True)
     ]
     show_table("No torque wanted, load moved", ("Hz", "mN·m rms", "mJ lost per cycle", "verdict"), zero)
-    from ..figures.loop_evaluation import passivity_words
+    from ..presentation.figures.loop_evaluation import passivity_words
 
     for angle, first in zip(result.impedance.linear.angles, result.impedance.first_active(), strict=True):
         click.echo(f"impedance at {math.degrees(angle):.3g}°: {passivity_words(float(first))}")
@@ -366,16 +207,11 @@ def _shown(result: _Evaluation) -> None:
         f"coupled at {math.degrees(result.coupled.angle):.3g}°: stable on {int(np.sum(stable_loads))} of "
         f"{stable_loads.size} loads"
     )
-    for sentence in result.findings:
+    for sentence in result.findings():
         click.echo(f"finding: {sentence}")
-    if not result.findings:
+    if result.stable:
         for onset in result.onsets:
             click.echo(str(onset))
-
-
-def _sine(response: SineResponse) -> str:
-    about = f" about {response.offset:g} N·m" if response.offset else ""
-    return f"±{response.amplitude:g} N·m{about}"
 
 
 def _text(value: float) -> str:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import MeasurementError
-from ..writing import write_text
+from ..foundation.errors import MeasurementError
+from ..foundation.text_files import write_text
 from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, next_command, show_json, show_table
 from .overwriting import out_option
 
 if TYPE_CHECKING:
-    from ..calibration import CalibrationPlan, CalibrationRecords, CalibrationTest
+    from ..bench.calibration import CalibrationPlan, CalibrationRecords, CalibrationTest
     from ..components import Assembly
     from ..simulation import Prior
 
@@ -57,7 +57,7 @@ def calibrate(
     as_json: bool,
 ) -> None:
     """Turn an afternoon at the bench into smaller spreads in the deck, or plan that afternoon."""
-    from ..calibration import (
+    from ..bench.calibration import (
         calibrated,
         estimate,
         load_calibration,
@@ -67,8 +67,8 @@ def calibrate(
         write_calibration,
     )
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..progress import Steps
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
 
     if plan and folders:
         raise MeasurementError(
@@ -115,7 +115,7 @@ def calibrate(
 
 
 def _kind(name: str) -> CalibrationTest:
-    from ..calibration import FreeRunTest, HungWeightTest, LoadCellTest
+    from ..bench.calibration import FreeRunTest, HungWeightTest, LoadCellTest
 
     kinds: dict[str, CalibrationTest] = dict(
         zip(KINDS, (HungWeightTest(), LoadCellTest(), FreeRunTest()), strict=True)
@@ -125,9 +125,9 @@ def _kind(name: str) -> CalibrationTest:
 
 def _while_running(actuator: Assembly) -> dict[str, Callable[[Prior], float]]:
     """Return the least error of the torque that any observer could have, where there is one to observe."""
-    from ..errors import ArrangementError, ValueRangeError
+    from ..feedback.observer import least_torque_error, observer_bench
+    from ..foundation.errors import ArrangementError, ValueRangeError
     from ..model import flatten
-    from ..observer import least_torque_error, observer_bench
 
     try:
         least = least_torque_error(observer_bench(flatten(actuator)))

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import out_option
 
 if TYPE_CHECKING:
-    from ..report import ComparedResult
+    from ..presentation.report import ComparedResult
 
 _SOURCES = ("design", "verdict")
 
@@ -36,8 +36,8 @@ def compare(results: tuple[Path, ...], out: Path, as_json: bool) -> None:
     """
     if len(results) < 2:
         raise click.UsageError("one result cannot be compared; name two folders or more")
-    from ..report import differing_numbers, key_figures, write_comparison
-    from ..writing import write_text
+    from ..foundation.text_files import write_text
+    from ..presentation.report import differing_numbers, key_figures, write_comparison
 
     labels = _labels(results)
     compared = [_read(path, label) for path, label in zip(results, labels, strict=True)]
@@ -71,9 +71,9 @@ def _labels(paths: tuple[Path, ...]) -> list[str]:
 def _read(path: Path, label: str) -> ComparedResult:
     """Read a folder or a deck."""
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..foundation.deck import load_deck
     from ..model import flatten
-    from ..report import ComparedResult
+    from ..presentation.report import ComparedResult
 
     if path.suffix == ".toml":
         deck, contents = path, {}

@@ -9,8 +9,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem, ShellComplete, get_completion_class
 
-from ..deck import deck_names
-from ..locations import folder
+from ..foundation.deck import deck_names
+from ..foundation.locations import folder
 from .output import examples, json_option, show_json
 
 INSTALL = {
@@ -73,13 +73,7 @@ _NAMES: dict[str, tuple[Callable[[], list[str]], bool]] = {
 
 
 def complete_names(program: click.Group) -> None:
-    """Let all parameters of a program that take the name of a deck, material, study or template complete it.
-
-    Parameters
-    ----------
-    program
-        With all its commands.
-    """
+    """Complete the names of decks, materials, studies and templates in all parameters of a program."""
     for command in _commands(program):
         for parameter in command.params:
             kind = (parameter.metavar or "").strip("[]")

@@ -40,13 +40,7 @@ _VELOCITY_BANDWIDTH = click.option(
 
 
 def law_options(command: F) -> F:
-    """Add the options that choose the law of a torque controller.
-
-    Parameters
-    ----------
-    command
-        Takes ``law``, ``bandwidth`` and ``velocity_bandwidth``.
-    """
+    """Add the options that choose the law of a torque controller."""
     return _LAW(_BANDWIDTH(_VELOCITY_BANDWIDTH(command)))
 
 
@@ -58,22 +52,8 @@ def controller_of(
     bandwidth: float | None,
     velocity_bandwidth: float | None,
 ) -> FlatModel:
-    """Return the torque controller that the options of a command ask for.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    sample_time
-        In s.
-    law
-        ``"scheduled"`` or ``"pid"``.
-    bandwidth
-        Of the scheduled law in Hz.
-    velocity_bandwidth
-        Of the velocity loop in Hz.
-    """
-    from ..control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
+    """Return the torque controller that the options of a command ask for."""
+    from ..feedback.control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
 
     if law == "pid" and bandwidth is not None:
         raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
@@ -106,9 +86,9 @@ def export_controller(
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
     from ..components.assembly.deck_writer import declare
-    from ..control import largest_torque
-    from ..deck import load_deck
     from ..export import export_c, export_fmu
+    from ..feedback.control import largest_torque
+    from ..foundation.deck import load_deck
     from ..model import flatten
 
     declared = declare(load_deck(deck_name))

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..errors import ValueRangeError, unknown_name
-from ..quantity import Quantity, quantity, typeset_unit
+from ..foundation.errors import ValueRangeError, unknown_name
+from ..foundation.quantity import Quantity, quantity, typeset_unit
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import out_file_option
@@ -21,7 +21,7 @@ from .units import Number, parse_number
 if TYPE_CHECKING:
     from ..export import Convergence, CoSimulation, FmuSystem, SamplesOf, Stepping, Wire
     from ..export.cosimulation.coupling import Coupling
-    from ..progress import Progress
+    from ..foundation.progress import Progress
     from ..simulation import Sine
 
 T = TypeVar("T")
@@ -89,7 +89,7 @@ def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **
     import tempfile
 
     from ..export import convergence
-    from ..progress import Steps
+    from ..foundation.progress import Steps
 
     _check_out(out, [*given["fmus"], *([str(given["system"])] if given.get("system") else [])])
     steps = Steps()
@@ -227,22 +227,7 @@ def _show(
 
 
 def pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
-    """Return what ``NAME=VALUE`` options give, by name.
-
-    Parameters
-    ----------
-    option
-        Its name, for messages.
-    given
-        What was written.
-    read
-        Reads a value.
-
-    Raises
-    ------
-    ValueRangeError
-        If one is not ``NAME=VALUE``, is given twice, or its value cannot be read.
-    """
+    """Return what ``NAME=VALUE`` options give, by name."""
     values: dict[str, T] = {}
     for text in given:
         name, sign, value = (part.strip() for part in text.partition("="))
@@ -259,18 +244,7 @@ def pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict
 
 
 def read_wire(text: str) -> Wire:
-    """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``.
-
-    Parameters
-    ----------
-    text
-        What was written.
-
-    Raises
-    ------
-    ValueRangeError
-        If it cannot be read so.
-    """
+    """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``."""
     from ..export import SamplesOf, Wire
 
     late = text.startswith(_LATE)

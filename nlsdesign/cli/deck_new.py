@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ExportError, NlsError, UnitError, nearest, unknown_name
-from ..quantity import Quantity, same_dimension, typeset_unit
-from ..writing import write_text
+from ..foundation.errors import ExportError, NlsError, UnitError, nearest, unknown_name
+from ..foundation.quantity import Quantity, same_dimension, typeset_unit
+from ..foundation.text_files import write_text
 from .output import examples, json_option, next_command, show_json
 from .readiness import shown_command
 from .units import parse_number, split_number
@@ -57,7 +57,7 @@ def new(
     from ..components.assembly.deck_remarks import deck_remarks
     from ..components.assembly.deck_template import load_template, motor_inertia, plain_name
     from ..components.assembly.deck_writer import declare
-    from ..deck import read_deck, template_names
+    from ..foundation.deck import read_deck, template_names
 
     if path.endswith(("/", os.sep)) or not Path(path).name.strip("."):
         raise click.BadParameter(f"'{path}' is no name of a file, for instance leg.toml")
@@ -96,20 +96,7 @@ def on_terminal() -> bool:
 
 
 def refuse_to_replace(file: Path, force: bool) -> None:
-    """Refuse to write over a file that is there, unless that is asked for.
-
-    Parameters
-    ----------
-    file
-        To write.
-    force
-        Whether it may be replaced.
-
-    Raises
-    ------
-    ExportError
-        If the file is there, or its name is too long for a file.
-    """
+    """Refuse to write over a file that is there, unless that is asked for."""
     try:
         there = file.exists()
     except OSError as error:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..deck import deck_names, load_deck, template_names
-from ..errors import NlsError
-from ..locations import bundled
-from ..quantity import Quantity, sources, with_unit
-from ..writing import write_text
+from ..foundation.deck import deck_names, load_deck, template_names
+from ..foundation.errors import NlsError
+from ..foundation.locations import bundled
+from ..foundation.quantity import Quantity, sources, with_unit
+from ..foundation.text_files import write_text
 from .deck_new import force_option, new, refuse_to_replace
 from .named_paths import NamedPath
 from .output import examples, json_option, line_width, next_command, show_json, show_table

@@ -18,15 +18,7 @@ _MARKED = re.compile(r":\w+:`~?([^`]+)`")
 
 
 def show_kinds(what: str, as_json: bool) -> None:
-    """Print the targets, limits or goals that a design file can name.
-
-    Parameters
-    ----------
-    what
-        One of :data:`KINDS`.
-    as_json
-        Whether JSON is printed.
-    """
+    """Print the targets, limits or goals that a design file can name."""
     known = design_kinds(what)
     if as_json:
         show_json(known)
@@ -46,13 +38,7 @@ def show_kinds(what: str, as_json: bool) -> None:
 
 
 def design_kinds(what: str) -> dict[str, dict[str, Any]]:
-    """Return meaning and fields of what a design file can name, by name.
-
-    Parameters
-    ----------
-    what
-        One of :data:`KINDS`.
-    """
+    """Return meaning and fields of what a design file can name, by name."""
     from ..design import Goal, Limit, Target, TaskTarget
     from ..design.jobs.job_file import kinds
 

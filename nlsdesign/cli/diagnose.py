@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..command_words import typed_command
+from ..foundation.command_words import typed_command
 from .exported_machine import MACHINE, export_machine, export_option
 from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, measured_option, show_json, spring_option
@@ -22,11 +22,11 @@ from .units import Number
 from .workers import workers_option
 
 if TYPE_CHECKING:
-    from ..discrepancy import Verdict
-    from ..identification import RecordSet
+    from ..bench.discrepancy import Verdict
+    from ..bench.identification import RecordSet
     from ..model import FlatModel
+    from ..presentation.report.sections import Section
     from ..regeneration import Regeneration
-    from ..report.sections import Section
 
 _file = NamedPath(dir_okay=False)
 _mapping = click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
@@ -70,17 +70,22 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @json_option
 def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
+    from ..bench.discrepancy import (
+        DiagnosisRun,
+        records_of_run,
+        with_records_named,
+        write_command,
+        write_verdict,
+    )
+    from ..bench.discrepancy import diagnose as find_what_is_missing
+    from ..bench.identification import load_records
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..discrepancy import DiagnosisRun, records_of_run, with_records_named, write_command, write_verdict
-    from ..discrepancy import diagnose as find_what_is_missing
-    from ..identification import load_records
-    from ..locations import version
+    from ..foundation.deck import load_deck
+    from ..foundation.locations import version
+    from ..foundation.progress import Steps
+    from ..foundation.text_files import discard, make_folder
     from ..model import flatten
-    from ..progress import Steps
-    from ..report import verdict_sections, write_report
-    from ..writing import make_folder
-    from ..written_files import discard
+    from ..presentation.report import verdict_sections, write_report
 
     command = typed_command("nlsdesign", *sys.argv[1:])
     date = datetime.now().astimezone().isoformat(" ", "minutes")
@@ -136,8 +141,8 @@ def _chosen(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def _ranges_left(verdict: Verdict, measured: RecordSet) -> list[str]:
     """Return which laws of the better model the records take out of their stated range."""
-    from ..discrepancy import ranges_left
-    from ..errors import NlsError
+    from ..bench.discrepancy import ranges_left
+    from ..foundation.errors import NlsError
 
     try:
         left = ranges_left(verdict.actuator, measured)
@@ -160,9 +165,9 @@ def _regenerated(
 
 def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list[Section]]:
     """Write the observer of the better model; return data, text and sections on it."""
+    from ..foundation.text_files import write_text
+    from ..presentation.report import regeneration_sections
     from ..regeneration import write_regeneration
-    from ..report import regeneration_sections
-    from ..writing import write_text
 
     files, lacking = write_regeneration(result, out)
     result = replace(result, reasons=(*result.reasons, *lacking))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from ..errors import unknown_name
-from ..locations import folder
+from ..foundation.errors import unknown_name
+from ..foundation.locations import folder
 from .output import examples, json_option, show_json
 
 _SITE = "site"

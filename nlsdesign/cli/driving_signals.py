@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import MeasurementError, NlsError, UnitError, ValueRangeError, nearest
-from ..quantity import parse_unit, same_dimension, typeset_unit, with_unit
-from ..written_numbers import name_and_unit
+from ..foundation.errors import MeasurementError, NlsError, UnitError, ValueRangeError, nearest
+from ..foundation.quantity import parse_unit, same_dimension, typeset_unit, with_unit
+from ..foundation.written_numbers import name_and_unit
 from .units import split_number
 
 if TYPE_CHECKING:
@@ -43,33 +43,14 @@ class StepAt:
     begin: float
 
     def __call__(self, time: float) -> float:
-        """Return the value at a time.
-
-        Parameters
-        ----------
-        time
-            In s.
-        """
+        """Return the value at a time."""
         return self.size if time >= self.begin else 0.0
 
 
 def read_driving_signal(text: str, unit: str) -> Sine | StepAt:
     """Read a constant, a sine or a step.
 
-    Parameters
-    ----------
-    text
-        For instance ``"2 A"``, ``"2 A sine 5 Hz"``, ``"2@5"``, ``"1 A + 2 A sine 5 Hz"``,
-        ``"2 A step 0.1 s"``.
-    unit
-        Of the input; a number without a unit is in it.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is none of these, or a number is not finite.
-    UnitError
-        If a number measures something else.
+    ``unit``: of the input; a number without a unit is in it.
     """
     from ..simulation import Sine
 
@@ -92,22 +73,7 @@ def read_driving_signal(text: str, unit: str) -> Sine | StepAt:
 
 
 def size_in(text: str, unit: str) -> float:
-    """Return a number in SI; without a unit it is taken to be in that of the model.
-
-    Parameters
-    ----------
-    text
-        Number, with a unit or without.
-    unit
-        SI unit in the model.
-
-    Raises
-    ------
-    UnitError
-        If it does not begin with a number, or measures something else.
-    ValueRangeError
-        If it is not finite.
-    """
+    """Return a number in SI; without a unit it is taken to be in that of the model."""
     try:
         number, given = split_number(text)
     except UnitError as error:
@@ -127,20 +93,7 @@ def size_in(text: str, unit: str) -> float:
 
 
 def read_pairs(option: str, given: Sequence[str]) -> dict[str, str]:
-    """Return what ``NAME=TEXT`` options give, by name.
-
-    Parameters
-    ----------
-    option
-        Its name, for messages.
-    given
-        What was written.
-
-    Raises
-    ------
-    ValueRangeError
-        If one is not ``NAME=TEXT``, or a name is given twice.
-    """
+    """Return what ``NAME=TEXT`` options give, by name."""
     pairs: dict[str, str] = {}
     for each in given:
         name, sign, text = (part.strip() for part in each.partition("="))
@@ -153,20 +106,7 @@ def read_pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 
 
 def read_inputs(model: FlatModel, given: Sequence[str]) -> dict[str, Sine | StepAt]:
-    """Return the inputs that are typed, and the speeds that follow from prescribed motions.
-
-    Parameters
-    ----------
-    model
-        Flat model with the inputs.
-    given
-        As ``NAME=SIGNAL``.
-
-    Raises
-    ------
-    NlsError
-        If an input does not exist, or a signal cannot be read.
-    """
+    """Return the inputs that are typed, and the speeds that follow from prescribed motions."""
     units = {v.name: v.unit for v in model.inputs}
     inputs: dict[str, Sine | StepAt] = {}
     for name, text in read_pairs("--input", given).items():
@@ -184,19 +124,7 @@ def check_rows(inputs: Mapping[str, Any], stop: float, step: float) -> None:
     The machine is driven by the sine itself, but table, picture and sizes know the rows alone: with fewer
     than four to a period they show another signal.
 
-    Parameters
-    ----------
-    inputs
-        By name; what is neither sine nor step is passed over.
-    stop
-        End of the run in s.
-    step
-        Between two rows in s.
-
-    Raises
-    ------
-    ValueRangeError
-        If a period has fewer than four rows, or a step begins at the end or later.
+    ``inputs``: by name; what is neither sine nor step is passed over.
     """
     from ..simulation import Sine
 
@@ -252,23 +180,10 @@ def read_input_file(file: Path, model: FlatModel) -> tuple[Any, dict[str, Any]]:
     """Return the times of a file in s, from zero, and the inputs among its columns in SI.
 
     Heads are ``time [s]`` and ``name [unit]``, as a simulation writes them; other columns are passed over.
-
-    Parameters
-    ----------
-    file
-        CSV.
-    model
-        Flat model with the inputs.
-
-    Raises
-    ------
-    MeasurementError
-        If the file cannot be read, has no time that ascends or no column of an input, or a unit does not fit.
     """
     import numpy as np
 
-    from ..identification.records.csv_files import read_csv
-    from ..identification.records.heads import heads_with_units, times_among
+    from ..bench.identification.records.csv_files import heads_with_units, read_csv, times_among
 
     try:
         table = read_csv(file)

@@ -79,10 +79,10 @@ def export_code(
     The observer is by default the one that is best over the spread of the deck.
     """
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
     from ..export import export_c, write_examples
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..progress import Steps
 
     declared = declare(load_deck(deck_name))
     plant = flatten(declared)
@@ -101,19 +101,7 @@ def export_code(
 def sampled_part(
     plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]
 ) -> tuple[str, FlatModel, tuple[str, ...]]:
-    """Return what a controller runs, what its files are called, and what is to be known of its size.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    what
-        ``"observer"``, ``"controller"`` or ``"both"``.
-    sample_time
-        In s.
-    chosen
-        Options of observer, law and size by name.
-    """
+    """Return what a controller runs, what its files are called, and what is to be known of its size."""
     law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
     others = {name: value for name, value in chosen.items() if name not in law}
     if what == CONTROLLER:
@@ -124,7 +112,7 @@ def sampled_part(
     if what == OBSERVER:
         sized = sized_observer(plant, sample_time, **others)
         return OBSERVER, sized.designed.model, sized.sentences
-    from ..control import joined
+    from ..feedback.control import joined
 
     controller = controller_of(plant, sample_time, **law)
     sized = sized_observer(plant, sample_time, part_of=lambda each: joined(each, controller), **others)

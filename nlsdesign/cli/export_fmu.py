@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .controller import controller_of, law_options
 from .observer import sample_time_option
-from .observer_kinds import kind_option, observer_of
+from .observer_kinds import kind_option
 from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import out_option
 from .range_remarks import range_remarks, warn
@@ -34,7 +34,7 @@ class _Models:
     """The models of a deck, each designed once and only when it is asked for."""
 
     def __init__(
-        self, plant: FlatModel, sample_time: float, chosen: dict[str, str | None], law: dict[str, Any]
+        self, plant: FlatModel, sample_time: float, chosen: dict[str, Any], law: dict[str, Any]
     ) -> None:
         self.plant, self.sample_time, self.chosen, self.law = plant, sample_time, chosen, law
         self._made: dict[str, FlatModel] = {"plant": plant}
@@ -42,18 +42,23 @@ class _Models:
     def __getitem__(self, what: str) -> FlatModel:
         if what not in self._made:
             makers: dict[str, Callable[[], FlatModel]] = {
-                "observer": lambda: observer_of(self.plant, self.sample_time, **self.chosen),
+                "observer": self._observer,
                 "controller": self._controller,
                 "both": self._both,
             }
             self._made[what] = makers[what]()
         return self._made[what]
 
+    def _observer(self) -> FlatModel:
+        from ..feedback.observer import designed_observer
+
+        return designed_observer(self.plant, sample_time=self.sample_time, **self.chosen).model
+
     def _controller(self) -> FlatModel:
         return controller_of(self.plant, self.sample_time, **self.law)
 
     def _both(self) -> FlatModel:
-        from ..control import joined
+        from ..feedback.control import joined
 
         return joined(self["observer"], self["controller"])
 
@@ -143,10 +148,10 @@ def export_fmus(
 ) -> None:
     """Write plant, torque observer, torque controller, and observer with controller in one, as FMUs."""
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
     from ..export import Authorship
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..progress import Steps
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
     law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}

@@ -37,8 +37,8 @@ def export_modelica_text(
     """
     from ..components import smoothed
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
     from ..export import export_modelica
+    from ..foundation.deck import load_deck
     from ..model import flatten
 
     assembly = declare(load_deck(deck_name))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .controller import controller_of
-from .observer_kinds import observer_of
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -56,25 +55,18 @@ def export_machine(
 
     What fails leaves the others.
 
-    Parameters
-    ----------
-    plant
-        Flat model of a deck; all files name it.
-    out
-        Folder; C stands in ``c``.
-    sample_time
-        Of observer and controller, in s.
-    observer
-        Of the plant; by default the one that errs least over the spread of the deck.
-    spring, measured
-        Where the structure of the plant leaves them open.
+    ``plant``: flat model of a deck; all files name it. ``out``: folder; C stands in ``c``. ``observer``: of
+    the plant; by default the one that errs least over the spread of the deck.
     """
-    from ..control import joined
     from ..export import export_c, export_fmu
+    from ..feedback.control import joined
+    from ..feedback.observer import designed_observer
 
     @cache
     def observing() -> FlatModel:
-        return observer or observer_of(plant, sample_time, spring=spring, measured=measured)
+        if observer is not None:
+            return observer
+        return designed_observer(plant, sample_time=sample_time, spring=spring, measured=measured).model
 
     @cache
     def controlling() -> FlatModel:

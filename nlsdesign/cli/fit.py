@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from ..quantity import typeset_unit
+from ..foundation.quantity import typeset_unit
 from .exported_machine import MACHINE, ExportedMachine, export_machine, export_option
 from .named_paths import NamedPath
 from .observer import sample_time_option
@@ -58,13 +58,13 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @json_option
 def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
+    from ..bench.discrepancy import refit, with_records_named, write_refit
+    from ..bench.identification import load_records
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..discrepancy import refit, with_records_named, write_refit
-    from ..identification import load_records
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..progress import Steps
-    from ..report import write_fit_report
+    from ..presentation.report import write_fit_report
 
     actuator = declare(load_deck(deck_name))
     mapping, hold_out = options["mapping"], options["hold_out"]

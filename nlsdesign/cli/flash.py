@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..errors import ExportError, ValueRangeError
-from ..prefixes import prefixed
-from ..quantity import typeset_unit
-from .observer_kinds import DesignedObserver, designed_observer
+from ..foundation.errors import ExportError, ValueRangeError
+from ..foundation.quantity import typeset_unit
+from ..foundation.written_numbers import prefixed
 from .units import Bytes, Number
 
 if TYPE_CHECKING:
+    from ..feedback.observer import DesignedObserver, GridByTorqueError
+    from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
     from ..model import FlatModel
-    from ..observer import GridByTorqueError
-    from ..observer.scheduling.torque_grid import TableTooLargeError
 
 ATTEMPTS = 3
 """Designs until code and table together keep a size; a coarser table changes the code a little."""
@@ -27,13 +26,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def flash_options(command: F) -> F:
-    """Add ``--flash`` and ``--table-error``.
-
-    Parameters
-    ----------
-    command
-        A command that writes an observer.
-    """
+    """Add ``--flash`` and ``--table-error``."""
     command = click.option(
         "--flash", type=Bytes(), metavar="SIZE",
         help="Most flash of code and tables on a Cortex-M4F, for instance 16kB; the table is made coarser "
@@ -95,31 +88,10 @@ def sized_observer(
 ) -> SizedObserver:
     """Design an observer whose code and tables keep a size.
 
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    sample_time
-        In s.
-    real
-        ``"double"`` or ``"float"``.
-    flash
-        Most bytes on a Cortex-M4F.
-    table_error
-        Torque error that the table may cause, in the unit of the estimate.
-    part_of
-        Makes what is exported of the observer; by default that is the observer alone.
-    chosen
-        Kind, spring and measured state, as for :func:`~nlsdesign.cli.observer_kinds.designed_observer`.
-
-    Raises
-    ------
-    ValueRangeError
-        If the size cannot be met, with what it would cost and the smallest that can be met.
-    ExportError
-        If a size is asked for and no compiler is installed.
+    ``part_of``: makes what is exported of the observer; by default that is the observer alone.
     """
-    from ..observer.scheduling.torque_grid import TableTooLargeError
+    from ..feedback.observer import designed_observer
+    from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
 
     each = 4 if real == "float" else 8
     grid = _grid(plant, table_error, each, None)
@@ -152,22 +124,7 @@ def sized_observer(
 
 
 def controller_size(controller: FlatModel, real: str, flash: int | None) -> tuple[str, ...]:
-    """Return what is to be known of the size of a controller.
-
-    Parameters
-    ----------
-    controller
-        Discrete.
-    real
-        ``"double"`` or ``"float"``.
-    flash
-        Most bytes on a Cortex-M4F.
-
-    Raises
-    ------
-    ValueRangeError
-        If the code takes more.
-    """
+    """Return what is to be known of the size of a controller."""
     size = _measured(controller, real, needed=flash is not None)
     if size is None:
         return ("the flash of the code was not measured: no compiler",)
@@ -190,7 +147,7 @@ def _refused(flash: int, code: int, error: TableTooLargeError) -> ValueRangeErro
 
 
 def _grid(plant: FlatModel, error: float | None, each: int, most: int | None) -> GridByTorqueError:
-    from ..observer.scheduling.scheduled import whole_contour
+    from ..feedback.observer.scheduling.scheduled import whole_contour
 
     return replace(whole_contour(plant), torque_error=error, bytes_per_number=each, most_bytes=most)
 
@@ -204,8 +161,8 @@ def _sized(designed: DesignedObserver, exported: FlatModel, real: str, *, needed
 def _measured(exported: FlatModel, real: str, *, needed: bool) -> int | None:
     """Return the flash of code and tables in bytes."""
     from ..export import export_c
-    from ..export.target.cross_build import controller_sizes
-    from ..export.target.processors import CORTEX_M4F
+    from ..export.compilation.processors import CORTEX_M4F
+    from ..export.compilation.target_build import controller_sizes
 
     with tempfile.TemporaryDirectory() as folder:
         source = export_c(exported, Path(folder), real=real, name="part")

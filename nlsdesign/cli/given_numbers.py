@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..errors import NlsError, UnitError, unknown_name
-from ..quantity import Quantity, parse_unit, quantity, typeset_unit, with_unit
+from ..foundation.errors import NlsError, UnitError, unknown_name
+from ..foundation.quantity import Quantity, parse_unit, quantity, typeset_unit, with_unit
 from .driving_signals import read_pairs, size_in
 from .units import split_number
 
@@ -19,22 +19,7 @@ BARE = "A number without a unit is in that of the model (rad, N·m, kg·m²), as
 
 
 def with_given_values(actuator: Assembly, given: Sequence[str]) -> tuple[Assembly, dict[str, str]]:
-    """Return the machine with other numbers, and in words what was taken, by name.
-
-    Parameters
-    ----------
-    actuator
-        As its deck declares it.
-    given
-        As ``NAME=NUMBER``.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such number.
-    NlsError
-        If it cannot be read, or is refused by its part.
-    """
+    """Return the machine with other numbers, and in words what was taken, by name."""
     declared, taken = actuator.quantities(), dict[str, str]()
     for name, text in read_pairs("--value", given).items():
         if name not in declared:
@@ -68,22 +53,7 @@ def _value(text: str, declared: Quantity) -> Quantity:
 
 
 def given_start(model: FlatModel, given: Sequence[str]) -> tuple[dict[str, float], dict[str, str]]:
-    """Return the states at the begin in SI, and in words what was taken, by name.
-
-    Parameters
-    ----------
-    model
-        Flat model with the states.
-    given
-        As ``STATE=NUMBER``.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such state.
-    NlsError
-        If a number cannot be read.
-    """
+    """Return the states at the begin in SI, and in words what was taken, by name."""
     units = {v.name: v.unit for v in model.states}
     start: dict[str, float] = {}
     for name, text in read_pairs("--initial", given).items():
@@ -97,13 +67,7 @@ def given_start(model: FlatModel, given: Sequence[str]) -> tuple[dict[str, float
 
 
 def given_words(values: Mapping[str, str], start: Mapping[str, str]) -> list[str]:
-    """Return a line for each number that was taken from the command line.
-
-    Parameters
-    ----------
-    values, start
-        In words by name.
-    """
+    """Return a line for each number that was taken from the command line."""
     return [f"with {name} = {words}" for name, words in values.items()] + [
         f"begins at {name} = {words}" for name, words in start.items()
     ]

@@ -7,8 +7,8 @@ import sys
 
 import click
 
-from ..errors import NlsError, nearest
-from ..locations import version
+from ..foundation.errors import NlsError, nearest
+from ..foundation.locations import version
 from .analyse import analyse
 from .analyse_angle import analyse_angle
 from .analyse_loop import loop
@@ -58,7 +58,7 @@ from .unexpected import BROKEN_PIPE
 def program(context: click.Context, packages: tuple[str, ...]) -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
     if packages:
-        from ..extensions import extended_by, load_extension
+        from ..foundation.extensions import extended_by, load_extension
 
         context.with_resource(extended_by(*(load_extension(name) for name in packages)))
 

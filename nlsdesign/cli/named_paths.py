@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 
 if TYPE_CHECKING:
     _Kind = click.Path[Path]
@@ -41,13 +41,7 @@ class NamedPath(_Kind):
     def convert(
         self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
     ) -> Path:
-        """Return the path.
-
-        Raises
-        ------
-        ValueRangeError
-            If the name is empty or blank.
-        """
+        """Return the path."""
         if not os.fspath(value).strip():
             raise self._nameless(str(value), param)
         path: Path = super().convert(value, param, ctx)

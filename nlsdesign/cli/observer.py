@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from .observer_certificate import CERTIFICATE, range_options
-from .observer_kinds import CASCADE, CERTIFIED, designed_observer, kind_option
+from .observer_certificate import CERTIFICATE, given_ranges, range_options
+from .observer_kinds import CASCADE, CERTIFIED, kind_option
 from .output import DECK_HELP, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
 from .range_remarks import range_remarks, warn
 from .units import Number
-
-if TYPE_CHECKING:
-    from .observer_certificate import ToProve
 
 sample_time_option = click.option(
     "--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
@@ -77,13 +74,12 @@ def observer(
     if deck_name is None:
         raise click.MissingParameter(ctx=context, param_type="option", param_hint="'--deck'")
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..export import export_c
+    from ..export import export_c, quickest
+    from ..feedback.observer import certified_design, designed_observer, errors_beside
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..observer import certified_design
-    from ..progress import Steps
-    from .observer_certificate import prove, with_statement, write_proved
-    from .observer_spread import content_of, show_errors, spread_errors, write_errors
+    from .observer_spread import show_errors, write_errors
 
     drawn = context.get_parameter_source("draws") is not click.core.ParameterSource.DEFAULT
     if drawn and not options["with_errors"]:
@@ -97,16 +93,19 @@ def observer(
     steps = Steps()
     with steps.step("observer"):
         chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
-        proved = None if wanted is None else prove(plant, deck, chosen, wanted)
+        text = (deck.name, deck.path.read_text(encoding="utf-8-sig"))
+        proved = None if wanted is None else chosen.certify(plant, deck=text, **wanted)
     errors = None
     if options["with_errors"]:
         with steps.step("errors over the spread"):
-            errors = spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
-    model = chosen.model if proved is None else with_statement(certified_design(proved, plant).model, proved)
+            errors = errors_beside(
+                plant, chosen, draws=options["draws"], sample_time=sample_time, translate=quickest(), **roles
+            )
+    model = chosen.model if proved is None else proved.stated(certified_design(proved, plant).model)
     source = export_c(model, out, real=real, name="observer")
     files = [source.header, source.source, source.selftest]
     if proved is not None:
-        files.insert(0, write_proved(proved, out, source))
+        files.insert(0, proved.write_beside(source.header, source.source))
     statement = () if proved is None else proved.statement
     remarks = range_remarks(declared, measured=options["measured"])
     warn(remarks)
@@ -119,7 +118,7 @@ def observer(
             "description": model.description, "statement": list(statement),
             "certified": proved is not None, "warnings": remarks, "files": files,
         }  # fmt: skip
-        show_json(content | ({} if errors is None else {"errors": content_of(errors)}))
+        show_json(content | ({} if errors is None else {"errors": errors.content()}))
         return
     for sentence in words:
         click.echo(sentence)
@@ -132,10 +131,10 @@ def observer(
     click.echo(f"written: {', '.join(map(str, files))}")
 
 
-def _what_is_asked(context: click.Context, options: dict[str, Any]) -> tuple[str | None, ToProve | None]:
+def _what_is_asked(
+    context: click.Context, options: dict[str, Any]
+) -> tuple[str | None, dict[str, Any] | None]:
     """Return the kind of observer, and what is to be proved of it; nothing by default."""
-    from .observer_certificate import ToProve, given_ranges
-
     ranges = given_ranges(options)
     kind, decay, with_spread = options["kind"], options["decay"], options["with_spread"]
     if not (options["certified"] or kind == CERTIFIED):
@@ -151,7 +150,7 @@ def _what_is_asked(context: click.Context, options: dict[str, Any]) -> tuple[str
     if decay is not None and kind == CASCADE:
         raise click.UsageError(f"--decay belongs to --kind {CERTIFIED}", ctx=context)
     kind = kind or (CASCADE if decay is None else CERTIFIED)
-    return kind, ToProve(decay, with_spread, options["real"], ranges)
+    return kind, {"decay": decay, "with_spread": with_spread, "real": options["real"], "ranges": ranges}
 
 
 def _refuse_misplaced(context: click.Context) -> None:

@@ -4,36 +4,23 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from ..errors import ArrangementError
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json
 from .units import Number
 
-if TYPE_CHECKING:
-    from ..deck import Deck
-    from ..export import CSource
-    from ..model import FlatModel
-    from ..observer import AdaptiveDesign, Certificate, HeldEstimateCertificate
-    from ..observer.certificates import Proof
-    from ..observer.certificates.verification import WritesCode
-    from .observer_kinds import DesignedObserver
-
 CERTIFICATE = "certificate.json"
+"""File that is announced; the library is not loaded for it."""
 
 
 def range_options(command: Any) -> Any:
     """Add the options for the ranges over which a bound on the torque is to hold.
 
-    Parameters
-    ----------
-    command
-        Gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
+    ``command``: gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
     """
     for option in (
         click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
@@ -47,144 +34,9 @@ def range_options(command: Any) -> Any:
 
 
 def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ranges that were given.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    """
+    """Return the ranges that were given."""
     named = {name: options[name] for name in ("angles", "speed", "angle_error")}
     return {name: value for name, value in named.items() if value is not None}
-
-
-@dataclass(frozen=True)
-class ToProve:
-    """What is to be proved of an observer.
-
-    Parameters
-    ----------
-    decay
-        Of one certified gain in 1/s; the default gain is certified without it.
-    with_spread
-        Whether parameters may be anywhere within their spread.
-    real
-        ``"double"`` or ``"float"``.
-    ranges
-        Angles, speed and error of the angle by name, where they are not those that the deck declares.
-    """
-
-    decay: float | None
-    with_spread: bool
-    real: str
-    ranges: Mapping[str, Any] = field(default_factory=dict)
-
-
-def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve) -> Certificate:
-    """Prove what can be proved of an observer.
-
-    Parameters
-    ----------
-    plant, deck
-        Flat model of an actuator, and its deck.
-    chosen
-        Cascade or certified gain.
-    wanted
-        What is to be proved.
-
-    Raises
-    ------
-    ArrangementError
-        If observers of that kind cannot be certified.
-    """
-    from ..observer import ObserverDesign, certify, declared_assumptions
-
-    design = chosen.design
-    if not isinstance(design, ObserverDesign):
-        raise ArrangementError(
-            f"observer of kind '{chosen.kind}'", "cannot be certified", next_step="take --kind certified"
-        )
-    spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if wanted.with_spread else {}
-    assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=wanted.real, **wanted.ranges)
-    text = deck.path.read_text(encoding="utf-8-sig")
-    return certify(plant, design, assumptions=assumed, decay=wanted.decay, deck=(deck.name, text))
-
-
-def with_statement(observer: FlatModel, proved: Proof) -> FlatModel:
-    """Return an observer whose description, and so the head of its C code, ends with what is proved.
-
-    Parameters
-    ----------
-    observer
-        As designed.
-    proved
-        Its certificate.
-    """
-    words = " ".join(proved.statement)
-    return replace(observer, description=f"{observer.description}; certified, see {CERTIFICATE}: {words}")
-
-
-def write_proved(proved: Certificate | HeldEstimateCertificate, out: Path, source: CSource) -> Path:
-    """Write the certificate beside the C code, with the hashes of both files.
-
-    Parameters
-    ----------
-    proved
-        Without the hashes.
-    out
-        Folder.
-    source
-        The C code.
-    """
-    from ..observer import write_certificate
-
-    return write_certificate(replace(proved, code=_hashes(source.header, source.source)), out / CERTIFICATE)
-
-
-def _hashes(*files: Path) -> dict[str, str]:
-    from ..observer.certificates.certificate import hashes_of_code
-
-    (folder,) = {file.parent for file in files}
-    result = hashes_of_code(folder)
-    return {file.name: result[file.name] for file in files}
-
-
-def written_anew(proved: Proof) -> WritesCode:
-    """Return what writes the C code of a certificate as the commands do, with its sentences in the head.
-
-    Parameters
-    ----------
-    proved
-        The certificate.
-    """
-    from ..export import export_c
-
-    def write(observer: FlatModel, folder: Path, /, *, real: str, name: str) -> object:
-        return export_c(with_statement(observer, proved), folder, real=real, name=name)
-
-    return write
-
-
-def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | None:
-    """Return the adaptive observer of a certificate, designed again from its deck; ``None`` for any other.
-
-    Parameters
-    ----------
-    proved
-        The certificate.
-    model
-        Flat model of its deck.
-    """
-    from ..observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
-
-    if model is None or not isinstance(proved, HeldEstimateCertificate):
-        return None
-    numbers = dict(proved.settings)
-    trust = Trust(most=int(numbers.pop("most")), **numbers)
-    return design_adaptive_observer(
-        model.with_values(dict(proved.parameters)), estimate=proved.estimate, measured=proved.measured,
-        sample_time=proved.sample_time, settings=AdaptiveSettings(trust=trust),
-    )  # fmt: skip
 
 
 @click.command(
@@ -206,9 +58,10 @@ def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | 
 def verify_certificate(certificate: Path, deck_name: str | None, code: Path | None, as_json: bool) -> None:
     """Check a certificate again, without the solver; exit status 1 where it does not hold."""
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck, read_deck
+    from ..export import export_c
+    from ..feedback.observer import CodeToCompare, read_certificate, verify
+    from ..foundation.deck import load_deck, read_deck
     from ..model import flatten
-    from ..observer import CodeToCompare, read_certificate, verify
 
     proved, untouched = read_certificate(certificate)
     given = load_deck(deck_name).path.read_text(encoding="utf-8-sig") if deck_name else None
@@ -216,8 +69,7 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     model = flatten(declare(read_deck(text, Path(f"{name}.toml")))) if text else None
     result = verify(
         proved, untouched=untouched, model=model, deck=given,
-        code=None if code is None else CodeToCompare(code, written_anew(proved)),
-        design=learning_design(proved, model),
+        code=None if code is None else CodeToCompare(code, export_c),
     )  # fmt: skip
     if as_json:
         checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in result.checks]

@@ -1,21 +1,12 @@
-"""The kinds of torque observers that commands offer, and the one that all of them take by default."""
+"""The option for the kind of a torque observer, which several commands offer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
-
 import click
-
-from ..errors import ArrangementError
-
-if TYPE_CHECKING:
-    from ..model import FlatModel
-    from ..observer import AdaptiveDesign, GainRule, Grid, ObserverDesign
 
 BEST, CASCADE, CERTIFIED = "best", "cascade", "certified"
 KINDS = (BEST, "adaptive", CASCADE, CERTIFIED, "kalman", "published")
+"""As :data:`nlsdesign.feedback.observer.spread.choice.KINDS`, which is not loaded for an option."""
 kind_option = click.option(
     "--kind",
     type=click.Choice(KINDS),
@@ -26,144 +17,3 @@ kind_option = click.option(
     "each angle, with noise from the deck's sensors and assumed disturbances. published: states of Austin et "
     "al. 2015, with the gain of the cascade.",
 )
-
-
-@dataclass(frozen=True, eq=False)
-class DesignedObserver:
-    """An observer as a command writes it.
-
-    Parameters
-    ----------
-    kind
-        Which was designed: not ``best``, but what that turned out to be.
-    design
-        With table and start values.
-    reason
-        Why it was taken; empty where it was asked for.
-    expected
-        Root mean square torque error over the spread, to first order: cascade, and adaptive observer where it
-        could be designed; empty where it was asked for.
-    """
-
-    kind: str
-    design: AdaptiveDesign | ObserverDesign
-    reason: str = ""
-    expected: tuple[float, ...] = ()
-
-    @property
-    def model(self) -> FlatModel:
-        """The observer, its description with reason and what is proved of it: here nothing."""
-        model = self.design.model
-        words = "; ".join(filter(None, (model.description, self.reason, "not certified")))
-        return replace(model, description=words)
-
-
-def designed_observer(
-    plant: FlatModel,
-    *,
-    kind: str | None = None,
-    decay: float | None = None,
-    sample_time: float = 1e-3,
-    spring: str | None = None,
-    measured: str | None = None,
-    grid: Grid | None = None,
-) -> DesignedObserver:
-    """Design an observer of the torque of a series spring.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    kind
-        One of :data:`KINDS`; the first by default.
-    decay
-        Of a certified gain, in 1/s; as fast as can be proved by default.
-    sample_time
-        In s.
-    spring
-        Path of the spring; decided from the structure if it is left out.
-    measured
-        State that is measured; decided from the structure if it is left out.
-    grid
-        Of its table; by the default torque error if it is left out.
-
-    Raises
-    ------
-    ArrangementError
-        If the model has no spring or no driven body, the structure leaves open which is meant, or there is
-        no observer of that kind.
-    """
-    from .. import observer
-    from ..model.roles import measured_motion, series_spring
-
-    try:
-        torque, measured = series_spring(plant, spring).effort, measured_motion(plant, measured)
-    except ArrangementError as error:
-        alone = "nlsdesign export fmu --what plant writes the plant alone, with its C sources inside"
-        raise ArrangementError(error.thing, error.rule, next_step=f"{error.next_step}; {alone}") from None
-    named: dict[str, Any] = {
-        "estimate": torque,
-        "measured": measured,
-        "sample_time": sample_time,
-        "grid": grid,
-    }
-    kind = kind or BEST
-    if kind == BEST:
-        chosen = observer.choose_observer(plant, **named)
-        adaptive = isinstance(chosen.design, observer.AdaptiveDesign)
-        return DesignedObserver(
-            "adaptive" if adaptive else CASCADE, chosen.design, chosen.reason, chosen.expected
-        )
-    if kind == "adaptive":
-        return DesignedObserver(kind, observer.design_adaptive_observer(plant, **named))
-    if kind == "published":
-        form = observer.PaperForm()
-        return DesignedObserver(kind, observer.design_observer_with_details(plant, form=form, **named))
-    gains: dict[str, Callable[[], Any]] = {
-        CASCADE: observer.CascadeGain,
-        CERTIFIED: lambda: observer.CertifiedGain(decay=decay),
-        "kalman": lambda: _kalman(plant, measured, sample_time),
-    }
-    gain = gains[kind]()
-    return DesignedObserver(kind, observer.design_observer_with_details(plant, gain=gain, **named))
-
-
-def _kalman(plant: FlatModel, measured: str, sample_time: float) -> GainRule:
-    """Return the rule with the noise that the deck declares, and that assumed where it declares none."""
-    import numpy as np
-
-    from ..analysis import NoiseAssumptions
-    from ..analysis.noise_assumptions import declared_deviation
-    from ..analysis.rest_points import rest_points
-    from ..observer import SteadyStateKalman
-    from ..observer.scheduling.scheduled import whole_contour
-
-    over = whole_contour(plant)
-    points = rest_points(plant, np.linspace(over.lower, over.upper, 41), angle=measured)
-    process = NoiseAssumptions(sample_time=sample_time).process(points)
-    return SteadyStateKalman(process, (declared_deviation(plant, measured),))
-
-
-def observer_of(
-    plant: FlatModel,
-    sample_time: float,
-    *,
-    kind: str | None = None,
-    spring: str | None = None,
-    measured: str | None = None,
-) -> FlatModel:
-    """Return the observer of the torque of a series spring; see :func:`designed_observer`.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    sample_time
-        In s.
-    kind
-        One of :data:`KINDS`; the first by default.
-    spring, measured
-        Where the structure leaves them open.
-    """
-    chosen = designed_observer(plant, kind=kind, sample_time=sample_time, spring=spring, measured=measured)
-    return chosen.model

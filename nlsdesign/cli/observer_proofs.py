@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .observer_certificate import CERTIFICATE, given_ranges, range_options, with_statement, write_proved
+from .observer_certificate import CERTIFICATE, given_ranges, range_options
 from .output import DECK_HELP, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import c_names, out_option
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..deck import Deck
+    from ..foundation.deck import Deck
     from ..model import FlatModel
 
 deck_option = click.option("--deck", "deck_name", metavar="DECK", required=True, help=DECK_HELP)
@@ -22,7 +22,7 @@ deck_option = click.option("--deck", "deck_name", metavar="DECK", required=True,
 
 def _plant(deck_name: str) -> tuple[Deck, tuple[str, str], FlatModel]:
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..foundation.deck import load_deck
     from ..model import flatten
 
     deck = load_deck(deck_name)
@@ -66,7 +66,7 @@ def certify_continuous_gain(
     **options: Any,
 ) -> None:
     """Design one gain in continuous time with the proof that every error vanishes."""
-    from ..observer import Minimal, PaperForm, certify_continuous, write_certificate
+    from ..feedback.observer import Minimal, PaperForm, certify_continuous, write_certificate
 
     _, text, plant = _plant(deck_name)
     proved = certify_continuous(
@@ -75,7 +75,7 @@ def certify_continuous_gain(
     )  # fmt: skip
     proved = replace(proved, deck=text)
     path = write_certificate(proved, out / CERTIFICATE)
-    gains = dict(zip(proved.system.states, proved.gain, strict=True))
+    gains = dict(zip(proved.proof.system.states, proved.proof.gain, strict=True))
     rows = [f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}" for name, row in gains.items()]
     show_written(as_json, (*proved.statement, *rows), [path], gains=gains)
 
@@ -109,8 +109,8 @@ def certify_adaptive_estimate(
 ) -> None:
     """Write the adaptive observer as C, with a bound on how far its estimate can leave the deck's torque."""
     from ..export import export_c
-    from ..observer import AdaptiveSettings, Trust, certify_held_estimate, design_adaptive_observer
-    from ..observer.certificates.held_estimate import held_assumptions
+    from ..feedback.observer import AdaptiveSettings, Trust, certify_held_estimate, design_adaptive_observer
+    from ..feedback.observer.certificates.held_estimate import held_assumptions
 
     _, text, plant = _plant(deck_name)
     trust = Trust() if limit is None else Trust(limit=limit)
@@ -121,6 +121,6 @@ def certify_adaptive_estimate(
     )  # fmt: skip
     assumed = replace(held_assumptions(plant, design), real=real, **given_ranges(options))
     proved = certify_held_estimate(plant, design, assumptions=assumed, settings=asdict(trust), deck=text)
-    source = export_c(with_statement(design.model, proved), out, real=real, name="observer")
-    path = write_proved(proved, out, source)
+    source = export_c(proved.stated(design.model), out, real=real, name="observer")
+    path = proved.write_beside(source.header, source.source)
     show_written(as_json, proved.statement, [path, source.header, source.source, source.selftest])

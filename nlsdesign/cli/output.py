@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from ..command_words import typed_command
+from ..foundation.command_words import typed_command
 from .terminal_tables import head_count, table_lines
 
 WIDE = 160
@@ -21,17 +21,7 @@ WIDE = 160
 
 
 def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table.
-
-    Parameters
-    ----------
-    title
-        Heading.
-    columns
-        Headings of the columns.
-    rows
-        Text of the cells.
-    """
+    """Print a table."""
     on_terminal, width = sys.stdout.isatty(), line_width()
     lines = table_lines(columns, rows, width=width)
     bold = head_count(columns, rows, width=width) if on_terminal and _bold() else 0
@@ -59,13 +49,7 @@ def _columns() -> int:
 
 
 def show_json(content: Mapping[str, Any]) -> None:
-    """Print a mapping as JSON.
-
-    Parameters
-    ----------
-    content
-        Numbers, texts and lists by name.
-    """
+    """Print a mapping as JSON."""
     click.echo(json.dumps(content, indent=2, ensure_ascii=False, default=_plain))
 
 
@@ -78,19 +62,7 @@ def _plain(value: Any) -> Any:
 
 
 def show_written(as_json: bool, sentences: Sequence[str], files: Sequence[Path], **more: Any) -> None:
-    """Print what was written, after sentences on it; or all of it as JSON.
-
-    Parameters
-    ----------
-    as_json
-        Whether JSON is printed.
-    sentences
-        What there is to know of the files.
-    files
-        That were written.
-    **more
-        Further content of the JSON.
-    """
+    """Print what was written, after sentences on it; or all of it as JSON."""
     if as_json:
         show_json({"sentences": list(sentences), **more, "files": list(files)})
         return
@@ -100,13 +72,7 @@ def show_written(as_json: bool, sentences: Sequence[str], files: Sequence[Path],
 
 
 def next_command(*words: object) -> str:
-    """Return a command of this program as it can be copied, with the packages that this run was given.
-
-    Parameters
-    ----------
-    *words
-        Behind the name of the program.
-    """
+    """Return a command of this program as it can be copied, with the packages that this run was given."""
     context = click.get_current_context(silent=True)
     packages = () if context is None else context.find_root().params.get("packages") or ()
     given = [item for package in packages for item in ("--with", package)]
@@ -114,13 +80,7 @@ def next_command(*words: object) -> str:
 
 
 def examples(*lines: str) -> str:
-    """Return the epilog of a help text that shows commands, each on its line.
-
-    Parameters
-    ----------
-    lines
-        Whole commands, as they are typed.
-    """
+    """Return the epilog of a help text that shows commands, each on its line."""
     # Click fills paragraphs anew unless they begin with this mark.
     return "\b\nExamples:\n" + "\n".join(_continued(line) for line in lines)
 

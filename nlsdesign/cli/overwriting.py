@@ -12,8 +12,8 @@ from typing import Any, TypeAlias, TypeVar
 
 import click
 
-from ..errors import ValueRangeError
-from ..written_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
+from ..foundation.errors import ValueRangeError
+from ..foundation.text_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
 from .named_paths import NamedPath
 from .output import show_json
 
@@ -33,13 +33,8 @@ dry_run_option = click.option(
 def out_option(default: str = "out", *, writes: Names = ()) -> Callable[[F], F]:
     """Return the option ``--out`` for a folder, with ``--force`` and ``--dry-run``.
 
-    Parameters
-    ----------
-    default
-        Folder if none is given.
-    writes
-        Files that the command writes there, so far as their names are known beforehand. Those that an earlier
-        run has listed there are looked at too where none is named.
+    ``writes``: files that the command writes there, so far as their names are known beforehand. Those that an
+    earlier run has listed there are looked at too where none is named.
     """
     kind = NamedPath(file_okay=False)
     text = "Folder for all files that are written."
@@ -62,16 +57,7 @@ def out_file_option(
 
     A file of that name that another command has written is not replaced without ``--force``.
 
-    Parameters
-    ----------
-    default
-        File if none is given; ``None`` where it must be given.
-    text
-        Help.
-    beside
-        Suffixes of further files of the same stem, or what gives them from the options.
-    ending
-        Such as ``.csv``, which the name must have.
+    ``default``: file if none is given; ``None`` where it must be given.
     """
     kind = NamedPath(dir_okay=False, example=default or f"my{ending or '.toml'}")
     shown = {"default": default, "show_default": True} if default else {"required": True}
@@ -113,13 +99,7 @@ def _guarded(
 
 
 def c_names(name: str) -> tuple[str, str, str]:
-    """Return the files of an export as C.
-
-    Parameters
-    ----------
-    name
-        Of what is exported.
-    """
+    """Return the files of an export as C."""
     return f"{name}.h", f"{name}.c", f"{name}_selftest.c"
 
 
@@ -127,24 +107,7 @@ def c_names(name: str) -> tuple[str, str, str]:
 def kept(
     folder: Path, paths: Iterable[Path], *, force: bool = False, only_own: bool = False
 ) -> Iterator[None]:
-    """Refuse at once what would be lost, and say at the end what was written beside.
-
-    Parameters
-    ----------
-    folder
-        Where a command writes.
-    paths
-        Files whose names are known beforehand.
-    force
-        Whether everything may be replaced.
-    only_own
-        Whether files of other commands are refused too.
-
-    Raises
-    ------
-    ExportError
-        If a file was changed, or not written by this package.
-    """
+    """Refuse at once what would be lost, and say at the end what was written beside."""
     command = _command()
     if not force:
         refuse_to_lose(paths, command=command if only_own else "")
@@ -164,19 +127,7 @@ def _command() -> str:
 
 
 def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool, only_own: bool = False) -> None:
-    """Print what would be written or replaced, and end with status 1 if a file would be refused.
-
-    Parameters
-    ----------
-    paths
-        Files whose names are known beforehand.
-    folder
-        Where the command writes.
-    as_json
-        Whether JSON is printed.
-    only_own
-        Whether files of other commands would be refused.
-    """
+    """Print what would be written or replaced, and end with status 1 if a file would be refused."""
     command = _command() if only_own else ""
     states = {path: file_state(path, command=command) for path in paths}
     refused = [path for path, state in states.items() if state not in ("new", "as written")]
@@ -192,15 +143,7 @@ def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool, only_own: 
 
 
 def folder_option(name: str, text: str) -> Callable[[F], F]:
-    """Return an option for a folder besides that of ``--out``; none by default.
-
-    Parameters
-    ----------
-    name
-        Such as ``--report``.
-    text
-        Help.
-    """
+    """Return an option for a folder besides that of ``--out``; none by default."""
     kind = NamedPath(file_okay=False, example="out/page")
     return click.option(name, type=kind, default=None, metavar="FOLDER", help=text, callback=_can_be_made)
 

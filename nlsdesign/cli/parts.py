@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..bibliography import cited
-from ..errors import unknown_name
-from ..quantity import typeset_unit
+from ..foundation.bibliography import cited
+from ..foundation.errors import unknown_name
+from ..foundation.quantity import typeset_unit
 from .output import examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import UnitError, ValueRangeError, visible
-from ..quantity import typeset_unit
+from ..foundation.errors import UnitError, ValueRangeError, visible
+from ..foundation.quantity import typeset_unit
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -28,21 +28,15 @@ def range_remarks(
 ) -> list[str]:
     """Return what is to be known of the angles that a command goes over, with the next step.
 
-    Parameters
-    ----------
-    declared
-        As the deck declares it.
-    last, first
-        Ends of the angles in rad; by default those of the contour of the cams, or ±90° where there is none.
-    measured
-        State that is swept; decided from the structure if it is left out.
+    ``last``, ``first``: ends of the angles in rad; by default those of the contour of the cams, or ±90° where
+    there is none. ``measured``: state that is swept; decided from the structure if it is left out.
     """
     import numpy as np
 
-    from ..analysis import ranges_at_rest
-    from ..errors import NlsError
+    from ..feedback.analysis import ranges_at_rest
+    from ..feedback.observer.scheduling.scheduled import whole_contour
+    from ..foundation.errors import NlsError
     from ..model import flatten
-    from ..observer.scheduling.scheduled import whole_contour
 
     try:
         model = flatten(declared)
@@ -65,31 +59,14 @@ def range_remarks(
 
 
 def usual_last(model: FlatModel) -> float:
-    """Return the angle to which a command goes that is not told: the end of the contour, 50° at most.
-
-    Parameters
-    ----------
-    model
-        Its cams say where a contour ends.
-    """
-    from ..observer.scheduling.scheduled import whole_contour
+    """Return the angle to which a command goes that is not told: the end of the contour, 50° at most."""
+    from ..feedback.observer.scheduling.scheduled import whole_contour
 
     return min(math.radians(50.0), whole_contour(model).upper)
 
 
 def check_angles(first: float, last: float) -> None:
-    """Refuse angles in the wrong order, and those that no spring is turned by.
-
-    Parameters
-    ----------
-    first, last
-        In rad.
-
-    Raises
-    ------
-    ValueRangeError
-        If the last does not lie above the first, or one is more than a hundred radians.
-    """
+    """Refuse angles in the wrong order, and those that no spring is turned by."""
     if not last > first:
         raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
     for option, angle in (("--from", first), ("--to", last)):
@@ -101,15 +78,7 @@ def check_angles(first: float, last: float) -> None:
 
 
 def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
-    """Return which cams end before an angle.
-
-    Parameters
-    ----------
-    model
-        Flat model of the machine.
-    angles
-        In rad.
-    """
+    """Return which cams end before an angle."""
     furthest = max(abs(angle) for angle in angles)
     cams = [cam for spring in model.springs for cam in spring.cams if cam.last_angle]
     return [
@@ -122,13 +91,7 @@ def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
 
 
 def warn(remarks: Iterable[str]) -> None:
-    """Print remarks where they do not mix with what a command prints for others to read.
-
-    Parameters
-    ----------
-    remarks
-        Sentences.
-    """
+    """Print remarks where they do not mix with what a command prints for others to read."""
     for remark in remarks:
         click.echo(f"warning: {visible(remark)}", err=True)
 
@@ -136,17 +99,7 @@ def warn(remarks: Iterable[str]) -> None:
 def swept_angle(model: FlatModel, measured: str | None) -> str:
     """Return the angle that an analysis goes over.
 
-    Parameters
-    ----------
-    model
-        As flattened.
-    measured
-        Name of the state; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnitError
-        If it is no angle.
+    ``measured``: name of the state; decided from the structure if it is left out.
     """
     from ..model.roles import measured_motion
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -65,7 +65,7 @@ class _Machine:
         """Bring the machine to rest over its angle."""
         import numpy as np
 
-        from ..analysis.rest_points import rest_points
+        from ..feedback.analysis.rest_points import rest_points
         from ..model.roles import series_spring
         from .range_remarks import swept_angle
 
@@ -90,7 +90,7 @@ class _Machine:
     def loop(self) -> None:
         """Do what the evaluation of the torque loop does before it simulates."""
         from ..components.assembly.moved_load import with_moved_load
-        from ..control import torque_controller
+        from ..feedback.control import torque_controller
         from ..model import flatten
 
         flatten(with_moved_load(self.declared))
@@ -102,7 +102,7 @@ class _Machine:
 
     def records(self) -> None:
         """Cut the machine at what its sensors, or states where there are none, and its inputs measure."""
-        from ..discrepancy.blocks.tearing import blocks_of
+        from ..bench.discrepancy.tearing import blocks_of
 
         blocks_of(self.model, self.measured)
 
@@ -116,13 +116,13 @@ class _Machine:
     @property
     def reach(self) -> float:
         """Angle up to which the cams have a contour, in rad."""
-        from ..observer.scheduling.scheduled import whole_contour
+        from ..feedback.observer.scheduling.scheduled import whole_contour
 
         return whole_contour(self.model).upper
 
     def _step(self, model: FlatModel) -> None:
-        from ..observer import CascadeGain, design_observer_with_details
-        from ..observer.scheduling.table import FixedGrid
+        from ..feedback.observer import CascadeGain, design_observer_with_details
+        from ..feedback.observer.scheduling.table import FixedGrid
 
         # The size of the table is chosen by the commands; here any does.
         grid = FixedGrid(-self.reach, self.reach, points=_POINTS)
@@ -137,18 +137,7 @@ _NEEDS = {
 
 
 def readiness(declared: Assembly) -> list[Readiness]:
-    """Return for each command that takes a deck whether it takes this one.
-
-    Parameters
-    ----------
-    declared
-        As the deck declares it.
-
-    Raises
-    ------
-    NlsError
-        If the deck has no flat model: then no command takes it.
-    """
+    """Return for each command that takes a deck whether it takes this one."""
     from ..model import flatten
 
     machine = _Machine(declared, flatten(declared))
@@ -175,11 +164,5 @@ def readiness(declared: Assembly) -> list[Readiness]:
 
 
 def shown_command(command: str) -> str:
-    """Return a command with what else it asks for, as ``fit (with records)``.
-
-    Parameters
-    ----------
-    command
-        As it is typed, without ``nlsdesign``.
-    """
+    """Return a command with what else it asks for, as ``fit (with records)``."""
     return f"{command} (with {_NEEDS[command]})" if command in _NEEDS else command

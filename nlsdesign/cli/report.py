@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .named_paths import NamedPath
 from .output import examples, json_option, show_written
 from .overwriting import out_option
@@ -56,7 +56,7 @@ def report(
     if deck_of:
         _decks(table, deck_of, out=out, as_json=as_json)
         return
-    from ..sweep_report import write_sweep_report
+    from ..presentation.sweep_report import write_sweep_report
 
     preferences, requirements = _preferences(table, given), _requirements(table, given)
     written = write_sweep_report(
@@ -78,8 +78,8 @@ def report(
 
 
 def _decks(table: SweepTable, points: tuple[int, ...], *, out: Path, as_json: bool) -> None:
+    from ..foundation.text_files import write_text
     from ..sweeps.point_deck import point_deck_text
-    from ..writing import write_text
 
     texts = {point: point_deck_text(table, point) for point in dict.fromkeys(points)}
     files = []

@@ -54,8 +54,8 @@ def _checked(name: str) -> str:
     A deck that cannot be read ends the command, not the page. What comes with the project is not read here:
     that takes libraries for which the page would have to wait.
     """
-    from ..deck import deck_names, load_deck, template_names
-    from ..errors import unknown_name
+    from ..foundation.deck import deck_names, load_deck, template_names
+    from ..foundation.errors import unknown_name
 
     bundled = (*deck_names(), *template_names())
     if name in bundled:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ValueRangeError, unknown_name
-from ..quantity import typeset_unit
+from ..foundation.errors import ValueRangeError, unknown_name
+from ..foundation.quantity import typeset_unit
 from .driving_signals import FORMS, check_rows, read_input_file, read_inputs
 from .given_numbers import BARE, given_start, given_words, with_given_values
 from .named_paths import NamedPath
@@ -127,9 +127,9 @@ def _check_out(out: Path, read: Path | None) -> None:
 
 def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
     from ..model import flatten
-    from ..progress import Steps
     from ..simulation import limits_reached, measure
     from ..simulation import simulate as integrate
 
@@ -266,8 +266,8 @@ def _drawn(
     about: tuple[Path, str, Sequence[str], Mapping[str, str]],
 ) -> list[Path]:
     """Write the picture and the page beside the table."""
-    from ..figures import run_over_time, write_figures
-    from ..report import FigureSection, FileSection, TableSection, TextSection, write_report
+    from ..presentation.figures import run_over_time, write_figures
+    from ..presentation.report import FigureSection, FileSection, TableSection, TextSection, write_report
 
     out, deck_name, warnings, taken = about
     picture = run_over_time(run, shown)
@@ -322,25 +322,11 @@ def _content(run: Trace, names: Sequence[str], warnings: list[str], files: list[
 
 
 def predict_record(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
-    """Drive a deck with a measured record; write its predictions and print their errors.
-
-    Parameters
-    ----------
-    deck_name
-        Name or file.
-    record
-        CSV file.
-    mapping
-        TOML that maps columns to signals.
-    out
-        CSV to write.
-    as_json
-        Whether JSON is printed.
-    """
+    """Drive a deck with a measured record; write its predictions and print their errors."""
+    from ..bench.discrepancy import band_errors, predict
+    from ..bench.identification import load_record
     from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..discrepancy import band_errors, predict
-    from ..identification import load_record
+    from ..foundation.deck import load_deck
     from ..model import flatten
 
     actuator = declare(load_deck(deck_name))
@@ -365,13 +351,7 @@ def predict_record(deck_name: str, record: Path, mapping: Path | None, out: Path
 
 
 def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
-    """Return name, rms error and unit of each predicted signal; a signal that is not measured should be zero.
-
-    Parameters
-    ----------
-    measured, predicted
-        At the same times.
-    """
+    """Return name, rms error and unit of each predicted signal; one that is not measured should be zero."""
     import numpy as np
 
     rows = []

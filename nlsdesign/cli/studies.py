@@ -16,12 +16,10 @@ from typing import Any, Protocol, SupportsFloat, runtime_checkable
 
 import click
 
-from ..errors import NlsError, brief, unknown_name
-from ..locations import bundled, folder
-from ..quantity import with_unit
-from ..reading import is_there, text_of
-from ..writing import make_folder
-from ..written_files import listed_files
+from ..foundation.errors import NlsError, brief, unknown_name
+from ..foundation.locations import bundled, folder
+from ..foundation.quantity import with_unit
+from ..foundation.text_files import is_there, listed_files, make_folder, text_of
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files
@@ -32,17 +30,7 @@ _SIGNATURE = "def main(out, fast=False): ..."
 
 @dataclass(frozen=True)
 class Claim:
-    """A number that a study claims, with unit and tolerance.
-
-    Parameters
-    ----------
-    value, tolerance
-        In ``unit``; the tolerance is absolute.
-    unit
-        As text.
-    why
-        What the tolerance covers.
-    """
+    """A number that a study claims, with unit and tolerance."""
 
     value: float
     tolerance: float
@@ -50,13 +38,7 @@ class Claim:
     why: str
 
     def holds(self, result: float) -> bool:
-        """Tell whether a result agrees with the claim.
-
-        Parameters
-        ----------
-        result
-            In the same unit.
-        """
+        """Tell whether a result agrees with the claim."""
         return abs(result - self.value) <= self.tolerance
 
 
@@ -79,20 +61,7 @@ def study_names() -> list[str]:
 
 
 def load_study(name: str) -> ModuleType:
-    """Return a study as a module with ``main(out, fast=False)``.
-
-    Parameters
-    ----------
-    name
-        Name of a study that comes with the project, or path of a Python file.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such study.
-    NlsError
-        If there is no such file, it cannot be loaded as Python, or has no ``main``.
-    """
+    """Return a study as a module with ``main(out, fast=False)``."""
     path = Path(name)
     if path.suffix != ".py":
         if name not in study_names():
@@ -139,37 +108,14 @@ def _line_of(error: BaseException, path: Path) -> str:
 
 
 def claims(name: str) -> dict[str, Claim]:
-    """Return the claims of a study in ``expected.toml``.
-
-    Parameters
-    ----------
-    name
-        Name of the study.
-    """
+    """Return the claims of a study in ``expected.toml``."""
     path = folder("studies") / "expected.toml"
     tables: Mapping[str, Any] = tomllib.loads(path.read_text(encoding="utf8")) if path.exists() else {}
     return {key: Claim(**table) for key, table in tables.get(name, {}).items()}
 
 
 def run_study(name: str, out: Path, *, fast: bool = False) -> dict[str, float]:
-    """Run a study and return its numbers; none where it was skipped.
-
-    Parameters
-    ----------
-    name
-        As for :func:`load_study`.
-    out
-        Folder for what it writes.
-    fast
-        Coarser and shorter.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such study.
-    NlsError
-        If its ``main`` cannot be called, fails, or returns something without numbers.
-    """
+    """Run a study and return its numbers; none where it was skipped."""
     study = load_study(name)
     if Path(name).suffix == ".py":
         _check_signature(name, study)
@@ -206,12 +152,7 @@ def _check_signature(name: str, study: ModuleType) -> None:
 def not_as_claimed(results: Mapping[str, float], expected: Mapping[str, Claim]) -> dict[str, str]:
     """Return the claimed numbers that are outside their tolerance or not computed, each with a message.
 
-    Parameters
-    ----------
-    results
-        Numbers of a study; without any it was skipped, and nothing is wrong.
-    expected
-        Its claims.
+    ``results``: numbers of a study; without any it was skipped, and nothing is wrong.
     """
     wrong = {}
     for key, claim in expected.items() if results else ():

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ExportError, ValueRangeError
+from ..foundation.errors import ExportError, ValueRangeError
 from .named_paths import NamedPath
 from .output import examples, json_option, next_command, show_json, show_table
 from .overwriting import folder_option, kept
 
 if TYPE_CHECKING:
-    from ..progress import Progress
+    from ..foundation.progress import Progress
+    from ..foundation.work_sharing import Executor
     from ..sweeps import SweepTable, SweepTask
-    from ..work_sharing import Executor
 
 _EVERY = 30.0
 """Seconds between lines of progress where there is no terminal."""
@@ -62,7 +62,7 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     executor = _executor(given)
-    from ..sweeps.arrow_columns import libraries
+    from ..sweeps.sweep_columns import libraries
     from ..sweeps.sweep_file import read_sweep_file
 
     libraries()
@@ -81,7 +81,7 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
 
 def _require_room(folder: Path) -> None:
     """Refuse, before any point is computed, a page that would replace what somebody has changed."""
-    from ..written_files import WORDS, file_state
+    from ..foundation.text_files import WORDS, file_state
 
     for path in (folder / name for name in ("sweep.html", "points.csv")):
         state = file_state(path)
@@ -93,7 +93,7 @@ def _require_room(folder: Path) -> None:
 
 
 def _page(table: SweepTable, folder: Path, source: Path) -> Path:
-    from ..sweep_report import write_sweep_report
+    from ..presentation.sweep_report import write_sweep_report
 
     with kept(folder, []):
         return write_sweep_report(table, folder, source=source).page
@@ -140,7 +140,7 @@ def _executor(given: dict[str, Any]) -> Executor:
             " and ".join(f"--{name}" for name in chosen), "name two places for the work",
             next_step="keep one of them",
         )  # fmt: skip
-    from ..work_sharing import DaskScheduler, MpiRanks, Processes
+    from ..foundation.work_sharing import DaskScheduler, MpiRanks, Processes
 
     if given["mpi"]:
         return MpiRanks()
@@ -151,7 +151,7 @@ def _executor(given: dict[str, Any]) -> Executor:
 
 
 def _run(task: SweepTask, out: Path, executor: Executor, given: dict[str, Any]) -> SweepTable:
-    from ..progress import Steps
+    from ..foundation.progress import Steps
     from ..sweeps.run_sweep import SweepSettings, run_task
 
     settings = SweepSettings(again=given["again"], retry_failed=given["retry_failed"])

@@ -18,14 +18,7 @@ _CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")
 def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], *, width: int) -> list[str]:
     """Return the lines of a table, heads first; rows are stacked where the columns do not fit.
 
-    Parameters
-    ----------
-    columns
-        Heads; may have several lines.
-    rows
-        Cells as text.
-    width
-        Of the terminal, in characters.
+    ``columns``: heads; may have several lines.
     """
     heads = [_shown(head) for head in columns]
     cells = [[_shown(cell) for cell in row] for row in rows]
@@ -39,13 +32,7 @@ def table_lines(columns: Sequence[str], rows: Sequence[Sequence[str]], *, width:
 
 
 def head_count(columns: Sequence[str], rows: Sequence[Sequence[str]], *, width: int) -> int:
-    """Return how many of the lines of :func:`table_lines` are heads: none where rows are stacked.
-
-    Parameters
-    ----------
-    columns, rows, width
-        As there.
-    """
+    """Return how many of the lines of :func:`table_lines` are heads: none where rows are stacked."""
     heads = [_shown(head) for head in columns]
     widths = _widths(heads, [[_shown(cell) for cell in row] for row in rows], width)
     return 0 if widths is None else len(_side_by_side(heads, widths, bottom=True))

@@ -11,10 +11,10 @@ import traceback
 
 import click
 
-from ..command_words import typed_command
-from ..errors import fit_for_message
-from ..interruption import usual_temporary_folder, was_interrupted
-from ..locations import version
+from ..foundation.command_words import typed_command
+from ..foundation.errors import fit_for_message
+from ..foundation.locations import version
+from ..foundation.processes import usual_temporary_folder, was_interrupted
 
 _ADVICE = {
     errno.ENAMETOOLONG: "give a shorter name",
@@ -31,13 +31,7 @@ FAULT, BROKEN_PIPE, INTERRUPTED, BAD_INPUT = 70, 141, 130, 2
 
 
 def status_of(error: Exception) -> int:
-    """Tell the user of an error that no command has expected, and return the exit status.
-
-    Parameters
-    ----------
-    error
-        Of any kind.
-    """
+    """Tell the user of an error that no command has expected, and return the exit status."""
     if was_interrupted():
         click.echo("interrupted", err=True)
         return INTERRUPTED

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import NlsError, UnitError, ValueRangeError
-from ..quantity import Quantity, parse_unit, quantity, same_dimension, typeset_unit, with_unit
-from ..written_numbers import split_number as split_number
+from ..foundation.errors import NlsError, UnitError, ValueRangeError
+from ..foundation.quantity import Quantity, parse_unit, quantity, same_dimension, typeset_unit, with_unit
+from ..foundation.written_numbers import split_number as split_number
 
 if TYPE_CHECKING:
     _Kind = click.ParamType[float]
@@ -36,15 +36,7 @@ class Number(_Kind):
         self.unit, self.above, self.up_to = unit, above, up_to
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the value in SI; errors name the option.
-
-        Raises
-        ------
-        UnitError
-            If the unit is missing or measures something else.
-        ValueRangeError
-            If the number is not finite, or outside its bounds.
-        """
+        """Return the value in SI; errors name the option."""
         if isinstance(value, float):
             return value
         option = param.opts[0] if param is not None and param.opts else "number"
@@ -76,13 +68,7 @@ class Bytes(_Count):
     name = "size"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Return the number of bytes.
-
-        Raises
-        ------
-        UnitError
-            If it is no size of memory.
-        """
+        """Return the number of bytes."""
         if isinstance(value, int):
             return value
         number, unit = split_number(str(value))
@@ -94,20 +80,7 @@ class Bytes(_Count):
 
 
 def parse_number(text: str, unit: str) -> Quantity:
-    """Read ``"5 N·m"``, ``"5 N*m"`` or ``"5N.m"``.
-
-    Parameters
-    ----------
-    text
-        Number and unit.
-    unit
-        A unit of the expected dimension.
-
-    Raises
-    ------
-    UnitError
-        If the unit is missing or measures something else.
-    """
+    """Read ``"5 N·m"``, ``"5 N*m"`` or ``"5N.m"``."""
     try:
         number, given = split_number(text)
     except UnitError as error:

@@ -12,17 +12,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def workers_option(command: F) -> F:
-    """Return a command with the option ``--workers``; its results do not depend on it.
-
-    Parameters
-    ----------
-    command
-        That maps its work over processes.
-    """
+    """Return a command with the option ``--workers``; its results do not depend on it."""
 
     @functools.wraps(command)
     def shared(*words: Any, **given: Any) -> Any:
-        from ..processes import at_most
+        from ..foundation.processes import at_most
 
         with at_most(given.pop("workers")):
             return command(*words, **given)

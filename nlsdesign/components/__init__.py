@@ -20,7 +20,7 @@ from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
-from .materials.library import Material, Property, material, materials
+from .materials.library import Material, material, materials
 from .materials.loss_tangent import (
     KnownLoss,
     Relaxation,
@@ -28,9 +28,8 @@ from .materials.loss_tangent import (
     loss_of,
     measured_relaxation,
     peaked_relaxation,
-    relaxation_of,
 )
-from .materials.material_law import MaterialLaw, law_of, material_laws, rubber_of
+from .materials.material_law import MaterialLaw, law_of, rubber_of
 from .materials.named_networks import (
     burgers,
     generalised_maxwell,
@@ -44,7 +43,7 @@ from .materials.rate_independent import SlidingFillers
 from .materials.relaxing_rubber import relaxing_law_of, relaxing_rubber_of
 from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
 from .materials.smooth_hysteresis import BoucWen
-from .materials.specimen import Area, Specimen, Strength, Strip, specimen
+from .materials.specimen import Area, Specimen, Strip, specimen
 from .materials.springpot import Springpot
 from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
@@ -167,7 +166,6 @@ __all__ = [
     "Part",
     "PermanentSet",
     "PositionLoop",
-    "Property",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
@@ -193,7 +191,6 @@ __all__ = [
     "Spring",
     "Springpot",
     "StrainStiffening",
-    "Strength",
     "StressSoftening",
     "StretchyCable",
     "StribeckFriction",
@@ -227,14 +224,12 @@ __all__ = [
     "law_of",
     "loss_of",
     "material",
-    "material_laws",
     "materials",
     "maxwell",
     "measured_relaxation",
     "parallel",
     "peaked_relaxation",
     "pull_only",
-    "relaxation_of",
     "relaxing_law_of",
     "relaxing_rubber_of",
     "rubber_of",

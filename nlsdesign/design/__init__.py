@@ -5,7 +5,7 @@ from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, mot
 from .curves.shapes import PolynomialTorque, TabulatedStiffness, TorqueBand
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
 from .curves.target_files import read_band, read_target
-from .curves.task import Task, TaskCycle, read_task, walking_task
+from .curves.task import Task, read_task, walking_task
 from .curves.task_curve import (
     LeastEnergy,
     LeastPeakPower,
@@ -29,10 +29,17 @@ from .drawing.machined_cam import (
 from .jobs.job_file import DesignJob, job_of, read_job
 from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
-from .optimisation.checks import torque_check
+from .jobs.written_design import (
+    DESIGN_FILES,
+    PicturesOfDesign,
+    WrittenDesign,
+    design_summary,
+    write_design,
+    write_part,
+)
 from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
-from .optimisation.front import FrontPoint, ParetoFront
+from .optimisation.front import ParetoFront
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -45,50 +52,46 @@ from .optimisation.limits import (
     MaximumTorqueError,
     MinimumRadiusOfCurvature,
     NumberRange,
+    OneNumber,
     PositiveStiffness,
     PretensionRange,
     RestLengthRange,
 )
 from .optimisation.limits_of_use import AtMost, OverTravel, TorqueWithin
 from .optimisation.pareto import pareto
-from .optimisation.result import CamDesign, LimitState, TorqueCheck
+from .optimisation.result import CamDesign, LimitState
 from .optimisation.settings import DesignSettings
 from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam
-from .optimisation.stock import RubberStock, Stock, StockChoice
+from .optimisation.stock import RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
-from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
-from .statics.energy import CamProfile, energy_profile
-from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .statics.declared_cam import cam_from_profile, contour_of_cam
+from .statics.equilibrium import elastic_law, equilibrium_torque
 from .statics.unmakeable import UnmakeablePart, unmakeable_parts
-from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
+from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread
 from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
-from .tolerance.tolerance_result import CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect
+from .tolerance.tolerance_result import ToleranceResult
 from .tolerance.trimming import Trim
 
 __all__ = [
+    "DESIGN_FILES",
     "AnchorDistance",
     "AreaRange",
     "AtMost",
     "BoltCircle",
     "BothStrokes",
     "CamDesign",
-    "CamFit",
     "CamPart",
-    "CamProfile",
     "Cause",
-    "CauseEffect",
     "ClampScrew",
     "Contour",
     "DesignJob",
     "DesignSettings",
-    "ElasticLaw",
     "EnergyLost",
     "ExponentialTorque",
     "FerruleSeat",
-    "FrontPoint",
     "Goal",
     "Hole",
     "InsensitiveStiffness",
@@ -115,14 +118,15 @@ __all__ = [
     "NumberRange",
     "OddSpring",
     "OneBatch",
+    "OneNumber",
     "OneSidedSpring",
     "OverTravel",
     "ParetoFront",
+    "PicturesOfDesign",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
-    "QuantileEstimate",
     "RestLengthRange",
     "RubberStock",
     "SeparateModuli",
@@ -132,37 +136,33 @@ __all__ = [
     "SpringLimits",
     "SpringSymmetry",
     "Stock",
-    "StockChoice",
     "TabulatedStiffness",
     "TabulatedTorque",
     "Target",
     "Task",
     "TaskCurve",
-    "TaskCycle",
     "TaskGoal",
     "TaskProblem",
     "TaskTarget",
     "ToleranceQuantile",
     "ToleranceResult",
     "TorqueBand",
-    "TorqueCheck",
     "TorqueError",
     "TorqueWithin",
     "Trim",
-    "TrimEffect",
     "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
     "UnmakeablePart",
+    "WrittenDesign",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
     "curve_for_task",
     "design_cam",
-    "draw_deviations",
+    "design_summary",
     "elastic_law",
-    "energy_profile",
     "equilibrium_torque",
     "fingerprint",
     "job_of",
@@ -177,8 +177,9 @@ __all__ = [
     "safe_limits",
     "scan_gear_ratio",
     "tolerance_analysis",
-    "torque_check",
     "unmakeable_parts",
     "walking_task",
+    "write_design",
     "write_drawings",
+    "write_part",
 ]

@@ -1,44 +1,46 @@
-"""C code for the controller, FMUs for everybody else, and co-simulation of FMUs."""
+"""C code for the controller, FMUs and Modelica text for everybody else, and co-simulation of FMUs.
 
-from .c.controller_code import CSource, export_c
-from .c.examples import write_examples
-from .compilation.compiled_step import Natively, natively, quickest
-from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
-from .compilation.running_c import CompiledStep
+Presentation and commands may import it; it reads models, and designs nothing.
+"""
+
+from .c.controller_code import export_c
+from .c.programs import write_examples
+from .c.writer import CSource
+from .compilation.compiled_step import natively, quickest
+from .compilation.cross_compiler import ALL_PLATFORMS
+from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
+from .compilation.target_run import TargetMeasurement, measure_on_target
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
+from .cosimulation.ssp import WrittenSystem, read_ssp, write_ssp
 from .cosimulation.wires import Late, SamplesOf, Wire
+from .exported_files import ExportedFile, ExportedFolder, read_exports
 from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
 from .fmi.reference_results import write_reference
 from .modelica.modelica_model import export_modelica
-from .ssp.read_ssp import read_ssp
-from .ssp.write_ssp import WrittenSystem, write_ssp
-from .target.processors import CORTEX_M4F, CORTEX_M7, Processor
-from .target.target_run import TargetMeasurement, TargetRun, measure_on_target
 
 __all__ = [
     "ALL_PLATFORMS",
     "CORTEX_M4F",
     "CORTEX_M7",
-    "PLATFORMS",
+    "PROCESSORS",
     "Authorship",
     "CSource",
     "CoSimulation",
-    "CompiledStep",
     "Convergence",
+    "ExportedFile",
+    "ExportedFolder",
     "Extrapolated",
     "FmuSystem",
     "Held",
     "Iterated",
     "Late",
-    "Natively",
     "Processor",
     "SamplesOf",
     "Stepping",
     "TargetMeasurement",
-    "TargetRun",
     "Wire",
     "WrittenSystem",
     "convergence",
@@ -46,10 +48,10 @@ __all__ = [
     "export_c",
     "export_fmu",
     "export_modelica",
-    "host_platform",
     "measure_on_target",
     "natively",
     "quickest",
+    "read_exports",
     "read_ssp",
     "write_examples",
     "write_reference",

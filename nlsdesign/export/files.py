@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
-from ..errors import ExportError
-from ..writing import draft
+from ..foundation.errors import ExportError
+from ..foundation.text_files import draft
 
 BROKEN_ARCHIVE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,
@@ -24,31 +24,15 @@ _PLACEHOLDER = re.compile(r"^(?P<indent> *)@(?P<row>\w+)@\n|@(?P<name>\w+)@", re
 
 
 def shell(name: str) -> str:
-    """Return the text of a fixed shell.
-
-    Parameters
-    ----------
-    name
-        File name in ``nlsdesign/export/shells``.
-    """
+    """Return the text of a fixed shell."""
     return (files(__package__) / "shells" / name).read_text(encoding="utf-8")
 
 
 def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
     """Return a shell with its ``@name@`` placeholders replaced.
 
-    Parameters
-    ----------
-    name
-        File name in ``nlsdesign/export/shells``.
-    values
-        By name of the placeholder: a text, or rows where the placeholder is a line of its own. Rows get the
-        indentation of that line; without rows the line is left out.
-
-    Raises
-    ------
-    ExportError
-        If a placeholder has no value.
+    ``values``: by name of the placeholder: a text, or rows where the placeholder is a line of its own. Rows
+    get the indentation of that line; without rows the line is left out.
     """
 
     def replacement(match: re.Match[str]) -> str:
@@ -64,18 +48,7 @@ def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
 
 
 def write_all(texts: Mapping[Path, str]) -> None:
-    """Write several files; none is replaced before all of them are written as temporary files.
-
-    Parameters
-    ----------
-    texts
-        Content by path.
-
-    Raises
-    ------
-    ExportError
-        If a folder stands in the place of a file; then nothing is written.
-    """
+    """Write several files; none is replaced before all of them are written as temporary files."""
     if not texts:
         return
     for each in texts:

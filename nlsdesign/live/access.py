@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -41,18 +41,7 @@ _HEADERS = {
 
 
 def loopback(host: str) -> str:
-    """Return the address of this machine that a host stands for.
-
-    Parameters
-    ----------
-    host
-        As asked for.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is no loopback address.
-    """
+    """Return the address of this machine that a host stands for."""
     if host not in LOOPBACK:
         raise ValueRangeError(
             f"host '{host}'",
@@ -106,13 +95,7 @@ class Access:
         return f"{self.origins[0]}/#token={self.token}"
 
     def refusal(self, scope: Scope) -> Refusal | None:
-        """Return why a request is refused; ``None`` where it is not.
-
-        Parameters
-        ----------
-        scope
-            Of the request, as ASGI gives it.
-        """
+        """Return why a request is refused; ``None`` where it is not."""
         headers = _headers(scope)
         if f"http://{headers.get('host', '').lower()}" not in self.origins:
             return Refusal(421, "The live page answers at its loopback address only.")
@@ -154,15 +137,7 @@ def _opened(headers: dict[str, str]) -> bool:
 
 
 def gate(application: Application, access: Access) -> Application:
-    """Return an application that refuses what access does not allow, and adds headers to each answer.
-
-    Parameters
-    ----------
-    application
-        Asked for what is allowed.
-    access
-        What a request must show.
-    """
+    """Return an application that refuses what access does not allow, and adds headers to each answer."""
 
     async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):

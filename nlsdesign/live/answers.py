@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..quantity import parse_unit, with_unit
-
-Floats = NDArray[np.float64]
+from ..foundation.arrays import Array
+from ..foundation.quantity import parse_unit, with_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +29,7 @@ class LiveColumn:
     name: str
     unit: str
     description: str
-    values: Floats
+    values: Array
 
 
 @dataclass(frozen=True)
@@ -65,13 +63,7 @@ class LimitMargin:
     active: bool
 
     def shown(self, value: float) -> str:
-        """Return a number in the unit of the limit as text.
-
-        Parameters
-        ----------
-        value
-            In SI.
-        """
+        """Return a number in the unit of the limit as text."""
         return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
 
 
@@ -173,24 +165,13 @@ class DesignView:
     margins: tuple[LimitMargin, ...]
     active: tuple[str, ...]
     numbers: tuple[ShownNumber, ...]
-    contour: Floats
+    contour: Array
     rubber_volume: float
     strain_end: float = math.inf
     beyond: tuple[str, ...] = ()
 
     def column(self, name: str) -> LiveColumn:
-        """Return one column.
-
-        Parameters
-        ----------
-        name
-            For instance ``"torque"``.
-
-        Raises
-        ------
-        KeyError
-            If there is none of that name.
-        """
+        """Return one column."""
         return {each.name: each for each in self.columns}[name]
 
 
@@ -259,11 +240,11 @@ class Mechanism:
     """
 
     angle: float
-    halves: tuple[Floats, ...]
-    cables: tuple[Floats, ...]
-    contacts: tuple[Floats, ...]
-    guides: tuple[Floats, ...]
-    rubbers: tuple[Floats, ...]
+    halves: tuple[Array, ...]
+    cables: tuple[Array, ...]
+    contacts: tuple[Array, ...]
+    guides: tuple[Array, ...]
+    rubbers: tuple[Array, ...]
     extent: tuple[float, float]
     remark: str
 
@@ -282,8 +263,8 @@ class PoleGroup:
 
     mode: str
     words: str
-    real: Floats
-    imaginary: Floats
+    real: Array
+    imaginary: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,9 +308,9 @@ class LoopResponse:
         Which controller and observer, and what the response holds for.
     """
 
-    frequencies: Floats
-    magnitude: Floats
-    phase: Floats
+    frequencies: Array
+    magnitude: Array
+    phase: Array
     stable: bool
     mode: str
     words: str
@@ -386,13 +367,7 @@ class AngleAnswer:
 
 
 def to_json(value: Any) -> Any:
-    """Return an answer as what JSON can hold; numbers that are not finite become ``None``.
-
-    Parameters
-    ----------
-    value
-        Any of the classes here, or rows, arrays and numbers.
-    """
+    """Return an answer as what JSON can hold; numbers that are not finite become ``None``."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         content = {f.name: to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
         return content | ({"stale": value.stale} if isinstance(value, LiveAnswer) else {})

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .access import PROTOCOL, Access, Application, gate
 from .session_process import content_of
 from .sessions import MOST, Session, Sessions
@@ -45,15 +45,7 @@ def page_files() -> dict[str, tuple[bytes, str]]:
 
 
 def application(sessions: Sessions, access: Access) -> Application:
-    """Return the application, behind its gate.
-
-    Parameters
-    ----------
-    sessions
-        Of this server.
-    access
-        What a request must show.
-    """
+    """Return the application, behind its gate."""
     from starlette.applications import Starlette
     from starlette.responses import Response
     from starlette.routing import Route, WebSocketRoute
@@ -79,13 +71,7 @@ def application(sessions: Sessions, access: Access) -> Application:
 
 
 class _Answers:
-    """Answers of one server.
-
-    Parameters
-    ----------
-    sessions
-        Of this server.
-    """
+    """Answers of one server."""
 
     def __init__(self, sessions: Sessions) -> None:
         self._sessions = sessions

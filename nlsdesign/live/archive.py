@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import zipfile
 
-from ..errors import DeckError, ValueRangeError
 from ..export.files import BROKEN_ARCHIVE
+from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
 from .saved import SavedDesign
 
@@ -17,13 +17,7 @@ _OLD = (1980, 1, 1, 0, 0, 0)
 
 
 def archived(design: SavedDesign) -> bytes:
-    """Return a saved design as an archive.
-
-    Parameters
-    ----------
-    design
-        As :meth:`~.live_design.LiveDesign.saved` gives it.
-    """
+    """Return a saved design as an archive."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in zip(MEMBERS, (design.deck, design.job, design.begin), strict=True):
@@ -32,20 +26,7 @@ def archived(design: SavedDesign) -> bytes:
 
 
 def unarchived(content: bytes) -> SavedDesign:
-    """Return the design of an archive; only its three members are read, and no more than they may hold.
-
-    Parameters
-    ----------
-    content
-        Of the file.
-
-    Raises
-    ------
-    DeckError
-        If it is no archive of a design.
-    ValueRangeError
-        If a member is too large.
-    """
+    """Return the design of an archive; only its three members are read, and no more than they may hold."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             texts = [_member(archive, name) for name in MEMBERS]

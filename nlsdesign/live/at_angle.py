@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..analysis import Observability
-from ..analysis.rest_points import RestPoints, rest_points
 from ..components.assembly.named_parts import Assembly
 from ..design import Contour
-from ..errors import NlsError
+from ..feedback.analysis import Observability
+from ..feedback.analysis.rest_points import RestPoints, rest_points
+from ..foundation.arrays import Array
+from ..foundation.errors import NlsError
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.structure import CamNames
@@ -29,8 +29,6 @@ from .answers import (
     SeenStates,
 )
 from .mechanism import mechanism_at
-
-Floats = NDArray[np.float64]
 
 _GRID = 21
 """Angles over which the typical sizes of states are taken, as observability is scaled by them."""
@@ -66,13 +64,7 @@ class AngleView:
         return self.make()
 
     def seen_as(self, view: DesignView) -> AngleView:
-        """Return the same design under another revision, with what was computed of it.
-
-        Parameters
-        ----------
-        view
-            Of that revision.
-        """
+        """Return the same design under another revision, with what was computed of it."""
         changed = replace(self, view=view)
         for name in ("machine", "model", "_grid"):
             if name in self.__dict__:
@@ -100,13 +92,7 @@ class AngleView:
         )
 
     def mechanism(self, angle: float) -> Mechanism:
-        """Return cam, cable and rubber at one angle.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return cam, cable and rubber at one angle."""
         column = self.view.column("extension").values
         now = float(np.interp(abs(angle), self.view.columns[0].values, column))
         extensions = (float(column[0]), now, float(column[-1]))
@@ -115,10 +101,7 @@ class AngleView:
     def readings(self, angle: float) -> tuple[LiveColumn, ...]:
         """Return the columns of the design at one angle, by interpolation.
 
-        Parameters
-        ----------
-        angle
-            In rad; the curves are those of the positive side.
+        ``angle``: in rad; the curves are those of the positive side.
         """
         at = self.view.columns[0].values
         return tuple(
@@ -127,15 +110,7 @@ class AngleView:
         )
 
     def answer(self, angle: float, loop: Lazy) -> AngleAnswer:
-        """Return all that holds at one angle.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        loop
-            State of the torque loop there.
-        """
+        """Return all that holds at one angle."""
         points: list[RestPoints] = []
 
         def rest() -> RestPoints:
@@ -169,13 +144,7 @@ class AngleView:
 
 
 def seen_states(points: RestPoints) -> SeenStates:
-    """Return what the sensor of the angle shows at the last of some rest points.
-
-    Parameters
-    ----------
-    points
-        Over the whole range, and the angle itself last.
-    """
+    """Return what the sensor of the angle shows at the last of some rest points."""
     columns = Observability(measured=(points.angle,)).over(points)
     values = dict(zip((v.name for v in columns.columns), columns.values[-1], strict=True))
     return SeenStates(
@@ -188,13 +157,7 @@ def seen_states(points: RestPoints) -> SeenStates:
 
 
 def pole_groups(points: RestPoints) -> tuple[PoleGroup, ...]:
-    """Return the poles of the plant at the last of some rest points, by mode of its dry friction.
-
-    Parameters
-    ----------
-    points
-        The angle last.
-    """
+    """Return the poles of the plant at the last of some rest points, by mode of its dry friction."""
     return tuple(
         PoleGroup(mode.name, mode.words, mode.eigenvalues[-1].real.copy(), mode.eigenvalues[-1].imag.copy())
         for mode in points.modes
@@ -203,31 +166,14 @@ def pole_groups(points: RestPoints) -> tuple[PoleGroup, ...]:
 
 def loop_responses(
     stage: Callable[[str], None], machine: Assembly, last: float
-) -> tuple[Floats, list[LoopResponse]]:
+) -> tuple[Array, list[LoopResponse]]:
     """Return the torque loop of a machine over its angle, with controller and observer by default.
 
-    Parameters
-    ----------
-    stage
-        Called with what is done now.
-    machine
-        With a motor, a spring and an encoder.
-    last
-        Largest angle in rad.
-
-    Returns
-    -------
-    tuple
-        Angles, shape (n,), and the response at each.
-
-    Raises
-    ------
-    NlsError
-        If the machine has no such loop.
+    Result: angles, shape (n,), and the response at each.
     """
-    from ..control import encoder_loop, torque_controller
-    from ..control.evaluation.linear_loop import linear_loop
-    from ..observer import CascadeGain, design_observer
+    from ..feedback.control import encoder_loop, torque_controller
+    from ..feedback.control.evaluation.linear_loop import linear_loop
+    from ..feedback.observer import CascadeGain, design_observer
 
     whole = flatten(machine)
     torque = series_spring(whole).effort

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ..errors import NlsError
-from ..extensions import extended_by, extension_names, load_extension
-from ..processes import signals_held
+from ..foundation.errors import NlsError
+from ..foundation.extensions import extended_by, extension_names, load_extension
+from ..foundation.processes import signals_held
 
 _ENDED = "its process ended without an answer"
 _PATIENCE = 2.0
@@ -92,13 +92,7 @@ class BackgroundWork:
         return WorkState(self._name, self._revision, self._state, self._message, took, self._value)
 
     def wait(self, seconds: float) -> WorkState:
-        """Return how far it is once it is over, or after that time.
-
-        Parameters
-        ----------
-        seconds
-            Longest.
-        """
+        """Return how far it is once it is over, or after that time."""
         last = time.monotonic() + seconds
         while self._state == "computing" and (left := last - time.monotonic()) > 0.0:
             if self._end.poll(min(left, 0.2)):

@@ -11,20 +11,13 @@ from typing import Any, ClassVar
 
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
-from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
+from ..design.optimisation.limit_kinds import limit_kinds
+from ..design.parametric.cam_question import ChosenMachine, TargetPoint
+from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
-from .limit_kinds import LIMIT_KINDS
 from .limit_words import in_words
-from .question import (
-    LARGEST_ANGLE,
-    LARGEST_TORQUE,
-    LEAST_STEP,
-    ChosenMachine,
-    LiveQuestion,
-    TargetPoint,
-    finite_in,
-)
+from .question import LARGEST_ANGLE, LARGEST_TORQUE, LEAST_STEP, LiveQuestion, finite_in
 
 _LONGEST_NAME = 200
 
@@ -38,20 +31,7 @@ class LiveEdit(ABC):
 
     @abstractmethod
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question after the edit.
-
-        Parameters
-        ----------
-        question
-            Before it.
-        shown
-            The last good design, where an edit begins from it.
-
-        Raises
-        ------
-        NlsError
-            If it cannot be done; the question before it stays.
-        """
+        """Return the question after the edit."""
 
 
 @dataclass(frozen=True)
@@ -128,13 +108,7 @@ class ScaleTarget(LiveEdit):
     torque: float
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with all points scaled.
-
-        Raises
-        ------
-        ValueRangeError
-            If the last point has no torque to scale, or a number is out of range.
-        """
+        """Return the question with all points scaled."""
         last = question.points[-1]
         if not last.torque > 0.0:
             raise ValueRangeError(
@@ -165,18 +139,10 @@ class ChangeLimit(LiveEdit):
     value: float
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that limit.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such limit.
-        ValueRangeError
-            If the number is out of its range.
-        """
-        if self.limit not in LIMIT_KINDS:
-            raise unknown_name("limit", self.limit, LIMIT_KINDS)
-        kind = LIMIT_KINDS[self.limit]
+        """Return the question with that limit."""
+        if self.limit not in limit_kinds():
+            raise unknown_name("limit", self.limit, limit_kinds())
+        kind = limit_kinds()[self.limit]
         value = finite_in(kind.title, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
         try:
             kind.limit(value)
@@ -190,29 +156,12 @@ class ChangeLimit(LiveEdit):
 
 @dataclass(frozen=True)
 class DropLimit(LiveEdit):
-    """Take a limit away; where the deck gives one of its kind, that one holds again.
-
-    Parameters
-    ----------
-    limit
-        Name of its kind.
-
-    Raises
-    ------
-    ValueRangeError
-        If it was not set: limits that follow from the deck are changed, not dropped.
-    """
+    """Take a limit away; where the deck gives one of its kind, that one holds again."""
 
     limit: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question without it.
-
-        Raises
-        ------
-        ValueRangeError
-            If it was not set here.
-        """
+        """Return the question without it."""
         if self.limit not in question.limits:
             raise ValueRangeError(
                 f"limit '{in_words(self.limit[:80])}'", "was not set here, so it cannot be dropped",
@@ -224,15 +173,7 @@ class DropLimit(LiveEdit):
 
 @dataclass(frozen=True)
 class SetNumber(LiveEdit):
-    """Give a number, for instance pretension or a size of the rubber; it is held from then on.
-
-    Parameters
-    ----------
-    name
-        Full name.
-    value
-        In SI.
-    """
+    """Give a number, for instance pretension or a size of the rubber; it is held from then on."""
 
     name: str
     value: float
@@ -265,13 +206,7 @@ class FreeNumber(LiveEdit):
     maximum: float | None = None
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number free.
-
-        Raises
-        ------
-        ValueRangeError
-            If the anchor is freed while the contour is held.
-        """
+        """Return the question with that number free."""
         free = (*(each for each in question.free if each != self.name), self.name)
         if self.name == question.contour:
             return replace(question, free=free)
@@ -295,24 +230,12 @@ class FreeNumber(LiveEdit):
 
 @dataclass(frozen=True)
 class HoldNumber(LiveEdit):
-    """Hold a number, or the contour, where the design has it now.
-
-    Parameters
-    ----------
-    name
-        Full name.
-    """
+    """Hold a number, or the contour, where the design has it now."""
 
     name: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number held.
-
-        Raises
-        ------
-        ValueRangeError
-            If the contour is held while the anchor is free.
-        """
+        """Return the question with that number held."""
         held = without_free(question, self.name)
         if self.name == question.contour:
             if question.cam.anchor_distance in held.free:
@@ -329,24 +252,12 @@ class HoldNumber(LiveEdit):
 
 @dataclass(frozen=True)
 class ChooseMaterial(LiveEdit):
-    """Take another rubber of the library; sizes stay.
-
-    Parameters
-    ----------
-    material
-        Its name.
-    """
+    """Take another rubber of the library; sizes stay."""
 
     material: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that rubber.
-
-        Raises
-        ------
-        ArrangementError
-            If there is no piece of rubber.
-        """
+        """Return the question with that rubber."""
         pieces = question.cam.specimens
         if not pieces:
             raise ArrangementError(
@@ -379,13 +290,7 @@ class ChooseDeck(LiveEdit):
 
 
 def kept_names(question: LiveQuestion) -> LiveQuestion:
-    """Return a question without numbers that its machine no longer has.
-
-    Parameters
-    ----------
-    question
-        With a changed machine.
-    """
+    """Return a question without numbers that its machine no longer has."""
     names = {*question.machine.sizes, question.contour}
     return replace(
         question,
@@ -396,22 +301,7 @@ def kept_names(question: LiveQuestion) -> LiveQuestion:
 
 
 def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
-    """Return a question in which a number, or the contour, is not free.
-
-    Parameters
-    ----------
-    question
-        Before.
-    name
-        Full name.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such number.
-    ValueRangeError
-        If nothing would be left that may change.
-    """
+    """Return a question in which a number, or the contour, is not free."""
     if name != question.contour:
         question.number(name)
     free = tuple(each for each in question.free if each != name)
@@ -433,20 +323,7 @@ def _with_cam_of(machine: ChosenMachine, shown: AngleView) -> ChosenMachine:
 
 
 def edit_from(message: Mapping[str, Any]) -> LiveEdit:
-    """Return the edit of a message: ``{"edit": "MovePoint", "index": 1, "angle": 0.4, "torque": 2.0}``.
-
-    Parameters
-    ----------
-    message
-        Name of the edit and its fields.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such edit or field.
-    ValueRangeError
-        If a field is missing or of the wrong kind.
-    """
+    """Return the edit of a message: ``{"edit": "MovePoint", "index": 1, "angle": 0.4, "torque": 2.0}``."""
     kinds = {kind.__name__: kind for kind in LiveEdit.__subclasses__()}
     name = message.get("edit")
     if not isinstance(name, str) or name not in kinds:

@@ -12,10 +12,11 @@ from typing import Any
 
 from ..components.assembly.deck_writer import deck_text
 from ..components.assembly.named_parts import Assembly
-from ..design import Contour, MachinedOneSidedCam, MachinedTwoSidedCam, write_drawings
-from ..errors import ValueRangeError, unknown_name
+from ..design import Contour, write_drawings
+from ..design.jobs.machined import declared_edge
+from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import flatten
-from ..model.roles import measured_motion, series_cam, series_spring
+from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from .at_angle import AngleView
 from .question import LiveQuestion
@@ -28,21 +29,20 @@ _OLD = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class ExportedDesign:
-    """One file.
-
-    Parameters
-    ----------
-    name
-        Of the file.
-    media_type
-        For browsers.
-    content
-        Bytes.
-    """
+    """One file."""
 
     name: str
     media_type: str
     content: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class ShownDesign:
+    """The design that is exported: the changed machine, the contour of its cam, and a note for the files."""
+
+    machine: Assembly
+    contour: Contour
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,88 +63,37 @@ class ExportDesign(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the export of the last good design.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such export.
-        ValueRangeError
-            If there is no design yet.
-        """
+        """Return the export of the last good design."""
         if self.what not in EXPORTS:
             raise unknown_name("export", self.what[:80], EXPORTS)
         if shown is None:
             raise ValueRangeError("export", "there is no design yet", next_step="widen a limit first")
-        return EXPORTS[self.what], (shown.machine, shown.contour, self.note)
+        return EXPORTS[self.what], (ShownDesign(shown.machine, shown.contour, self.note),)
 
 
-def exported_deck(
-    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
-) -> ExportedDesign:
-    """Return the machine as a deck.
-
-    Parameters
-    ----------
-    stage
-        Called with what is done now.
-    machine
-        Changed.
-    contour
-        Of its cam.
-    note
-        What the head of the file says; empty for nothing.
-    """
-    text = f"# {note}\n{deck_text(machine)}" if note else deck_text(machine)
-    return ExportedDesign(f"{machine.name}.toml", "application/toml", text.encode())
+def exported_deck(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the machine as a deck."""
+    text = f"# {design.note}\n{deck_text(design.machine)}" if design.note else deck_text(design.machine)
+    return ExportedDesign(f"{design.machine.name}.toml", "application/toml", text.encode())
 
 
-def exported_svg(
-    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
-) -> ExportedDesign:
-    """Return the drawing of the cam as SVG.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-    """
-    return _drawing(machine, contour, "svg", note)
+def exported_svg(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the drawing of the cam as SVG."""
+    return _drawing(design, "svg")
 
 
-def exported_dxf(
-    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
-) -> ExportedDesign:
-    """Return the drawing of the cam as DXF.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-    """
-    return _drawing(machine, contour, "dxf", note)
+def exported_dxf(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the drawing of the cam as DXF."""
+    return _drawing(design, "dxf")
 
 
-def exported_c(
-    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
-) -> ExportedDesign:
-    """Return cascade observer and PID controller as C, in an archive.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-
-    Raises
-    ------
-    NlsError
-        If the machine has no observer or controller.
-    """
-    from ..control import joined, torque_controller
+def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return cascade observer and PID controller as C, in an archive."""
     from ..export import export_c
-    from ..observer import CascadeGain, design_observer
+    from ..feedback.control import joined, torque_controller
+    from ..feedback.observer import CascadeGain, design_observer
 
-    whole = flatten(machine)
+    whole = flatten(design.machine)
     plant = with_outputs(whole, [measured_motion(whole), series_spring(whole).effort])
     stage("designs observer and controller")
     observer = design_observer(plant, sample_time=_SAMPLE_TIME, gain=CascadeGain())
@@ -152,38 +101,25 @@ def exported_c(
     stage("writes C")
     with tempfile.TemporaryDirectory() as folder:
         files = export_c(both, folder, name="observer_and_controller")
-        head = f"/* {note} */\n" if note else ""
+        head = f"/* {design.note} */\n" if design.note else ""
         content = _archive([files.header, files.source, files.selftest], head)
     return ExportedDesign("observer_and_controller.zip", "application/zip", content)
 
 
-def exported_fmu(
-    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
-) -> ExportedDesign:
-    """Return the plant as an FMU for co-simulation.
-
-    Parameters
-    ----------
-    stage, machine, contour, note
-        As for :func:`exported_deck`.
-
-    Raises
-    ------
-    NlsError
-        If it cannot be compiled here.
-    """
+def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the plant as an FMU for co-simulation."""
     from ..export import export_fmu
 
     stage("compiles the plant")
     with tempfile.TemporaryDirectory() as folder:
-        plant = flatten(machine)
-        if note:
-            plant = replace(plant, description=f"{note}. {plant.description}")
+        plant = flatten(design.machine)
+        if design.note:
+            plant = replace(plant, description=f"{design.note}. {plant.description}")
         file = export_fmu(plant, Path(folder) / "plant.fmu")
         return ExportedDesign("plant.fmu", "application/zip", file.read_bytes())
 
 
-EXPORTS: dict[str, Callable[..., ExportedDesign]] = {
+EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {
     "deck": exported_deck,
     "svg": exported_svg,
     "dxf": exported_dxf,
@@ -196,18 +132,13 @@ EXPORTS: dict[str, Callable[..., ExportedDesign]] = {
 _MEDIA = {"svg": "image/svg+xml", "dxf": "image/vnd.dxf"}
 
 
-def _drawing(machine: Assembly, contour: Contour, ending: str, note: str) -> ExportedDesign:
-    names = series_cam(flatten(machine))
-    machined = None
-    if names.cable is not None:
-        diameter = machine.quantities()[names.cable.diameter]
-        half = diameter.with_value(diameter.number / 2.0, f"half of {names.cable.diameter}")
-        kind = MachinedOneSidedCam if contour.anchor_distance == float("inf") else MachinedTwoSidedCam
-        machined = kind(cable_radius=half)
+def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
+    _, kind, radius = declared_edge(design.machine)
+    machined = None if radius is None else kind(cable_radius=radius)
     centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
-    note = "; ".join(filter(None, (note, centre)))
+    note = "; ".join(filter(None, (design.note, centre)))
     with tempfile.TemporaryDirectory() as folder:
-        files = write_drawings(Path(folder), contour, machined=machined, note=note, formats=(ending,))
+        files = write_drawings(Path(folder), design.contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
     return ExportedDesign(f"cam.{ending}", _MEDIA[ending], content)
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
 from ..design import CamDesign, Contour, DesignSettings, Limit, Target, design_cam
-from ..errors import ConvergenceError, InfeasibleError
-from ..prefixes import prefixed
+from ..design.parametric.parametric_solver import ParametricDesign
+from ..foundation.errors import ConvergenceError, InfeasibleError
+from ..foundation.written_numbers import prefixed
 from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
 from .limit_words import in_words
 from .question import LiveQuestion
-from .quick_design import QuickDesign
 from .views import not_kept, unkept, view_of
 
 STARTS = 8
@@ -26,17 +26,7 @@ _DIFFERS = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class FullDesign:
-    """What the whole design came to.
-
-    Parameters
-    ----------
-    state
-        ``"solved"``, ``"infeasible"`` or ``"not solved"``.
-    design
-        Where it is solved.
-    message
-        Otherwise.
-    """
+    """What the whole design came to."""
 
     state: str
     design: CamDesign | None
@@ -53,14 +43,8 @@ def whole_design(
 ) -> FullDesign:
     """Return the whole design.
 
-    Parameters
-    ----------
-    stage
-        Called with what is done now.
-    actuator, target, free, keep
-        As for :func:`~nlsdesign.design.design_cam`; the limits are all that hold.
-    contour
-        To which the cam was fitted, where it was designed and is held.
+    ``actuator``, ``target``, ``free``, ``keep``: as for :func:`~nlsdesign.design.design_cam`; the limits are
+    all that hold.
     """
     done = 0
 
@@ -86,20 +70,11 @@ def whole_design(
 
 
 def full_answer(
-    full: FullDesign, question: LiveQuestion, quick: LiveAnswer, solved: QuickDesign | None
+    full: FullDesign, question: LiveQuestion, quick: LiveAnswer, solved: ParametricDesign | None
 ) -> LiveAnswer:
     """Return the answer that replaces the quick one, with what differs between the two in its message.
 
-    Parameters
-    ----------
-    full
-        Of the same question.
-    question
-        That was asked.
-    quick
-        The quick answer.
-    solved
-        Its design; ``None`` where it had none of its own.
+    ``solved``: its design; ``None`` where it had none of its own.
     """
     limits = question.limit_values
     if full.design is None and solved is None:
@@ -126,7 +101,7 @@ def full_answer(
     return replace(quick, state="solved", source="full", message=message, design=view, conflicts=())
 
 
-def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> list[str]:
+def _differences(design: CamDesign, solved: ParametricDesign, quick: DesignView) -> list[str]:
     """Return in words where the quick answer was another optimum, or the finished assembly is another."""
     cost, largest, sentences = design.starts[design.taken].cost, design.target.largest, []
     was, there = (f"{prefixed(each)} rms" for each in (quick.rms_error, design.predicted_rms))
@@ -150,15 +125,5 @@ def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> l
 
 
 def angle_view_of(view: DesignView, design: CamDesign, question: LiveQuestion) -> AngleView:
-    """Return a finished design as it is looked at angle by angle.
-
-    Parameters
-    ----------
-    view
-        What is shown of it.
-    design
-        Finished.
-    question
-        That it answers.
-    """
+    """Return a finished design as it is looked at angle by angle."""
     return AngleView(view, design.contour, question.cam, lambda: design.actuator)

@@ -7,22 +7,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..components.assembly.deck_template import load_template
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
-from ..deck import Deck, deck_names, load_deck, read_deck, template_names
 from ..design import MaximumStrain, MaximumStress, contour_of_cam
+from ..design.optimisation.defaults import BREAKS
+from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque
-from ..errors import NlsError, ValueRangeError, unknown_name
+from ..foundation.arrays import Array
+from ..foundation.deck import Deck, deck_names, load_deck, read_deck, template_names
+from ..foundation.errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
-from .question import ChosenMachine, LiveQuestion, TargetPoint
-from .stretch import BREAKS, declared_strain
-
-Floats = NDArray[np.float64]
+from .question import LiveQuestion
+from .stretch import declared_strain
 
 MOST_DECK_BYTES = 400_000
 """Largest deck that is read."""
@@ -66,40 +66,12 @@ def gallery_cards() -> tuple[GalleryCard, ...]:
 
 
 def gallery_question(name: str) -> LiveQuestion:
-    """Return the question with which an actuator of the gallery begins: its own curve as the target.
-
-    Parameters
-    ----------
-    name
-        Of a deck or template.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is none of that name.
-    ArrangementError
-        If it has no cam to design.
-    """
+    """Return the question with which an actuator of the gallery begins: its own curve as the target."""
     return question_of(declare(_deck(name)), name)
 
 
 def question_of_deck(text: str, name: str) -> LiveQuestion:
-    """Return the question with which a deck of one's own begins.
-
-    Parameters
-    ----------
-    text
-        TOML.
-    name
-        Of the file, for messages.
-
-    Raises
-    ------
-    ValueRangeError
-        If the deck is too large.
-    NlsError
-        If it cannot be read, or has no cam to design.
-    """
+    """Return the question with which a deck of one's own begins."""
     size = len(text.encode())
     if size > MOST_DECK_BYTES:
         raise ValueRangeError(
@@ -115,20 +87,8 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
 
     The target is its own torque curve, contour and pretension are free. Rubber of which no strength is
     declared begins with a limit of its own: twice the strain of its own cam.
-
-    Parameters
-    ----------
-    actuator
-        With a cam spring.
-    title
-        For people.
-
-    Raises
-    ------
-    ArrangementError
-        If it has no cam spring, or none whose contour can be designed, or one that gives no torque.
     """
-    blank = LiveQuestion(title, ChosenMachine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
+    blank = LiveQuestion(ChosenMachine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)), title=title)
     cam = blank.cam
     if cam.last_angle is not None:
         last = blank.machine.model.values[cam.last_angle]
@@ -146,7 +106,7 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     return question.with_points(points)
 
 
-def _stretch(machine: ChosenMachine, angles: Floats) -> dict[str, float]:
+def _stretch(machine: ChosenMachine, angles: Array) -> dict[str, float]:
     """Return the limit on the strain of rubber of which no strength is declared: by what its own cam does.
 
     Without any, a design may stretch it without end, to where its law has no value any more.

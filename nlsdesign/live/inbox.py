@@ -25,13 +25,7 @@ class Inbox:
         self._closed = False
 
     def put(self, message: Mapping[str, Any]) -> None:
-        """Add a message.
-
-        Parameters
-        ----------
-        message
-            ``{"page": ...}`` or ``{"server": ...}``.
-        """
+        """Add a message."""
         with self._condition:
             drag = _drag(message)
             last = self._waiting[-1] if self._waiting else {}
@@ -51,15 +45,7 @@ class Inbox:
     def take(self, seconds: float | None) -> Mapping[str, Any] | None:
         """Return the next message; ``None`` where none came in time.
 
-        Parameters
-        ----------
-        seconds
-            To wait; without end for ``None``.
-
-        Raises
-        ------
-        EOFError
-            If no message can come any more.
+        ``seconds``: to wait; without end for ``None``.
         """
         with self._condition:
             self._condition.wait_for(lambda: self._waiting or self._closed, seconds)
@@ -70,13 +56,7 @@ class Inbox:
             return None
 
     def read(self, stream: IO[bytes]) -> None:
-        """Read messages, one to a line, until the stream ends.
-
-        Parameters
-        ----------
-        stream
-            From the server.
-        """
+        """Read messages, one to a line, until the stream ends."""
         for line in stream:
             self.put(json.loads(line))
         with self._condition:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .answers import AngleAnswer, LiveAnswer
 from .at_angle import AngleView
 from .background import WorkState
@@ -53,22 +53,7 @@ class LiveDesign:
         return self._history.now.shown
 
     def apply(self, edit: LiveEdit, *, drag: str | None = None, last: bool = False) -> LiveAnswer:
-        """Do an edit and return the answer.
-
-        Parameters
-        ----------
-        edit
-            What the designer does.
-        drag
-            Name of what is being dragged: edits with the same name, one after the other, are undone together.
-        last
-            Whether the hand lets go with this edit: the next one of that name is undone by itself.
-
-        Raises
-        ------
-        NlsError
-            If the edit cannot be done; nothing has changed then.
-        """
+        """Do an edit and return the answer."""
         question = edit.applied(self.question, self.shown)
         if edit.begins_anew:
             self._history.open(question, {})
@@ -87,36 +72,14 @@ class LiveDesign:
         return self.answer
 
     def at(self, angle: float) -> AngleAnswer:
-        """Return what holds at one angle for the last good design.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-
-        Raises
-        ------
-        ValueRangeError
-            If the angle is out of range, or there is no design yet.
-        """
+        """Return what holds at one angle for the last good design."""
         finite_in("angle", angle, lowest=-_LARGEST_ANGLE, highest=_LARGEST_ANGLE, unit="rad")
         if self.shown is None:
             raise ValueRangeError("angle", "there is no design yet", next_step="widen a limit first")
         return self.shown.answer(angle, self.work.loop_at(angle, self.shown))
 
     def start(self, task: LiveTask) -> WorkState:
-        """Start a piece of long work on the design as it stands; one of its kind that runs is cancelled.
-
-        Parameters
-        ----------
-        task
-            For instance ``SettleDesign()`` or ``ToleranceCloud(draws=200)``.
-
-        Raises
-        ------
-        ValueRangeError
-            If it needs a design and there is none, or one of this question and there is only an earlier one.
-        """
+        """Start a piece of long work on the design as it stands; one of its kind that runs is cancelled."""
         if isinstance(task, ToleranceCloud) and self.answer.stale:
             raise ValueRangeError(
                 "tolerance cloud", "would hold an earlier design against the target of now",
@@ -136,15 +99,7 @@ class LiveDesign:
     def keep(self, name: str) -> Snapshot:
         """Keep the design as it is under a name, to be shown beside others.
 
-        Parameters
-        ----------
-        name
-            Up to 60 characters; one of that name is replaced.
-
-        Raises
-        ------
-        ValueRangeError
-            If the name is empty or too long, too many are kept, or there is no design of this question.
+        ``name``: up to 60 characters; one of that name is replaced.
         """
         return self.snapshots.keep(name, self.question, self.answer)
 
@@ -156,19 +111,7 @@ class LiveDesign:
 def open_question(live: LiveDesign, question: LiveQuestion, values: dict[str, float]) -> LiveAnswer:
     """Go on with another question, one step that can be undone; what was computed before is forgotten.
 
-    Parameters
-    ----------
-    live
-        The design.
-    question
-        For instance of a saved design.
-    values
-        Numbers in SI of a design to begin beside; empty without one.
-
-    Raises
-    ------
-    NlsError
-        If the question cannot be asked; nothing has changed then.
+    ``values``: numbers in SI of a design to begin beside; empty without one.
     """
     live._history.open(question, values)
     live.work.forget()

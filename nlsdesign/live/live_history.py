@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ..design.parametric.parametric_solver import ParametricSolver
 from .full_design import FullDesign
 from .live_moment import LiveMoment, first_moment, next_moment, opened_moment, settled_moment
 from .question import LiveQuestion
-from .quick_design import QuickSolver
 
 MOST_UNDO = 200
 """Steps that can be undone."""
@@ -23,24 +23,14 @@ class LiveHistory:
     """
 
     def __init__(self, question: LiveQuestion, values: dict[str, float]) -> None:
-        self._solver = QuickSolver()
+        self._solver = ParametricSolver()
         self._grip: str | None = None
         self.past: list[LiveMoment] = []
         self.future: list[LiveMoment] = []
         self.now = first_moment(self._solver, question, values)
 
     def ask(self, question: LiveQuestion, drag: str | None, *, last: bool = False) -> None:
-        """Make a changed question with its answer the present moment.
-
-        Parameters
-        ----------
-        question
-            Changed.
-        drag
-            Name of what is being dragged: steps with the same name, one after the other, are one step.
-        last
-            Whether the hand lets go with it: the next one of that name is a step of its own.
-        """
+        """Make a changed question with its answer the present moment."""
         moment = next_moment(self._solver, question, self.now)
         if drag is None or drag != self._grip:
             self.past = [*self.past, self.now][-MOST_UNDO:]
@@ -50,12 +40,7 @@ class LiveHistory:
     def open(self, question: LiveQuestion, values: dict[str, float]) -> None:
         """Make another question with its answer the present moment, one step by itself.
 
-        Parameters
-        ----------
-        question
-            That has nothing to do with the one before.
-        values
-            Numbers in SI of a design to begin beside; empty without one.
+        ``values``: numbers in SI of a design to begin beside; empty without one.
         """
         moment = opened_moment(self._solver, question, self.now, values)
         self.past, self.future, self._grip = [*self.past, self.now][-MOST_UNDO:], [], None
@@ -70,13 +55,7 @@ class LiveHistory:
         self._step(self.future, self.past)
 
     def settle(self, full: FullDesign) -> None:
-        """Take the whole design as the answer of the present moment.
-
-        Parameters
-        ----------
-        full
-            Of its question.
-        """
+        """Take the whole design as the answer of the present moment."""
         self.now = settled_moment(self._solver, self.now, full)
 
     def _step(self, source: list[LiveMoment], left: list[LiveMoment]) -> None:

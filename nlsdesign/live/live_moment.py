@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+from ..design.parametric.parametric_solver import DesignedNumbers, ParametricDesign, ParametricSolver
 from .answers import LiveAnswer
 from .at_angle import AngleView
 from .full_design import FullDesign, angle_view_of, full_answer
 from .limit_words import holding
 from .question import LiveQuestion
-from .quick_design import DesignedNumbers, QuickDesign, QuickSolver
-from .views import controls_of, not_kept
+from .views import controls_of, not_kept, quick_view_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class LiveMoment:
 
     question: LiveQuestion
     answer: LiveAnswer
-    solved: QuickDesign | None
+    solved: ParametricDesign | None
     numbers: DesignedNumbers | None
     shown: AngleView | None
 
@@ -48,24 +48,12 @@ class LiveMoment:
         return replace(self, solved=None)
 
     def with_controls(self, *, can_undo: bool, can_redo: bool) -> LiveMoment:
-        """Return the moment with controls that offer the steps there are.
-
-        Parameters
-        ----------
-        can_undo, can_redo
-            Whether there is a step before and after it.
-        """
+        """Return the moment with controls that offer the steps there are."""
         controls = controls_of(self.question, can_undo=can_undo, can_redo=can_redo)
         return replace(self, answer=replace(self.answer, controls=controls))
 
     def under_revision(self, revision: int) -> LiveMoment:
-        """Return a moment of before as the present one.
-
-        Parameters
-        ----------
-        revision
-            Of its own.
-        """
+        """Return a moment of before as the present one."""
         design, shown = self.answer.design, self.shown
         if design is not None and shown is not None and not self.answer.stale:
             design = replace(design, revision=revision)
@@ -74,67 +62,31 @@ class LiveMoment:
         return replace(self, answer=answer, shown=shown)
 
 
-def first_moment(solver: QuickSolver, question: LiveQuestion, values: dict[str, float]) -> LiveMoment:
+def first_moment(solver: ParametricSolver, question: LiveQuestion, values: dict[str, float]) -> LiveMoment:
     """Return the moment with which a session begins.
 
-    Parameters
-    ----------
-    solver
-        Of the session.
-    question
-        Any.
-    values
-        Numbers in SI of a design to begin beside, by name; empty without one.
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
     """
     return _answered(solver, question, None, None, values)
 
 
-def next_moment(solver: QuickSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
-    """Return the moment of a changed question, answered from the design of the one before.
-
-    Parameters
-    ----------
-    solver
-        Of the session.
-    question
-        Changed.
-    before
-        The present moment.
-    """
+def next_moment(solver: ParametricSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
+    """Return the moment of a changed question, answered from the design of the one before."""
     return _answered(solver, question, before, before.solved, before.values)
 
 
 def opened_moment(
-    solver: QuickSolver, question: LiveQuestion, before: LiveMoment, values: dict[str, float]
+    solver: ParametricSolver, question: LiveQuestion, before: LiveMoment, values: dict[str, float]
 ) -> LiveMoment:
     """Return the moment of a question that was opened, answered as if nothing had been before.
 
-    Parameters
-    ----------
-    solver
-        Of the session.
-    question
-        Any.
-    before
-        The present moment, whose revision it follows.
-    values
-        Numbers in SI of a design to begin beside, by name; empty without one.
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
     """
     return _answered(solver, question, before, None, values)
 
 
-def settled_moment(solver: QuickSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
-    """Return the moment with the whole design as its answer, beside which the next drag begins.
-
-    Parameters
-    ----------
-    solver
-        Of the session.
-    moment
-        With the quick answer.
-    full
-        The whole design of its question.
-    """
+def settled_moment(solver: ParametricSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
+    """Return the moment with the whole design as its answer, beside which the next drag begins."""
     question = moment.question
     quick = moment.solved if moment.answer.state == "solved" else None
     answer = full_answer(full, question, moment.answer, quick)
@@ -147,16 +99,21 @@ def settled_moment(solver: QuickSolver, moment: LiveMoment, full: FullDesign) ->
 
 
 def _answered(
-    solver: QuickSolver, question: LiveQuestion, before: LiveMoment | None, beside: QuickDesign | None,
+    solver: ParametricSolver,
+    question: LiveQuestion,
+    before: LiveMoment | None,
+    beside: ParametricDesign | None,
     values: dict[str, float],
-) -> LiveMoment:  # fmt: skip
+) -> LiveMoment:
     began = time.perf_counter()
     revision = before.answer.revision + 1 if before else 1
     solved, outcome = solver.answer(question, beside, values)
     shown = before.shown if before else None
     message = outcome.words
     if solved is not None:
-        shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.numbers.machine)
+        shown = AngleView(
+            quick_view_of(question, revision, solved), solved.contour, question.cam, solved.numbers.machine
+        )
         sentences = [*shown.view.beyond, *([] if shown.view.met else [missed(question, shown)])]
         message = "; ".join([*sentences, *not_kept(question, shown.view.margins)])
     controls = controls_of(question, can_undo=before is not None, can_redo=False)
@@ -170,15 +127,7 @@ def _answered(
 
 
 def missed(question: LiveQuestion, shown: AngleView) -> str:
-    """Return how far a design misses its target, and which limits hold it.
-
-    Parameters
-    ----------
-    question
-        That was asked.
-    shown
-        The design.
-    """
+    """Return how far a design misses its target, and which limits hold it."""
     view = shown.view
     holders = holding(question, view.margins)
     held = f"held by {', '.join(holders)}" if holders else "no limit holds it"

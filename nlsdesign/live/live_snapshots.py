@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .answers import LiveAnswer
 from .question import LiveQuestion
 
@@ -15,17 +15,7 @@ _NAME = 60
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A design that was kept under a name.
-
-    Parameters
-    ----------
-    name
-        Given by the designer.
-    question
-        What was asked.
-    answer
-        What was answered.
-    """
+    """A design that was kept under a name."""
 
     name: str
     question: LiveQuestion
@@ -36,22 +26,7 @@ class Snapshots(dict[str, Snapshot]):
     """The designs that are kept, by name."""
 
     def keep(self, name: str, question: LiveQuestion, answer: LiveAnswer) -> Snapshot:
-        """Keep a design under a name; one of that name is replaced.
-
-        Parameters
-        ----------
-        name
-            Up to 60 characters.
-        question
-            What was asked.
-        answer
-            What was answered.
-
-        Raises
-        ------
-        ValueRangeError
-            If the name is empty or too long, too many are kept, or there is no design of this question.
-        """
+        """Keep a design under a name; one of that name is replaced."""
         if answer.design is None or answer.stale:
             raise ValueRangeError(
                 f"design '{name:.80}'", "is not there: what is shown belongs to an earlier question",

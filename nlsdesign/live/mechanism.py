@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design import Contour
 from ..design.statics.contour import turn
+from ..foundation.arrays import Array
 from .answers import Mechanism
-
-Floats = NDArray[np.float64]
 
 _CLEARANCE = 3e-3
 """Least distance in m between guide and clamp of the rubber, so that both can be seen."""
@@ -24,16 +22,7 @@ def mechanism_at(
 ) -> Mechanism:
     """Return the mechanism at one angle.
 
-    Parameters
-    ----------
-    contour
-        Of the cam; a finite anchor for a cable through the centre.
-    angle
-        In rad, of either sign for a cable through the centre, not negative otherwise.
-    extensions
-        Of the rubber in m: at angle zero, at this angle, and the largest.
-    rest_length
-        Of the rubber in m.
+    ``contour``: of the cam; a finite anchor for a cable through the centre.
     """
     both = bool(np.isfinite(contour.anchor_distance))
     angle = float(np.clip(angle, -contour.angles[-1] if both else 0.0, contour.angles[-1]))
@@ -62,7 +51,7 @@ def mechanism_at(
     )
 
 
-def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Floats, Floats, Floats]:
+def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Array, Array, Array]:
     """Return the line of the cable up to its guide, its contact point and the guide."""
     touched = contour.points[contour.angles < abs(angle)]
     side = np.array([1.0, -1.0 if angle < 0.0 else 1.0])
@@ -74,8 +63,8 @@ def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Fl
     return np.vstack([wrapped, contact, end]), contact, end
 
 
-def _one_lip(contour: Contour, angle: float) -> Floats:
+def _one_lip(contour: Contour, angle: float) -> Array:
     """Return the sector between the lip and the centre, closed, in the resting frame."""
     points = contour.points
-    result: Floats = turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
+    result: Array = turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
     return result

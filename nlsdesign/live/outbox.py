@@ -8,13 +8,7 @@ from typing import IO, Any
 
 
 class Outbox:
-    """Lines to the server: ``P`` for the page, ``S`` for the server itself.
-
-    Parameters
-    ----------
-    stream
-        To the server.
-    """
+    """Lines to the server: ``P`` for the page, ``S`` for the server itself."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
@@ -22,21 +16,12 @@ class Outbox:
     def page(self, message: Mapping[str, Any]) -> None:
         """Say something to the page.
 
-        Parameters
-        ----------
-        message
-            Plain data; numbers are finite or ``None``.
+        ``message``: plain data; numbers are finite or ``None``.
         """
         self._write(b"P", message)
 
     def server(self, message: Mapping[str, Any]) -> None:
-        """Answer a question of the server.
-
-        Parameters
-        ----------
-        message
-            Plain data with the ``number`` of the question.
-        """
+        """Answer a question of the server."""
         self._write(b"S", message)
 
     def _write(self, kind: bytes, message: Mapping[str, Any]) -> None:

@@ -6,9 +6,9 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import NlsError
+from ..foundation.arrays import Array
+from ..foundation.errors import NlsError
 from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
 from .at_angle import AngleView
 from .limit_words import in_words
@@ -19,13 +19,7 @@ _MOST_POINTS = 140
 
 
 def answer_data(answer: LiveAnswer) -> dict[str, Any]:
-    """Return an answer as plain data.
-
-    Parameters
-    ----------
-    answer
-        To an edit.
-    """
+    """Return an answer as plain data."""
     data: dict[str, Any] = to_json(dataclasses.replace(answer, design=None))
     return {**data, "design": design_data(answer.design), "stale": answer.stale}
 
@@ -33,10 +27,7 @@ def answer_data(answer: LiveAnswer) -> dict[str, Any]:
 def design_data(design: DesignView | None) -> dict[str, Any] | None:
     """Return a design as plain data, without the contour, which the mechanism shows.
 
-    Parameters
-    ----------
-    design
-        What is shown; none before the first.
+    ``design``: what is shown; none before the first.
     """
     if design is None:
         return None
@@ -49,13 +40,7 @@ def design_data(design: DesignView | None) -> dict[str, Any] | None:
 
 
 def angle_data(answer: AngleAnswer) -> dict[str, Any]:
-    """Return what holds at an angle as plain data, without the mechanism, which is sent before.
-
-    Parameters
-    ----------
-    answer
-        At one angle.
-    """
+    """Return what holds at an angle as plain data, without the mechanism, which is sent before."""
     return {
         "angle": answer.angle,
         "observability": to_json(answer.observability),
@@ -67,12 +52,7 @@ def angle_data(answer: AngleAnswer) -> dict[str, Any]:
 def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, Any]:
     """Return the mechanism at an angle, or why there is no picture of it.
 
-    Parameters
-    ----------
-    shown
-        Design; none before the first.
-    angle
-        In rad.
+    ``shown``: design; none before the first.
     """
     if shown is None or angle is None:
         return {"angle": angle, "mechanism": None, "reason": "there is no design yet"}
@@ -84,14 +64,8 @@ def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, An
     return {"angle": angle, "mechanism": _lines(mechanism), "reason": ""}
 
 
-def short_numbers(values: NDArray[np.float64]) -> list[Any]:
-    """Return numbers with seven digits; those that are not finite are ``None``.
-
-    Parameters
-    ----------
-    values
-        Of any shape.
-    """
+def short_numbers(values: Array) -> list[Any]:
+    """Return numbers with seven digits; those that are not finite are ``None``."""
     finite = np.isfinite(values)
     kept = np.where(finite, values, 0.0)
     size = np.where(kept == 0.0, 1.0, np.abs(kept))
@@ -114,10 +88,10 @@ def _lines(mechanism: Mechanism) -> dict[str, Any]:
     return {"angle": mechanism.angle, **lines, "extent": extent, "remark": mechanism.remark}
 
 
-def _fewer(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fewer(points: Array) -> Array:
     """Return a line with fewer points; its ends, and every corner of a short one, stay."""
     if points.ndim < 2 or len(points) <= _MOST_POINTS:
         return points
     kept = np.unique(np.round(np.linspace(0, len(points) - 1, _MOST_POINTS)).astype(int))
-    fewer: NDArray[np.float64] = points[kept]
+    fewer: Array = points[kept]
     return fewer

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..errors import NlsError, ValueRangeError, brief, unknown_name
+from ..foundation.errors import NlsError, ValueRangeError, brief, unknown_name
 from .edits import edit_from
 from .session_news import SessionNews
 from .work_news import TASKS
@@ -31,13 +31,7 @@ class PageQuestions:
         }  # fmt: skip
 
     def answer(self, asked: Asked) -> None:
-        """Answer a message; what cannot be done is refused in words.
-
-        Parameters
-        ----------
-        asked
-            As the page sent it, which may be anything.
-        """
+        """Answer a message; what cannot be done is refused in words."""
         try:
             self._do(asked)
         except NlsError as error:

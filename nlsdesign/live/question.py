@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..components.assembly.named_parts import Assembly
-from ..design import Contour, Limit, NumberRange, TabulatedTorque, safe_limits
-from ..design.statics.declared_cam import with_contour
-from ..design.statics.smooth_cables import with_smooth_cables
-from ..errors import ValueRangeError, brief, unknown_name
-from ..model import FlatModel, flatten
-from ..model.roles import series_cam
-from ..model.structure import CamNames
-from .limit_kinds import LIMIT_KINDS, LimitKind
-from .stretch import StrainEnd, strain_ends
+from ..design.parametric.cam_question import CamQuestion, TargetPoint
+from ..foundation.errors import ValueRangeError, brief
 
 FEWEST_POINTS, MOST_POINTS = 2, 50
 """Points of a target with the first one at angle zero, which has no torque."""
@@ -27,7 +16,6 @@ LEAST_STEP = 1e-3
 """Least distance of two points in rad."""
 LARGEST_ANGLE = 6.28
 LARGEST_TORQUE = 1e5
-_GIVEN = "given by the designer"
 _READ_IN = {
     "rad": ("°", 180.0 / math.pi),
     "m": ("mm", 1e3),
@@ -40,230 +28,14 @@ _READ_IN = {
 """Units of the page and their factors, by unit in SI; "%" stands for a ratio that is read so."""
 
 
-class TargetPoint(NamedTuple):
-    """A point that the torque curve passes through: angle in rad, torque in N·m."""
-
-    angle: float
-    torque: float
-
-
-class NumberState(NamedTuple):
-    """A number that a designer may hold or free: all in SI, ``shown_unit`` is that of the deck."""
-
-    name: str
-    value: float
-    unit: str
-    shown_unit: str
-    free: bool
-    minimum: float
-    maximum: float
-    source: str
-
-
-class LimitNumber(NamedTuple):
-    """A limit that holds: what it is, its number in SI, and whether it follows from the deck."""
-
-    kind: LimitKind
-    value: float
-    by_default: bool
-
-
 @dataclass(frozen=True, eq=False)
-class ChosenMachine:
-    """An actuator with the rubber that was chosen; questions about it share what follows from its structure.
+class LiveQuestion(CamQuestion):
+    """What is asked on the page: a question with a title, its points within what the page can draw."""
 
-    Parameters
-    ----------
-    assembly
-        As declared.
-    material
-        Rubber of the library; empty for that of the deck.
-    designed
-        Contour to which its cam was fitted, where it was designed here.
-    """
-
-    assembly: Assembly
-    material: str = ""
-    designed: Contour | None = None
-
-    @cached_property
-    def model(self) -> FlatModel:
-        """Flat model, with cables that are smooth."""
-        return flatten(with_smooth_cables(self.assembly))
-
-    @cached_property
-    def cam(self) -> CamNames:
-        """Names around its cam."""
-        return series_cam(self.model)
-
-    @property
-    def cam_part(self) -> object:
-        """The cam, with the contour that it was designed with where there is one."""
-        return with_contour(self.assembly[self.cam.name], self.designed)
-
-    @cached_property
-    def sizes(self) -> tuple[str, ...]:
-        """Names of the single numbers that may be given or freed: pretension, rubber, anchor."""
-        cam = self.cam
-        rubber = [name for piece in cam.specimens for name in (*piece.section, piece.rest_length)]
-        names = [cam.pretension, *rubber, *([] if cam.anchor_distance is None else [cam.anchor_distance])]
-        known = self.assembly.quantities()
-        return tuple(name for name in dict.fromkeys(names) if name in known)
-
-    @cached_property
-    def strain_ends(self) -> dict[str, StrainEnd]:
-        """How far each piece of rubber may be stretched, by its path."""
-        return strain_ends(self.model)
-
-    @cached_property
-    def default_limits(self) -> dict[str, float]:
-        """Limits that follow from cable and rubber, in SI, by name of their kind."""
-        kinds = [(LIMIT_KINDS[type(each).__name__], each) for each in safe_limits(self.model)]
-        return {kind.name: kind.value_of(each) for kind, each in kinds}
-
-
-@dataclass(frozen=True, eq=False)
-class LiveQuestion:
-    """What is asked of a design; each change gives a new one.
-
-    Parameters
-    ----------
-    title
-        Of the actuator that it began from.
-    machine
-        Actuator and rubber.
-    points
-        Of the target, ascending; the first is angle zero without torque. The curve between them is the
-        monotone cubic of :class:`~nlsdesign.design.TabulatedTorque`, C¹ and without bumps of its own;
-        through two points it is a straight line.
-    limits
-        Numbers in SI of the limits that were set, by name of their kind.
-    free
-        Names of what may change.
-    ranges
-        Between which numbers in SI a free number may move, by name.
-    given
-        Numbers in SI in place of those of the machine, by name.
-    """
-
-    title: str
-    machine: ChosenMachine
-    points: tuple[TargetPoint, ...]
-    limits: Mapping[str, float] = field(default_factory=dict)
-    free: tuple[str, ...] = ()
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    given: Mapping[str, float] = field(default_factory=dict)
-
-    @cached_property
-    def actuator(self) -> Assembly:
-        """The machine with the numbers that were given."""
-        known = self.machine.assembly.quantities()
-        return self.machine.assembly.with_values(
-            {name: known[name].with_value(value, _GIVEN) for name, value in self.given.items()}
-        )
-
-    @property
-    def cam(self) -> CamNames:
-        """Names around its cam."""
-        return self.machine.cam
-
-    @property
-    def contour(self) -> str:
-        """Name by which the contour is free."""
-        return f"{self.cam.name}.contour"
-
-    @cached_property
-    def target(self) -> TabulatedTorque:
-        """The torque curve through the points."""
-        angles, torques = (tuple(column) for column in zip(*self.points, strict=True))
-        if len(angles) == 2:
-            angles, torques = (0.0, angles[1] / 2.0, angles[1]), (0.0, torques[1] / 2.0, torques[1])
-        return TabulatedTorque(angles=angles, torques=torques)
-
-    @property
-    def target_size(self) -> float:
-        """Largest torque of the target in N·m; between its points the curve is monotone."""
-        return max(point.torque for point in self.points)
-
-    @cached_property
-    def limit_values(self) -> dict[str, LimitNumber]:
-        """All limits that hold by name: those that were set, and those of the machine besides."""
-        result = {name: LimitNumber(LIMIT_KINDS[name], value, False) for name, value in self.limits.items()}
-        for name, value in self.machine.default_limits.items():
-            result.setdefault(name, LimitNumber(LIMIT_KINDS[name], value, True))
-        return dict(sorted(result.items()))
-
-    @property
-    def keep(self) -> tuple[Limit, ...]:
-        """The same as limits of a design, with the ranges of what is free.
-
-        Without limits on the shape of a contour that is held: nothing that is free changes them.
-        """
-        limits = [
-            each.kind.limit(each.value) for each in self.limit_values.values() if self.keeps(each.kind.name)
-        ]
-        ranges = [NumberRange(name, *self.ranges[name]) for name in self.free if name in self.ranges]
-        return (*limits, *ranges)
-
-    @property
-    def held_contour(self) -> Contour | None:
-        """Contour that was designed here and is held; ``None`` where it is free, or that of a deck."""
-        return None if self.contour in self.free else self.machine.designed
-
-    def keeps(self, limit: str) -> bool:
-        """Tell whether a limit is kept, and not only shown: whether anything that is free can change it.
-
-        Parameters
-        ----------
-        limit
-            Name of its class; ranges of free numbers are always kept.
-        """
-        kind = LIMIT_KINDS.get(limit)
-        return kind is None or self.contour in self.free or not kind.of_shape
-
-    @cached_property
-    def numbers(self) -> dict[str, NumberState]:
-        """The single numbers that may be given or freed, by name."""
-        known, result = self.machine.assembly.quantities(), {}
-        for name in self.machine.sizes:
-            v, declared = self.machine.model.variable(name), known[name]
-            low, high = self.ranges.get(name, (v.minimum, v.maximum))
-            result[name] = NumberState(
-                name, self.given.get(name, declared.number), v.unit, declared.unit, name in self.free,
-                low, high, _GIVEN if name in self.given else declared.source,
-            )  # fmt: skip
-        return result
-
-    def number(self, name: str) -> NumberState:
-        """Return one of them.
-
-        Parameters
-        ----------
-        name
-            Full name.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest that exists.
-        """
-        if name not in self.numbers:
-            raise unknown_name("number", name, self.numbers)
-        return self.numbers[name]
+    title: str = ""
 
     def with_points(self, points: tuple[TargetPoint, ...]) -> LiveQuestion:
-        """Return the question with another target.
-
-        Parameters
-        ----------
-        points
-            In the order of their angles.
-
-        Raises
-        ------
-        ValueRangeError
-            If there are too many or not enough, out of order, or out of range.
-        """
+        """Return the question with another target."""
         if not FEWEST_POINTS <= len(points) <= MOST_POINTS:
             raise ValueRangeError(
                 f"target with {len(points)} points", f"has {FEWEST_POINTS} to {MOST_POINTS} of them",
@@ -295,21 +67,7 @@ class LiveQuestion:
 def finite_in(what: str, value: object, *, lowest: float, highest: float, unit: str = "1") -> float:
     """Return a number that a designer gave, checked.
 
-    Parameters
-    ----------
-    what
-        For messages.
-    value
-        Anything.
-    lowest, highest
-        Inclusive range.
-    unit
-        Unit in SI of value and range; people read them in the unit of the page.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is no finite number in the range.
+    ``unit``: unit in SI of value and range; people read them in the unit of the page.
     """
     try:
         sound = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)

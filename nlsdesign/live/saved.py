@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from ..components.assembly.deck_writer import deck_text, declare
-from ..deck import read_deck
 from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_of
 from ..design.curves.numbers import plain
-from ..errors import DeckError, ValueRangeError
+from ..design.optimisation.limit_kinds import limit_kinds
+from ..design.parametric.cam_question import ChosenMachine, TargetPoint
+from ..foundation.deck import read_deck
+from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
-from .limit_kinds import LIMIT_KINDS
-from .question import ChosenMachine, LiveQuestion, TargetPoint
+from .question import LiveQuestion
 
 _DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
 _MOST_VALUES = 200
@@ -51,20 +52,15 @@ class SavedDesign:
 def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
     """Return a question as text.
 
-    Parameters
-    ----------
-    question
-        As it stands.
-    values
-        Numbers of the last design in SI by name; empty before the first.
+    ``values``: numbers of the last design in SI by name; empty before the first.
     """
     lines = [_HEAD, f"free = {json.dumps(list(question.free))}", "", "[target]"]
     rows = (question.target.angles, question.target.torques)
     angles, torques = (json.dumps([float(v) for v in row]) for row in rows)
     lines += [f"TabulatedTorque = {{angles = {angles}, torques = {torques}}}", "", "[limits]"]
     for name, value in question.limits.items():
-        kind = LIMIT_KINDS[name]
-        lines.append(f'{name} = {{{kind.field} = "{float(value)!r} {kind.unit}"}}')
+        kind = limit_kinds()[name]
+        lines.append(f'{name} = {{{kind.described.field} = "{float(value)!r} {kind.unit}"}}')
     ranges = [
         f'{{name = {json.dumps(name)}, minimum = "{float(low)!r} {question.numbers[name].unit}", '
         f'maximum = "{float(high)!r} {question.numbers[name].unit}"}}'
@@ -86,17 +82,7 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
 def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
     """Return the question of a saved design, and the numbers at which its design stood.
 
-    Parameters
-    ----------
-    texts
-        As :func:`saved` made them; the third may be empty.
-
-    Raises
-    ------
-    ValueRangeError
-        If a text is too large, or asks for something that the live design does not have.
-    NlsError
-        If a text cannot be read.
+    ``texts``: as :func:`saved` made them; the third may be empty.
     """
     for name, text in ((_DECK, texts.deck), (_JOB, texts.job), (_BEGIN, texts.begin)):
         if len(text.encode()) > MOST_DECK_BYTES:
@@ -120,7 +106,9 @@ def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
     limits, ranges = _limits_of(job.keep)
     machine = ChosenMachine(actuator, str(begin.get("material", ""))[:100])
     machine = replace(machine, designed=_contour_of(begin, machine))
-    question = LiveQuestion(str(begin.get("title", actuator.name))[:100], machine, points, limits, (), ranges)
+    question = LiveQuestion(
+        machine, points, limits, (), ranges, title=str(begin.get("title", actuator.name))[:100]
+    )
     given = [each for each in begin.get("points", []) if isinstance(each, list) and len(each) == 2]
     if len(given) == 2 and len(points) == 3:
         question = replace(question, points=(points[0], points[2]))
@@ -173,12 +161,12 @@ def _limits_of(keep: tuple[Any, ...]) -> tuple[dict[str, float], dict[str, tuple
         name = type(limit).__name__
         if isinstance(limit, NumberRange):
             ranges[limit.name] = (plain(limit.minimum), plain(limit.maximum))
-        elif name in LIMIT_KINDS and name not in limits:
-            limits[name] = LIMIT_KINDS[name].value_of(limit)
+        elif name in limit_kinds() and name not in limits:
+            limits[name] = limit_kinds()[name].value_of(limit)
         else:
             raise ValueRangeError(
                 f"{_JOB}: limit {name}", "is twice there, or is none of the live design",
-                next_step=f"those are: {', '.join([*LIMIT_KINDS, 'NumberRange'])}",
+                next_step=f"those are: {', '.join([*limit_kinds(), 'NumberRange'])}",
             )  # fmt: skip
     return limits, ranges
 

@@ -8,7 +8,7 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
-from ..errors import NlsError, missing_library
+from ..foundation.errors import NlsError, missing_library
 from .access import Access, loopback
 from .application import LONGEST_MESSAGE, application
 from .session_process import SessionProcess
@@ -30,27 +30,7 @@ def serve(
 ) -> None:
     """Serve the live page to this machine until the program is interrupted.
 
-    Parameters
-    ----------
-    deck
-        That each tab begins with; empty for the first of the gallery.
-    host
-        A loopback address.
-    port
-        Zero for one that is free.
-    packages
-        Names of packages that decks may take parts from.
-    ready
-        Called with the address of the page once it answers.
-
-    Raises
-    ------
-    ValueRangeError
-        If the host is no loopback address.
-    NlsError
-        If the port cannot be had.
-    MissingLibraryError
-        If the server's library is not installed.
+    ``deck``: that each tab begins with; empty for the first of the gallery.
     """
     _require_libraries()
     import uvicorn
@@ -97,13 +77,7 @@ async def _kept_in_bounds(sessions: Sessions) -> AsyncIterator[None]:
 
 
 def _require_libraries() -> None:
-    """Refuse in words where a library of the server is not installed.
-
-    Raises
-    ------
-    MissingLibraryError
-        With the extra that brings it.
-    """
+    """Refuse in words where a library of the server is not installed."""
     try:
         import starlette
         import uvicorn
@@ -125,13 +99,7 @@ def _settings(app: Any) -> Any:
 
 
 def _listener(host: str, port: int) -> socket.socket:
-    """Return a socket that listens at a port.
-
-    Raises
-    ------
-    NlsError
-        If the port is taken or not allowed.
-    """
+    """Return a socket that listens at a port."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     try:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 from .archive import archived, unarchived
 from .background import warm_up
 from .exports import ExportDesign
@@ -60,18 +60,7 @@ class SessionDesign:
             self._begin(LiveDesign(gallery_question(FIRST)), trouble)
 
     def run(self, inbox: Inbox) -> None:
-        """Answer until no message can come any more.
-
-        Parameters
-        ----------
-        inbox
-            What is asked.
-
-        Raises
-        ------
-        EOFError
-            When the server has closed it.
-        """
+        """Answer until no message can come any more."""
         if not inbox.waiting:
             choices()
         last_news = time.monotonic()

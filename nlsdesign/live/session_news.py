@@ -9,10 +9,10 @@ from typing import Any
 
 from ..components.materials.library import materials
 from ..components.materials.material_law import missing_law
-from ..errors import NlsError
+from ..design.optimisation.limit_kinds import limit_kinds
+from ..foundation.errors import NlsError
 from .answers import LiveAnswer, to_json
 from .gallery import gallery_cards
-from .limit_kinds import LIMIT_KINDS
 from .limit_words import in_words
 from .live_design import LiveDesign
 from .outbox import Outbox
@@ -54,13 +54,7 @@ class SessionNews:
         return self._settle_at is None and not self._look_due and not self.work.running
 
     def everything(self, number: int | None) -> None:
-        """Show everything, as to a page that was loaded just now.
-
-        Parameters
-        ----------
-        number
-            Of the question.
-        """
+        """Show everything, as to a page that was loaded just now."""
         self.answer(self.live.answer, number, None)
         self.kept(number)
         self._outbox.page({"what": "gallery", **choices()})
@@ -73,14 +67,7 @@ class SessionNews:
     def answer(self, answer: LiveAnswer, number: int | None, angle: float | None) -> None:
         """Send an answer with the mechanism; what takes longer at the angle follows on a pause.
 
-        Parameters
-        ----------
-        answer
-            To an edit.
-        number
-            Of the question.
-        angle
-            That the page looks at in rad; that of before for ``None``.
+        ``angle``: that the page looks at in rad; that of before for ``None``.
         """
         at = None
         if answer.design is not None:
@@ -92,28 +79,14 @@ class SessionNews:
         self._outbox.page({"what": "answer", "number": number, "answer": answer_data(answer), "at": at})
 
     def turn(self, angle: float, number: int | None) -> None:
-        """Show the mechanism at another angle.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        number
-            Of the question.
-        """
+        """Show the mechanism at another angle."""
         self._angle = angle
         at = mechanism_data(self.live.shown, angle)
         self._outbox.page({"what": "at", "number": number, "at": at})
         self._look_due = True
 
     def kept(self, number: int | None) -> None:
-        """Send the designs that are kept.
-
-        Parameters
-        ----------
-        number
-            Of the question.
-        """
+        """Send the designs that are kept."""
         kept = [
             {
                 "name": name, "title": each.question.title, "material": each.question.machine.material,
@@ -124,27 +97,11 @@ class SessionNews:
         self._outbox.page({"what": "kept", "number": number, "kept": kept})
 
     def work_of(self, name: str, number: int | None) -> None:
-        """Send the state of work of a kind.
-
-        Parameters
-        ----------
-        name
-            Of the kind.
-        number
-            Of the question.
-        """
+        """Send the state of work of a kind."""
         self._outbox.page({"what": "work", "number": number, "work": self.work.of(name)})
 
     def refuse(self, reason: str, number: int | None) -> None:
-        """Say why something was not done.
-
-        Parameters
-        ----------
-        reason
-            In words.
-        number
-            Of the question.
-        """
+        """Say why something was not done."""
         words = in_words(reason, self.live.question.limit_values)
         self._outbox.page({"what": "refused", "number": number, "reason": words})
 
@@ -188,7 +145,7 @@ def choices() -> dict[str, Any]:
     """Return what a page lets choose from: actuators, rubbers, limits."""
     kinds = [
         {"name": each.name, "words": each.words, "unit": each.unit, "upper": each.upper}
-        for each in LIMIT_KINDS.values()
+        for each in limit_kinds().values()
     ]
     return {
         "cards": [to_json(each) for each in gallery_cards()],

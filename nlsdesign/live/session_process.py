@@ -20,7 +20,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 
 Listener = Callable[[str], Awaitable[None]]
 
@@ -73,22 +73,13 @@ class SessionProcess:
         return self._process is not None and self._process.returncode is None
 
     def listen(self, listener: Listener | None) -> None:
-        """Hand what the process says to a page from now on, to none for ``None``.
-
-        Parameters
-        ----------
-        listener
-            Takes one message as text.
-        """
+        """Hand what the process says to a page from now on, to none for ``None``."""
         self._listener = listener
 
     async def tell(self, text: str) -> None:
         """Tell the page that listens now something; one that is not there misses nothing.
 
-        Parameters
-        ----------
-        text
-            A message of JSON. A page that comes back is shown the whole state.
+        ``text``: a message of JSON. A page that comes back is shown the whole state.
         """
         if self._listener is not None:
             with contextlib.suppress(Exception):
@@ -97,26 +88,12 @@ class SessionProcess:
     async def from_page(self, message: Mapping[str, Any]) -> None:
         """Hand over a message of the page.
 
-        Parameters
-        ----------
-        message
-            Parsed; the process judges what it says.
+        ``message``: parsed; the process judges what it says.
         """
         await self._send({"page": dict(message)})
 
     async def ask(self, question: Mapping[str, Any]) -> dict[str, Any]:
-        """Ask for something and wait for it.
-
-        Parameters
-        ----------
-        question
-            Of the server, for instance for a file.
-
-        Raises
-        ------
-        NlsError
-            If the process has ended, or does not answer in time.
-        """
+        """Ask for something and wait for it."""
         number = next(self._numbers)
         future: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self._waiting[number] = future
@@ -180,18 +157,7 @@ class SessionProcess:
 
 
 def content_of(answer: Mapping[str, Any]) -> tuple[str, bytes]:
-    """Return name and bytes of a file that a process has answered with.
-
-    Parameters
-    ----------
-    answer
-        Of :meth:`SessionProcess.ask`.
-
-    Raises
-    ------
-    NlsError
-        If the process refused; its words.
-    """
+    """Return name and bytes of a file that a process has answered with."""
     if "refused" in answer:
         raise NlsError("file", str(answer["refused"]))
     return str(answer["name"]), base64.b64decode(answer["content"])

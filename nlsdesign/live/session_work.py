@@ -27,7 +27,7 @@ def main() -> None:
     begin = inbox.take(None)
     assert begin is not None
     sys.path.extend(each for each in begin["places"] if each not in sys.path)
-    from ..extensions import extended_by, load_extension
+    from ..foundation.extensions import extended_by, load_extension
     from .session_design import SessionDesign
 
     with contextlib.suppress(EOFError), extended_by(*map(load_extension, begin["packages"])):

@@ -80,13 +80,7 @@ class Sessions:
             await self._spare.start()
 
     def get(self, name: str) -> Session | None:
-        """Return a session that is there.
-
-        Parameters
-        ----------
-        name
-            That a tab has kept.
-        """
+        """Return a session that is there."""
         session = self._sessions.get(name)
         if session is not None:
             session.touched = self._clock()
@@ -108,13 +102,7 @@ class Sessions:
         return session
 
     def end(self, session: Session) -> None:
-        """End a session with its process.
-
-        Parameters
-        ----------
-        session
-            Of this server.
-        """
+        """End a session with its process."""
         self._sessions.pop(session.name, None)
         session.process.kill()
 

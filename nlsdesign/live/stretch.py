@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..design.optimisation.defaults import StrainEnd
 from ..design.statics.equilibrium import cam_function, elastic_law
+from ..foundation.arrays import Array
 from ..model import FlatModel
-from ..model.roles import series_cam
-from ..model.spring_structure import SpecimenNames
 from .answers import LiveColumn
 
-Floats = NDArray[np.float64]
-
-BREAKS = 5.0
-"""Nominal strain at which soft rubbers break, for rubber of which nothing is stated: the tensile curve of
-PMC-770 ends there (Schepelmann 2014)."""
 _BEYOND = 5e-4
 """Share of the end by which a strain lies beyond it, from which it is stated."""
 _CHANGE = (
@@ -28,66 +21,13 @@ _CHANGE = (
 )
 
 
-class StrainEnd(NamedTuple):
-    """Strain up to which a piece of rubber may be believed, and what says so."""
-
-    strain: float
-    reason: str
-
-
-def strain_ends(model: FlatModel) -> dict[str, StrainEnd]:
-    """Return how far each piece of rubber behind the cam may be stretched, by its path.
-
-    Parameters
-    ----------
-    model
-        Flat model of an actuator with a cam spring.
-    """
-    return {piece.name: _end_of(model, piece) for piece in series_cam(model).specimens}
-
-
 def smallest(ends: Mapping[str, StrainEnd]) -> float:
-    """Return the least strain of several pieces; infinite without any.
-
-    Parameters
-    ----------
-    ends
-        By path of the piece.
-    """
+    """Return the least strain of several pieces; infinite without any."""
     return min((each.strain for each in ends.values()), default=math.inf)
 
 
-def _end_of(model: FlatModel, piece: SpecimenNames) -> StrainEnd:
-    """Return the least of what the laws beside each other in a piece state, and its elongation at break."""
-    ends = [
-        StrainEnd(v.maximum, f"its law is stated to hold up to {100.0 * v.maximum:.4g} %")
-        for v in model.signals
-        if v.bounded
-        and math.isfinite(v.maximum)
-        and v.name.startswith(f"{piece.name}.")
-        and v.name.endswith(".strain")
-        # Laws further inside share the strain of the piece with others in series.
-        and v.name.count(".") == piece.name.count(".") + 2
-    ]
-    if piece.elongation_at_break is not None:
-        breaks = model.values[piece.elongation_at_break]
-        ends.append(StrainEnd(breaks, f"it is declared to break at {100.0 * breaks:.4g} %"))
-    unknown = StrainEnd(
-        BREAKS, f"nothing is stated of its rubber, and soft rubbers break at {100 * BREAKS:g} %"
-    )
-    return min(ends, default=unknown)
-
-
 def stretched_beyond(ends: Mapping[str, StrainEnd], columns: Iterable[LiveColumn]) -> tuple[str, ...]:
-    """Return where rubber is stretched beyond what is stated of it, how far, and what to change.
-
-    Parameters
-    ----------
-    ends
-        By path of the piece.
-    columns
-        Of a design, the angle first.
-    """
+    """Return where rubber is stretched beyond what is stated of it, how far, and what to change."""
     angle, *others = columns
     rows = {each.name: each.values for each in others}
     sentences = []
@@ -103,16 +43,8 @@ def stretched_beyond(ends: Mapping[str, StrainEnd], columns: Iterable[LiveColumn
     return tuple(sentences)
 
 
-def declared_strain(model: FlatModel, angles: Floats) -> float | None:
-    """Return the largest strain of rubber of the machine as it is declared; ``None`` without rubber.
-
-    Parameters
-    ----------
-    model
-        Flat model of an actuator with a cam spring.
-    angles
-        In rad.
-    """
+def declared_strain(model: FlatModel, angles: Array) -> float | None:
+    """Return the largest strain of rubber of the machine as it is declared; ``None`` without rubber."""
     law = elastic_law(model)
     if not law.specimens:
         return None

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..errors import NlsError
+from ..foundation.errors import NlsError
 
 FILE_BYTES = 64 << 20
 """Most bytes of one file of records."""
@@ -18,7 +18,7 @@ ALL_BYTES = 256 << 20
 FILES = 40
 """Most files of one session."""
 ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5", ".toml")
-"""What :func:`nlsdesign.identification.load_records` reads, and ``records.toml``."""
+"""What :func:`nlsdesign.bench.identification.load_records` reads, and ``records.toml``."""
 
 
 class TooLargeError(NlsError):
@@ -27,13 +27,7 @@ class TooLargeError(NlsError):
 
 @dataclass
 class Uploads:
-    """The files that one session was handed.
-
-    Parameters
-    ----------
-    folder
-        Where they stand.
-    """
+    """The files that one session was handed."""
 
     folder: Path
     _sizes: dict[str, int] = field(default_factory=dict)
@@ -42,21 +36,8 @@ class Uploads:
     async def keep(self, name: str, parts: AsyncIterator[bytes], announced: int | None) -> str:
         """Write one file and return the name under which it stands.
 
-        Parameters
-        ----------
-        name
-            As the page calls it; letters that a name of ours may not have are replaced, and no path is left.
-        parts
-            The content as it comes.
-        announced
-            Its length in bytes, where the page says it.
-
-        Raises
-        ------
-        TooLargeError
-            If the file, or all together, or their number is too large; nothing of the file is kept.
-        NlsError
-            If its ending is none of records, or another file that is called differently has its place.
+        ``name``: as the page calls it; letters that a name of ours may not have are replaced, and no path is
+        left. ``announced``: its length in bytes, where the page says it.
         """
         kept = plain_name(name)
         self._require_place(kept, name)
@@ -87,13 +68,7 @@ class Uploads:
         return kept
 
     def _require_place(self, kept: str, name: str) -> None:
-        """Refuse a file that would take the place of another: one of two records would be lost unseen.
-
-        Raises
-        ------
-        NlsError
-            If another file stands under that name.
-        """
+        """Refuse a file that would take the place of another: one of two records would be lost unseen."""
         other = self._names.get(kept, name) if kept in self._sizes else name
         if other != name:
             raise NlsError(
@@ -109,15 +84,7 @@ class Uploads:
 
 
 def too_large(name: str, most: int) -> TooLargeError:
-    """Return the error of a file that is too large.
-
-    Parameters
-    ----------
-    name
-        Of the file.
-    most
-        Bytes that are taken.
-    """
+    """Return the error of a file that is too large."""
     return TooLargeError(
         name, f"is larger than {most / 2**20:.4g} MiB, the most that the live page takes",
         next_step="shorten the record, or diagnose from the command line: nlsdesign diagnose",
@@ -125,18 +92,7 @@ def too_large(name: str, most: int) -> TooLargeError:
 
 
 def plain_name(name: str) -> str:
-    """Return the name of a file of records without any path, in letters that every system takes.
-
-    Parameters
-    ----------
-    name
-        As somebody calls it.
-
-    Raises
-    ------
-    NlsError
-        If its ending is none of records.
-    """
+    """Return the name of a file of records without any path, in letters that every system takes."""
     last = re.split(r"[/\\]", name)[-1]
     _, dot, ending = last.rpartition(".")
     if dot + ending.lower() not in ENDINGS:
@@ -147,13 +103,7 @@ def plain_name(name: str) -> str:
 
 
 def plain_letters(name: str) -> str:
-    """Return the name of a file in letters that every system takes, and that end no header.
-
-    Parameters
-    ----------
-    name
-        With its ending.
-    """
+    """Return the name of a file in letters that every system takes, and that end no header."""
     stem, dot, ending = name.rpartition(".")
     # Points within a name stay: sine_2.0Hz is how records.toml calls it too.
     kept = (re.sub(r"[^A-Za-z0-9_.-]+", "_", part).strip("_.")[:80] for part in (stem, ending.lower()))

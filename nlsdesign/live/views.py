@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..design import CamDesign, LimitState
 from ..design.optimisation.result import DesignCurves
+from ..design.parametric.parametric_solver import ParametricDesign
+from ..foundation.arrays import Array
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
 from .limit_words import shown_value
 from .question import LiveQuestion
 from .stretch import smallest, stretched_beyond
-
-Floats = NDArray[np.float64]
 
 ALLOWED = 0.01
 """Rms error over the largest torque above which a design misses its target."""
@@ -26,15 +25,7 @@ _MOST_CHECKED = 161
 
 
 def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> LiveControls:
-    """Return what a designer can move.
-
-    Parameters
-    ----------
-    question
-        As it stands.
-    can_undo, can_redo
-        Whether there is a step back or forth.
-    """
+    """Return what a designer can move."""
     limits = tuple(
         (name, each.kind.words, each.value, each.kind.unit, each.kind.shown_unit, each.kind.upper,
          each.by_default)
@@ -53,16 +44,8 @@ def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> Li
     )
 
 
-def curve_columns(curves: DesignCurves, targets: Floats) -> tuple[LiveColumn, ...]:
-    """Return what cam and rubber do over the angle as columns.
-
-    Parameters
-    ----------
-    curves
-        At the nodes of the contour.
-    targets
-        Torque that is wanted there.
-    """
+def curve_columns(curves: DesignCurves, targets: Array) -> tuple[LiveColumn, ...]:
+    """Return what cam and rubber do over the angle as columns."""
     rows = [
         LiveColumn("angle", "rad", "cam angle", curves.angles),
         LiveColumn("torque", "N*m", "torque of the spring", curves.torques),
@@ -81,13 +64,7 @@ def curve_columns(curves: DesignCurves, targets: Floats) -> tuple[LiveColumn, ..
 
 
 def margins_of(states: Iterable[LimitState]) -> tuple[LimitMargin, ...]:
-    """Return how a design stands to its limits.
-
-    Parameters
-    ----------
-    states
-        Of a finished design.
-    """
+    """Return how a design stands to its limits."""
     return tuple(
         LimitMargin(
             each.limit, each.of, each.value, each.bound,
@@ -100,15 +77,7 @@ def margins_of(states: Iterable[LimitState]) -> tuple[LimitMargin, ...]:
 
 
 def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[ShownNumber, ...]:
-    """Return the numbers of a design.
-
-    Parameters
-    ----------
-    question
-        That it answers.
-    values
-        In SI by name, in place of those of the question.
-    """
+    """Return the numbers of a design."""
     return tuple(
         ShownNumber(n.name, values.get(n.name, n.value), n.unit, n.shown_unit, n.free)
         for n in question.numbers.values()
@@ -116,17 +85,7 @@ def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[
 
 
 def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignView:
-    """Return what is shown of a finished design: its torque is that of the assembly, flattened anew.
-
-    Parameters
-    ----------
-    question
-        That it answers.
-    revision
-        Of the question.
-    design
-        Of the whole search.
-    """
+    """Return what is shown of a finished design: its torque is that of the assembly, flattened anew."""
     check, largest = design.check, design.target.largest
     columns = list(curve_columns(design.curves, design.target.torque(design.curves.angles)))
     every = max(1, len(check.angles) // _MOST_CHECKED)
@@ -158,29 +117,35 @@ def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignV
     )
 
 
-def unkept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> tuple[LimitMargin, ...]:
-    """Return how a design stands to limits that are shown and not kept: nothing that is free changes them.
+def quick_view_of(question: LiveQuestion, revision: int, design: ParametricDesign) -> DesignView:
+    """Return what is shown of a quick design: its torque is that of the program's nodes."""
+    curves, limits, largest = design.curves, design.limits, question.target_size
+    columns, ends = curve_columns(curves, design.targets), question.machine.strain_ends
+    return DesignView(
+        revision=revision,
+        checked=False,
+        columns=columns,
+        rms_error=design.rms,
+        largest_error=float(np.max(np.abs(curves.torques - design.targets))),
+        relative_error=design.rms / largest,
+        met=design.rms <= ALLOWED * largest,
+        margins=margins_of(limits),
+        active=tuple(dict.fromkeys(state.limit for state in limits if state.active)),
+        numbers=shown_numbers(question, design.values),
+        contour=design.contour.points,
+        rubber_volume=design.rubber_volume,
+        strain_end=smallest(ends),
+        beyond=stretched_beyond(ends, columns),
+    )
 
-    Parameters
-    ----------
-    question
-        That it answers.
-    margins
-        To all of its limits.
-    """
+
+def unkept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> tuple[LimitMargin, ...]:
+    """Return how a design stands to limits that are shown and not kept: nothing that is free changes them."""
     return tuple(each for each in margins if not question.keeps(each.limit))
 
 
 def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
-    """Return in words which limits are shown and not kept, and which of them the design breaks.
-
-    Parameters
-    ----------
-    question
-        As it stands.
-    margins
-        Of the design, to all limits.
-    """
+    """Return in words which limits are shown and not kept, and which of them the design breaks."""
     limits = [each for each in question.limit_values.values() if not question.keeps(each.kind.name)]
     titles = " and ".join(f"{each.kind.title} ({each.kind.shown(each.value)})" for each in limits)
     rule = "is shown and not kept" if len(limits) == 1 else "are shown and not kept"

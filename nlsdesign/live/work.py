@@ -9,18 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
 from ..design import Target, ToleranceResult, tolerance_analysis
-from ..errors import ValueRangeError
+from ..foundation.arrays import Array
+from ..foundation.errors import ValueRangeError
 from .answers import Lazy, LoopResponse
 from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
 from .full_design import whole_design
 from .question import LiveQuestion
-
-Floats = NDArray[np.float64]
 
 MOST_DRAWS = 2000
 _FEWEST_DRAWS = 20
@@ -36,20 +34,7 @@ class LiveTask(ABC):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the function that does it and its arguments, picklable.
-
-        Parameters
-        ----------
-        question
-            As it stands.
-        shown
-            The last good design.
-
-        Raises
-        ------
-        ValueRangeError
-            If it cannot be done now.
-        """
+        """Return the function that does it and its arguments, picklable."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +51,7 @@ class SettleDesign(LiveTask):
 
 @dataclass(frozen=True)
 class ToleranceCloud(LiveTask):
-    """Torque of made springs around the design: :class:`CloudAnswer`.
-
-    Parameters
-    ----------
-    draws
-        Number of made springs.
-    seed
-        Of the draws.
-    """
+    """Torque of made springs around the design: :class:`CloudAnswer`."""
 
     draws: int = 200
     seed: int = 1
@@ -82,13 +59,7 @@ class ToleranceCloud(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the analysis on the finished assembly.
-
-        Raises
-        ------
-        ValueRangeError
-            If the number of draws or the seed is out of range.
-        """
+        """Return the analysis on the finished assembly."""
         for what, number, least, most in (
             ("draws", self.draws, _FEWEST_DRAWS, MOST_DRAWS),
             ("seed", self.seed, 0, 2**31 - 1),
@@ -129,13 +100,7 @@ class DiagnoseRecords(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the diagnosis of the machine as it is declared, not as it is designed.
-
-        Raises
-        ------
-        ValueRangeError
-            If there are too many records, or they are too large.
-        """
+        """Return the diagnosis of the machine as it is declared, not as it is designed."""
         files = [file for file in Path(self.folder).iterdir() if file.is_file()]
         size = sum(file.stat().st_size for file in files)
         if not 1 <= len(files) <= _MOST_FILES or size > _MOST_BYTES:
@@ -157,20 +122,7 @@ class LiveWork:
     def start(
         self, task: LiveTask, question: LiveQuestion, revision: int, shown: AngleView | None
     ) -> WorkState:
-        """Start a task; one of its kind that runs is cancelled.
-
-        Parameters
-        ----------
-        task
-            What to do.
-        question, revision, shown
-            Of the session.
-
-        Raises
-        ------
-        ValueRangeError
-            If it cannot be done now.
-        """
+        """Start a task; one of its kind that runs is cancelled."""
         work, arguments = task.call(question, shown)
         name = type(task).__name__
         self.cancel(name)
@@ -183,25 +135,11 @@ class LiveWork:
         return tuple(each.state() for each in self._running.values())
 
     def wait(self, name: str, seconds: float) -> WorkState | None:
-        """Return the state of work once it is over, or after that time; ``None`` if it never began.
-
-        Parameters
-        ----------
-        name
-            Of the kind, for instance ``"SettleDesign"``.
-        seconds
-            Longest.
-        """
+        """Return the state of work once it is over, or after that time; ``None`` if it never began."""
         return self._running[name].wait(seconds) if name in self._running else None
 
     def cancel(self, name: str) -> WorkState | None:
-        """End work of a kind; ``None`` if it never began.
-
-        Parameters
-        ----------
-        name
-            Of the kind.
-        """
+        """End work of a kind; ``None`` if it never began."""
         return self._running[name].cancel() if name in self._running else None
 
     def close(self) -> None:
@@ -216,15 +154,7 @@ class LiveWork:
         self._designs.clear()
 
     def loop_at(self, angle: float, shown: AngleView) -> Lazy:
-        """Return the torque loop at one angle, where it was asked for and computed for this design.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        shown
-            The design.
-        """
+        """Return the torque loop at one angle, where it was asked for and computed for this design."""
         work, revision = self._running.get(TorqueLoop.__name__), shown.view.revision
         state = None if work is None else work.state()
         begun = self._designs.get(TorqueLoop.__name__)
@@ -233,7 +163,7 @@ class LiveWork:
             return Lazy("asked for later", revision)
         if state.state != "done":
             return Lazy(state.state, revision, None, state.message)
-        angles: Floats = state.value[0]
+        angles: Array = state.value[0]
         responses: list[LoopResponse] = state.value[1]
         nearest = int(np.argmin(np.abs(angles - abs(angle))))
         words = f"at {np.degrees(angles[nearest]):.1f}°, the nearest of {len(angles)} angles"
@@ -258,30 +188,17 @@ class CloudAnswer:
         Summary: pairs of text.
     """
 
-    angles: Floats
-    nominal: Floats
-    band: Floats
-    errors: Floats
+    angles: Array
+    nominal: Array
+    band: Array
+    errors: Array
     rows: tuple[tuple[str, str], ...]
 
 
 def tolerance_cloud(
     stage: Callable[[str], None], machine: Assembly, target: Target, draws: int, seed: int
 ) -> CloudAnswer:
-    """Return the tolerance analysis of a design.
-
-    Parameters
-    ----------
-    stage
-        Called with what is done now.
-    machine, target, draws, seed
-        As for :func:`~nlsdesign.design.tolerance_analysis`.
-
-    Raises
-    ------
-    NlsError
-        If the machine cannot be analysed.
-    """
+    """Return the tolerance analysis of a design."""
     stage(f"computes {draws} made springs")
     result: ToleranceResult = tolerance_analysis(machine, target=target, draws=draws, seed=seed)
     return CloudAnswer(result.angles, result.nominal, result.band, result.errors, tuple(result.rows()))
@@ -316,25 +233,10 @@ class DiagnosisAnswer:
 
 
 def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) -> DiagnosisAnswer:
-    """Return what the records of a folder say.
-
-    Parameters
-    ----------
-    stage
-        Called with what is tried now.
-    actuator
-        As declared.
-    folder
-        Of the records.
-
-    Raises
-    ------
-    NlsError
-        If the records cannot be used.
-    """
+    """Return what the records of a folder say."""
+    from ..bench.discrepancy import diagnose
+    from ..bench.identification import load_records
     from ..components.assembly.deck_writer import deck_text
-    from ..discrepancy import diagnose
-    from ..identification import load_records
     from ..model import flatten
 
     stage("reads the records")

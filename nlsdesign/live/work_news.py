@@ -49,18 +49,7 @@ class WorkNews:
         return any(each.state == "computing" for each in self._live.work.states())
 
     def start(self, name: str) -> None:
-        """Start work of a kind.
-
-        Parameters
-        ----------
-        name
-            One of :data:`TASKS`.
-
-        Raises
-        ------
-        ValueRangeError
-            If it cannot be done now.
-        """
+        """Start work of a kind."""
         task = TASKS[name](self._records)
         if isinstance(task, DiagnoseRecords):
             self._records.mkdir(parents=True, exist_ok=True)
@@ -70,13 +59,7 @@ class WorkNews:
         self._noted(state)
 
     def stop(self, name: str) -> None:
-        """End work of a kind.
-
-        Parameters
-        ----------
-        name
-            One of :data:`TASKS`.
-        """
+        """End work of a kind."""
         state = self._live.work.cancel(name)
         if state is not None:
             self._noted(state)
@@ -103,13 +86,7 @@ class WorkNews:
         return [self.of(name) for name in TASKS]
 
     def of(self, name: str) -> dict[str, Any]:
-        """Return the news of work of a kind.
-
-        Parameters
-        ----------
-        name
-            One of :data:`TASKS`.
-        """
+        """Return the news of work of a kind."""
         state = self._states.get(name)
         if state is None:
             return {"name": name, "state": "not begun", "message": "", "revision": 0, "seconds": 0.0,

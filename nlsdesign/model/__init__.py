@@ -1,19 +1,15 @@
 """The waist: from an assembly to a frozen, flat, named model, and views of it."""
 
 from .casadi_view import casadi_dae
-from .flat import FlatModel, Symbols, Table, Variable
+from .flat import FlatModel, Table, Variable
 from .flatten import flatten
 from .origin import Origin
 from .plausibility import Plausibility
-from .switching import Switch, Switching
 
 __all__ = [
     "FlatModel",
     "Origin",
     "Plausibility",
-    "Switch",
-    "Switching",
-    "Symbols",
     "Table",
     "Variable",
     "casadi_dae",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .flat import FlatModel
 
 

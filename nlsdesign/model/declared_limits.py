@@ -28,15 +28,7 @@ _LIMITS = ("lowest_reading", "highest_reading", "largest_rate", "stale_time")
 
 
 def declared_reading(model: FlatModel, measured: str) -> DeclaredReading:
-    """Return what the deck declares of the sensor that shows a motion.
-
-    Parameters
-    ----------
-    model
-        Flat model with its sensors.
-    measured
-        State that a sensor shows.
-    """
+    """Return what the deck declares of the sensor that shows a motion."""
     for reading in model.readings:
         for sensor in reading.sensors if reading.measured == measured else ():
             names = [f"{sensor}.{name}" for name in _LIMITS]
@@ -54,14 +46,7 @@ def with_declared_reading(variable: Variable, model: FlatModel, measured: str) -
 
     Not the stale time: without knowing what drives the machine a sensor that is dead looks like one at rest.
 
-    Parameters
-    ----------
-    variable
-        Input of a controller or an observer; unchanged where nothing is declared.
-    model
-        Flat model with its sensors.
-    measured
-        State that the input shows.
+    ``variable``: input of a controller or an observer; unchanged where nothing is declared.
     """
     declared = declared_reading(model, measured)
     if declared.limits is None:

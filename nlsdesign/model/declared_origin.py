@@ -8,8 +8,8 @@ from functools import cached_property
 from ..components.assembly.deck_writer import deck_digest
 from ..components.assembly.named_parts import Assembly
 from ..components.core.part import resolved
-from ..deck import ParentDeck
-from ..quantity import Quantity
+from ..foundation.deck import ParentDeck
+from ..foundation.quantity import Quantity
 from .origin import Origin
 
 
@@ -70,11 +70,5 @@ class DeclaredOrigin(Origin):
         return {name: q for name, q in resolved(known, given).items() if q != known[name]}
 
     def with_values(self, values: Mapping[str, float | Quantity]) -> Origin:
-        """Return the origin of the model with other numbers.
-
-        Parameters
-        ----------
-        values
-            Numbers in SI, or quantities, by full name of the parameter.
-        """
+        """Return the origin of the model with other numbers."""
         return DeclaredOrigin(self._assembly, {**self._values, **values}) if values else self

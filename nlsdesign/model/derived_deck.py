@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..components.assembly.deck_writer import deck_digest
 from ..components.assembly.named_parts import Assembly
-from ..deck import ParentDeck
+from ..foundation.deck import ParentDeck
 
 DIGITS = 8
 """Digits of the digest in a name."""
@@ -18,14 +18,8 @@ _ENDING = re.compile(rf"_[a-z]+_([0-9a-f]{{{DIGITS}}})\Z")
 def derived(made: Assembly, declared: Assembly, change: str) -> Assembly:
     """Return an assembly under the name of the deck that it was made from, how, and the digits of its digest.
 
-    Parameters
-    ----------
-    made
-        Result of a design, a fit or a diagnosis; itself if nothing was changed.
-    declared
-        What it was made from. It becomes the parent.
-    change
-        What was done, in one word of small letters, such as ``"diagnosed"``.
+    ``made``: result of a design, a fit or a diagnosis; itself if nothing was changed. ``declared``: what it
+    was made from. It becomes the parent.
 
     Examples
     --------
@@ -48,22 +42,13 @@ def derived(made: Assembly, declared: Assembly, change: str) -> Assembly:
 def named_by_content(made: Assembly) -> Assembly:
     """Return a derived assembly under the name that its present numbers give it.
 
-    Parameters
-    ----------
-    made
-        Changed, for instance in a source, after it got its name; one without a derived name comes back.
+    ``made``: changed, for instance in a source, after it got its name; one without a derived name comes back.
     """
     digits = digits_in_name(made)
     return replace(made, name=made.name.removesuffix(digits) + deck_digest(made)[:DIGITS]) if digits else made
 
 
 def digits_in_name(assembly: Assembly) -> str:
-    """Return the digits of a digest with which the name of a derived deck ends, empty where it has none.
-
-    Parameters
-    ----------
-    assembly
-        As read.
-    """
+    """Return the digits of a digest with which the name of a derived deck ends, empty where it has none."""
     match = _ENDING.search(assembly.name) if assembly.parent else None
     return match[1] if match else ""

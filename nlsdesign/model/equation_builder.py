@@ -12,8 +12,8 @@ from ..components.core.element import UNBOUNDED, Range
 from ..components.core.part import Part
 from ..components.core.switches import Jump, Kink, StictionConstraint
 from ..components.core.tie import Tie
-from ..errors import ArrangementError
-from ..symbolic import Expression, depends, symbol
+from ..foundation.errors import ArrangementError
+from ..foundation.symbolic import Expression, depends, symbol
 from .flat import Variable
 from .owners import number_names
 
@@ -145,13 +145,7 @@ class NamingScope(SwitchScope):
         return self._builder.inputs[full][1]
 
     def state(self, name: str, unit: str, description: str) -> Expression:
-        """Declare a state.
-
-        Raises
-        ------
-        ArrangementError
-            If two equations claim the state.
-        """
+        """Declare a state."""
         full = self._builder.own(self.path, name)
         if full in self._builder.states:
             raise ArrangementError(full, "two equations claim this state")

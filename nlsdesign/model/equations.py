@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from .flat import FlatModel
-from .symbolic_view import LONGEST, Equations
+from .symbolic_view import Equations
 
-__all__ = ["LONGEST", "Equations", "equations"]
+__all__ = [
+    "Equations",
+    "equations",
+]
 
 
 def equations(model: FlatModel) -> Equations:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
-from ..quantity import Quantity, changed_source, same_dimension, with_unit
-from ..symbolic import Expression
+from ..foundation.arrays import Array
+from ..foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
+from ..foundation.quantity import Quantity, changed_source, same_dimension, with_unit
+from ..foundation.symbolic import Expression
 from .notebook_view import model_html
 from .origin import Origin
 from .plausibility import Plausibility
@@ -93,8 +93,8 @@ class Table:
     lower: float
     step: float
     columns: tuple[Variable, ...]
-    values: NDArray[np.float64]
-    breakpoints: NDArray[np.float64] | None = None
+    values: Array
+    breakpoints: Array | None = None
 
     def __post_init__(self) -> None:
         if self.breakpoints is None:
@@ -109,9 +109,7 @@ class Table:
             )
 
     @staticmethod
-    def over(
-        argument: str, points: NDArray[np.float64], columns: tuple[Variable, ...], values: NDArray[np.float64]
-    ) -> Table:
+    def over(argument: str, points: Array, columns: tuple[Variable, ...], values: Array) -> Table:
         """Return a table over breakpoints, which need not be uniform.
 
         Parameters
@@ -133,7 +131,7 @@ class Table:
         return Table(argument, float(points[0]) if len(points) else 0.0, 0.0, columns, values, points)
 
     @property
-    def grid(self) -> NDArray[np.float64]:
+    def grid(self) -> Array:
         """All grid points, shape (grid points,)."""
         if self.breakpoints is not None:
             return self.breakpoints
@@ -145,7 +143,7 @@ class Table:
         last = self.lower + self.step * (self.values.shape[0] - 1)
         return self.lower, last if self.breakpoints is None else float(self.breakpoints[-1])
 
-    def look_up(self, at: float) -> NDArray[np.float64]:
+    def look_up(self, at: float) -> Array:
         """Return all columns at one argument; not a number where the argument is none.
 
         Parameters
@@ -169,7 +167,7 @@ class Table:
         position = min(max((at - self.lower) / self.step, 0.0), float(last))
         left = min(int(position), last - 1)
         share = position - left
-        result: NDArray[np.float64] = self.values[left] + share * (self.values[left + 1] - self.values[left])
+        result: Array = self.values[left] + share * (self.values[left + 1] - self.values[left])
         return result
 
 
@@ -256,7 +254,7 @@ class FlatModel:
         """Parameter values in SI by name."""
         return {v.name: v.start for v in self.parameters}
 
-    def start(self, of: Sequence[Variable]) -> NDArray[np.float64]:
+    def start(self, of: Sequence[Variable]) -> Array:
         """Return the start values of a group of variables as a vector.
 
         Parameters
@@ -340,7 +338,7 @@ class FlatModel:
         result |= {v.name: float(s[i]) for i, v in enumerate(self.signals)}
         return result | {v.name: float(y[i]) for i, v in enumerate(self.outputs)}
 
-    def look_up(self, state: Sequence[float], inputs: Sequence[float]) -> NDArray[np.float64]:
+    def look_up(self, state: Sequence[float], inputs: Sequence[float]) -> Array:
         """Return the columns of all tables at one state and input.
 
         Parameters

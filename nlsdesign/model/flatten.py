@@ -18,9 +18,9 @@ from ..components.core.element import observed_effort
 from ..components.core.tie import Tie
 from ..components.mechanics.bodies import Body, Motion
 from ..components.sensing.sensors import Sensor
-from ..errors import ArrangementError, UnitError, nearest, unknown_name
-from ..quantity import typeset_unit
-from ..symbolic import Expression, depends
+from ..foundation.errors import ArrangementError, UnitError, nearest, unknown_name
+from ..foundation.quantity import typeset_unit
+from ..foundation.symbolic import Expression, depends
 from .declared_origin import DeclaredOrigin
 from .equation_builder import EquationBuilder, PartScope
 from .flat import FlatModel, Variable

@@ -17,7 +17,7 @@ from ..components.core.element import Scope
 from ..components.mechanics.bodies import Free, Motion
 from ..components.mechanics.gear import Gear, LossyGear
 from ..components.transmission.stretchy_cable import newton_root
-from ..symbolic import Expression, depends, solve_monotone, symbol
+from ..foundation.symbolic import Expression, depends, solve_monotone, symbol
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,7 @@ class Wheel:
 
 
 def trains(assembly: Assembly) -> dict[str, Wheel]:
-    """Return each train of two or more bodies by the name of its leading body, the one written first.
-
-    Parameters
-    ----------
-    assembly
-        Its gears have been checked.
-    """
+    """Return each train of two or more bodies by the name of its leading body, the one written first."""
     gears = [(name, part) for name, part in assembly.parts if isinstance(part, Gear)]
     leading: dict[str, Wheel] = {}
     taken: set[str] = set()
@@ -87,17 +81,7 @@ def _wheel(assembly: Assembly, name: str, gears: list[tuple[str, Gear]], taken: 
 def train_motions(
     root: Wheel, scopes: Mapping[str, Scope], lead: Motion
 ) -> dict[str, tuple[Motion, Expression]]:
-    """Return the motion of each body of a train, and its turns per turn of the leading body.
-
-    Parameters
-    ----------
-    root
-        Leading body.
-    scopes
-        Of bodies and gears, by name.
-    lead
-        Motion of the leading body.
-    """
+    """Return the motion of each body of a train, and its turns per turn of the leading body."""
     motions = {root.name: (lead, ca.SX(1))}
     for front, joint in root.gears():
         ratio = scopes[joint.name].parameter("ratio")
@@ -145,19 +129,7 @@ def balance_train(
     motions: Mapping[str, tuple[Motion, Expression]],
     efforts: Mapping[str, Expression],
 ) -> None:
-    """Close the equations of a train with the efforts of all elements on its bodies.
-
-    Parameters
-    ----------
-    root
-        Leading body.
-    scopes
-        Of bodies and gears, by name.
-    motions
-        As :func:`train_motions` gave them.
-    efforts
-        Sum of the torques of all elements on each body.
-    """
+    """Close the equations of a train with the efforts of all elements on its bodies."""
     lead, own = motions[root.name][0], scopes[root.name]
     acting = {
         w.name: w.body.drive(scopes[w.name], motions[w.name][0]) + efforts[w.name] for w in root.wheels()

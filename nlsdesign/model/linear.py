@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError, unknown_name
+from ..foundation.arrays import Array
+from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from .flat import FlatModel
 
 if TYPE_CHECKING:
     import control
-
-Matrix = NDArray[np.float64]
 
 
 class LinearModel(NamedTuple):
@@ -24,10 +22,10 @@ class LinearModel(NamedTuple):
     Shapes (n, n), (n, m), (r, n), (r, m).
     """
 
-    A: Matrix
-    B: Matrix
-    C: Matrix
-    D: Matrix
+    A: Array
+    B: Array
+    C: Array
+    D: Array
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -52,13 +50,7 @@ def _label(name: str) -> str:
 
 
 def jacobian_function(model: FlatModel) -> ca.Function:
-    """Return (t, x, u, p, w) -> (A, B, C, D) of a flat model.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    """
+    """Return (t, x, u, p, w) -> (A, B, C, D) of a flat model."""
     s = model.symbols()
     return ca.Function(
         "linear",
@@ -105,27 +97,8 @@ def linearise(model: FlatModel, state: Sequence[float], inputs: Sequence[float] 
 
 def rest_state(
     model: FlatModel, held: dict[str, float], inputs: Sequence[float] = (), *, tolerance: float = 1e-9
-) -> NDArray[np.float64]:
-    """Return the state in which all states but the held ones rest.
-
-    Parameters
-    ----------
-    model
-        Continuous model.
-    held
-        States that are prescribed, such as the cam angle and the speed of a servoed motor.
-    inputs
-        Shape (inputs,).
-    tolerance
-        Largest remaining derivative relative to the nominal size of its state, in 1/s.
-
-    Raises
-    ------
-    UnknownNameError
-        If a held state does not exist.
-    ConvergenceError
-        If no such state is found.
-    """
+) -> Array:
+    """Return the state in which all states but the held ones rest."""
     for name in held:
         if name not in (names := [v.name for v in model.states]):
             raise unknown_name("state", name, names)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Protocol
 
-from ..quantity import typeset_unit
+from ..foundation.quantity import typeset_unit
 
 LINE = 18.0
 """Height of a line in pixels."""
@@ -31,14 +31,7 @@ class Named(Protocol):
 def model_html(name: str, description: str, groups: Sequence[Sequence[Named]], latex: str) -> str:
     """Return a model as HTML.
 
-    Parameters
-    ----------
-    name, description
-        Of the model.
-    groups
-        Inputs, states and outputs.
-    latex
-        Equations, for the mathematics of the notebook; nothing if empty.
+    ``latex``: equations, for the mathematics of the notebook; nothing if empty.
     """
     title = f"<p><b>{escape(name)}</b> {escape(description)}</p>"
     shown = f"<div>$${escape(latex)}$$</div>" if latex else ""
@@ -46,15 +39,7 @@ def model_html(name: str, description: str, groups: Sequence[Sequence[Named]], l
 
 
 def block_svg(name: str, inputs: Sequence[Named], states: Sequence[Named], outputs: Sequence[Named]) -> str:
-    """Return a block diagram as SVG.
-
-    Parameters
-    ----------
-    name
-        Of the model, for those who cannot see it.
-    inputs, states, outputs
-        What stands left of the block, in it and right of it.
-    """
+    """Return a block diagram as SVG."""
     left, inside, right = (
         7.0 * max((len(_label(v)) for v in g), default=0) for g in (inputs, states, outputs)
     )

@@ -6,8 +6,8 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from ..deck import ParentDeck
-from ..quantity import Quantity
+from ..foundation.deck import ParentDeck
+from ..foundation.quantity import Quantity
 
 
 @dataclass(frozen=True)
@@ -54,16 +54,8 @@ class Origin:
 def common_origin(*origins: Origin | None) -> Origin | None:
     """Return the origin of a model that was made from several.
 
-    Parameters
-    ----------
-    *origins
-        Of each.
-
-    Returns
-    -------
-    Origin
-        The one that all have; where they differ, one that names every deck and has the digest of none.
-        ``None`` if none has one.
+    Result: the one that all have; where they differ, one that names every deck and has the digest of none.
+    ``None`` if none has one.
     """
     known = [each for each in origins if each is not None]
     if not known:

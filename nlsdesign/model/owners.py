@@ -10,13 +10,7 @@ from ..components.core.part import Part
 
 @dataclass(frozen=True)
 class Owners:
-    """Which part declared a variable: path of the part by name of the variable, in order of declaration.
-
-    Parameters
-    ----------
-    parameters, states, inputs, signals
-        Of the whole model.
-    """
+    """Which part declared a variable: path of the part by name of the variable, in order of declaration."""
 
     parameters: Mapping[str, str]
     states: Mapping[str, str]
@@ -24,13 +18,7 @@ class Owners:
     signals: Mapping[str, str]
 
     def keeping(self, states: Collection[str], inputs: Collection[str]) -> Owners:
-        """Return a copy with these states and inputs only.
-
-        Parameters
-        ----------
-        states, inputs
-            Names.
-        """
+        """Return a copy with these states and inputs only."""
         return replace(
             self,
             states={name: path for name, path in self.states.items() if name in states},
@@ -39,30 +27,12 @@ class Owners:
 
 
 def declared_by(paths: Collection[str], owned: Mapping[str, str]) -> Iterator[str]:
-    """Yield the names of what some parts have declared.
-
-    Parameters
-    ----------
-    paths
-        Of the parts.
-    owned
-        Path of the part by name of the variable.
-    """
+    """Yield the names of what some parts have declared."""
     return (name for name, path in owned.items() if path in paths)
 
 
 def number_names(path: str, part: Part, field: str) -> list[str]:
-    """Return the names that one field of a part has in the model: one, or one for each item of a row.
-
-    Parameters
-    ----------
-    path
-        Of the part.
-    part
-        Holds the field.
-    field
-        Name of the field.
-    """
+    """Return the names that one field of a part has in the model: one, or one for each item of a row."""
     given, name = part.parameters()[field], f"{path}.{field}"
     if not isinstance(given.value, tuple):
         return [name]

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ..errors import ArrangementError, unknown_name
-from ..symbolic import Expression, depends
+from ..foundation.errors import ArrangementError, unknown_name
+from ..foundation.symbolic import Expression, depends
 from .flat import FlatModel, Variable
 from .roles import driven_body, series_cam
 from .transform import cut, named, parts_of, with_parts
@@ -46,18 +46,7 @@ class PaperFormNames:
     speed: str | None = None
 
     def of(self, model: FlatModel) -> KnownNames:
-        """Return the names in a model.
-
-        Parameters
-        ----------
-        model
-            Continuous, with one element behind a cam.
-
-        Raises
-        ------
-        ArrangementError
-            If the structure does not decide one that is left out.
-        """
+        """Return the names in a model."""
         cam, body = series_cam(model), driven_body(model)
         if self.inner is None and len(cam.states) != 1:
             raise ArrangementError(
@@ -92,21 +81,6 @@ def paper_form(model: FlatModel, names: PaperFormNames | None = None) -> FlatMod
     acceleration is that of the model with the force as it is. The extension that really follows from the
     angle stays as the signal ``<extension>.geometric``. Source: Austin et al. 2015, eq. (3) and (4),
     corrected: the moduli in dF/dt engage with δ, and all elements share the torque.
-
-    Parameters
-    ----------
-    model
-        Continuous, with one element behind a cam between ``angle`` and a fixed load.
-    names
-        Which variables are meant, where the structure of the model does not say it.
-
-    Raises
-    ------
-    UnknownNameError
-        If a name does not exist.
-    ArrangementError
-        If the force does not depend on extension and inner state alone, or is not affine in the latter, or
-        the structure does not decide which variables are meant.
     """
     n = (names or PaperFormNames()).of(model)
     states = [v.name for v in model.states]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..components.assembly.named_parts import Assembly
 from ..components.sensing.sensors import Sensor
-from ..symbolic import Expression
+from ..foundation.symbolic import Expression
 
 
 @dataclass(frozen=True)
@@ -49,20 +49,7 @@ class ReadingNames:
         return all(law.shows_value for law in self.laws)
 
     def inferred(self, reading: Expression, known: Mapping[str, Expression]) -> Expression:
-        """Return the value behind a reading: the inverse of each sensor, the last one first.
-
-        Parameters
-        ----------
-        reading
-            What the last sensor gave, later by the sum of the ``delays``.
-        known
-            Parameters and states of the model by full name.
-
-        Raises
-        ------
-        ArrangementError
-            If a sensor does not show the value, see ``shows_value``.
-        """
+        """Return the value behind a reading: the inverse of each sensor, the last one first."""
         for name, law in zip(self.sensors, self.laws, strict=True):
             reading = law.infer(_NumbersOf(name, known), reading)
         return reading
@@ -84,26 +71,12 @@ class _NumbersOf:
 
 
 def reading_of(readings: Sequence[ReadingNames], signal: str) -> ReadingNames:
-    """Return what a signal shows; one that is not the reading of a sensor shows itself.
-
-    Parameters
-    ----------
-    readings
-        Of a flat model.
-    signal
-        Full name.
-    """
+    """Return what a signal shows; one that is not the reading of a sensor shows itself."""
     return next((r for r in readings if r.signal == signal), ReadingNames(signal, signal))
 
 
 def readings_of(assembly: Assembly) -> tuple[ReadingNames, ...]:
-    """Return what each sensor of an assembly shows, through which chain of sensors.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return what each sensor of an assembly shows, through which chain of sensors."""
     sensors, readings = assembly.sensors(), []
     for name in sensors:
         measured, chain = assembly.measured(f"{name}.reading")

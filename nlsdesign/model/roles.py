@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-from ..errors import ArrangementError, unknown_name
+from ..foundation.errors import ArrangementError, unknown_name
 from .flat import FlatModel
 from .structure import CamNames, MotorNames, MovingBody, SpringNames
 
@@ -19,19 +19,7 @@ Named = TypeVar("Named")
 def series_spring(model: FlatModel, name: str | None = None) -> SpringNames:
     """Return the spring between drive and load: the only one with a cam, or else the only one.
 
-    Parameters
-    ----------
-    model
-        As flattened.
-    name
-        Path of the spring; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no spring of that name.
-    ArrangementError
-        If the structure does not decide.
+    ``name``: path of the spring; decided from the structure if it is left out.
     """
     if name is not None:
         return _named("spring", name, {spring.name: spring for spring in model.springs})
@@ -51,22 +39,7 @@ def series_spring(model: FlatModel, name: str | None = None) -> SpringNames:
 
 
 def series_cam(model: FlatModel, name: str | None = None) -> CamNames:
-    """Return the cam of the series spring.
-
-    Parameters
-    ----------
-    model
-        As flattened.
-    name
-        Path of a spring with one cam, or of the part in it that holds the cam.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no cam spring of that name.
-    ArrangementError
-        If the structure does not decide.
-    """
+    """Return the cam of the series spring."""
     cams = {cam.drive: cam for spring in model.springs for cam in spring.cams}
     if name is not None:
         cams |= {spring.name: spring.cams[0] for spring in model.springs if len(spring.cams) == 1}
@@ -87,19 +60,7 @@ def series_cam(model: FlatModel, name: str | None = None) -> CamNames:
 def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
     """Return the body that the drive moves: the only one with a motor, or else the only one free to move.
 
-    Parameters
-    ----------
-    model
-        As flattened.
-    name
-        Path of the body; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no free body of that name.
-    ArrangementError
-        If the structure does not decide.
+    ``name``: path of the body; decided from the structure if it is left out.
     """
     free = [body for body in model.bodies if not body.prescribed]
     if name is not None:
@@ -122,19 +83,7 @@ def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
 def measured_motion(model: FlatModel, name: str | None = None) -> str:
     """Return the state that is measured and swept: the motion of the driven body.
 
-    Parameters
-    ----------
-    model
-        As flattened.
-    name
-        Name of the state; decided from the structure if it is left out.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not decide.
-    UnknownNameError
-        If the model has no state of that name.
+    ``name``: name of the state; decided from the structure if it is left out.
     """
     if name is None:
         return driven_body(model).motion
@@ -147,34 +96,13 @@ def measured_motion(model: FlatModel, name: str | None = None) -> str:
 def spring_torque(model: FlatModel, name: str | None = None) -> str:
     """Return the signal of the torque (or force) of the series spring.
 
-    Parameters
-    ----------
-    model
-        As flattened.
-    name
-        Name of the signal; decided from the structure if it is left out.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not decide.
+    ``name``: name of the signal; decided from the structure if it is left out.
     """
     return series_spring(model).effort if name is None else name
 
 
 def motor_of(model: FlatModel) -> tuple[MovingBody, MotorNames]:
-    """Return the driven body and the motor in it.
-
-    Parameters
-    ----------
-    model
-        As flattened.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not decide, or the driven body has no motor.
-    """
+    """Return the driven body and the motor in it."""
     body = driven_body(model)
     if body.motor is None:
         raise _undecided(
@@ -187,19 +115,7 @@ def motor_of(model: FlatModel) -> tuple[MovingBody, MotorNames]:
 def moved_load(model: FlatModel, name: str | None = None) -> MovingBody:
     """Return the load whose motion is prescribed: at the far end of the series spring, or else the only one.
 
-    Parameters
-    ----------
-    model
-        As flattened.
-    name
-        Path of the body; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no body of that name with a prescribed motion.
-    ArrangementError
-        If the structure does not decide.
+    ``name``: path of the body; decided from the structure if it is left out.
     """
     prescribed = {body.name: body for body in model.bodies if body.prescribed}
     if name is not None:
@@ -218,13 +134,7 @@ def moved_load(model: FlatModel, name: str | None = None) -> MovingBody:
 
 
 def is_actuator(model: FlatModel) -> bool:
-    """Tell whether a model has a spring and a motor, as a series elastic actuator does.
-
-    Parameters
-    ----------
-    model
-        As flattened.
-    """
+    """Tell whether a model has a spring and a motor, as a series elastic actuator does."""
     return bool(model.springs) and any(body.motor for body in model.bodies)
 
 

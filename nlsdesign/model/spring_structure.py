@@ -19,21 +19,7 @@ from .owners import Owners, declared_by, number_names
 
 @dataclass(frozen=True)
 class SpecimenNames:
-    """The names around one piece of material.
-
-    Parameters
-    ----------
-    name
-        Path of the piece.
-    section
-        Parameters whose product is the cross-section: one area, or width and thickness.
-    rest_length
-        Parameter.
-    strain, force
-        Signals.
-    tensile_strength, elongation_at_break
-        Parameters; ``None`` where the strength of the material is not declared.
-    """
+    """The names around one piece of material."""
 
     name: str
     section: tuple[str, ...]
@@ -118,25 +104,7 @@ class CamNames:
 
 @dataclass(frozen=True)
 class SpringNames:
-    """A tie that restores: what lies between two bodies and is elastic.
-
-    Parameters
-    ----------
-    name
-        Path of the tie.
-    domain
-        Of its motion and effort.
-    motion, effort
-        Signals.
-    between
-        Names of the bodies at its ends, one or two.
-    cams
-        The cams in it, in written order.
-    parameters
-        All numbers in it.
-    states
-        All states in it.
-    """
+    """A tie that restores: what lies between two bodies and is elastic."""
 
     name: str
     domain: Domain
@@ -149,15 +117,7 @@ class SpringNames:
 
 
 def springs_of(assembly: Assembly, owners: Owners) -> tuple[SpringNames, ...]:
-    """Return the ties that restore, in written order.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    owners
-        Of the variables of its model.
-    """
+    """Return the ties that restore, in written order."""
     springs = []
     for name, part in assembly.parts:
         if not isinstance(part, Tie) or not part.element.restores:

@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 
 from ..components.core.switches import StictionConstraint
-from ..errors import ArrangementError
-from ..symbolic import Expression, depends
+from ..foundation.errors import ArrangementError
+from ..foundation.symbolic import Expression, depends
 from .equation_builder import EquationBuilder
 from .switching import Switch, Switching
 
@@ -52,18 +52,7 @@ class Laws:
 
 
 def switch_laws(builder: EquationBuilder) -> Laws:
-    """Solve for all holding efforts, note them in the builder and return the laws of the switches.
-
-    Parameters
-    ----------
-    builder
-        With the equations of all parts.
-
-    Raises
-    ------
-    ArrangementError
-        If a rate that is to be held has no inertia, or two efforts hold the same one.
-    """
+    """Solve for all holding efforts, note them in the builder and return the laws of the switches."""
     constraints = _merged(builder)
     reach = _solved(builder, constraints) if constraints else {name: () for name in builder.derivatives}
     others = (*builder.jumps, *builder.kinks)
@@ -229,18 +218,7 @@ def _hold_exactly(
 
 
 def natural_modes(laws: Laws) -> Expression:
-    """Return the modes at a state as expressions without modes, a column.
-
-    Parameters
-    ----------
-    laws
-        Cleaned.
-
-    Raises
-    ------
-    ArrangementError
-        If the side of a switch depends on itself, as inside a series.
-    """
+    """Return the modes at a state as expressions without modes, a column."""
     modes = ca.vertcat(*laws.modes) if laws.modes else ca.SX(0, 1)
     natural = ca.vertcat(*laws.first) if laws.first else ca.SX(0, 1)
     for _ in laws.modes:
@@ -260,19 +238,7 @@ def natural_modes(laws: Laws) -> Expression:
 def switching(
     laws: Laws, columns: Sequence[Expression], rows: Sequence[Sequence[Expression]], states: Sequence[str]
 ) -> Switching:
-    """Return the functions of the switches.
-
-    Parameters
-    ----------
-    laws
-        Cleaned.
-    columns
-        Symbols of time, states, inputs and parameters.
-    rows
-        Derivatives of the states, outputs and signals, with the symbols of the modes.
-    states
-        Names.
-    """
+    """Return the functions of the switches."""
     modes, given = ca.vertcat(*laws.modes), [ca.SX(c) for c in columns[:4]]
     slope = ca.densify(ca.jacobian(ca.vertcat(*laws.rates), given[1]))
     reach = ca.vertcat(*[ca.horzcat(*laws.reach[n]) for n in states])

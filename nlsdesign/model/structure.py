@@ -92,26 +92,12 @@ class MovingBody:
 
 
 def body_moved_by(bodies: Sequence[MovingBody], motion: str) -> MovingBody | None:
-    """Return the body that has this motion, ``None`` if there is none.
-
-    Parameters
-    ----------
-    bodies
-        Of a flat model.
-    motion
-        Full name of an angle or a position.
-    """
+    """Return the body that has this motion, ``None`` if there is none."""
     return next((body for body in bodies if body.motion == motion), None)
 
 
 def motions_of_efforts(assembly: Assembly) -> dict[str, str]:
-    """Return the motion that does work with each force and torque, by name of the effort.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
+    """Return the motion that does work with each force and torque, by name of the effort."""
     pieces = ((path, part.element if isinstance(part, Tie) else part) for path, part in assembly.walk())
     return {
         f"{path}.{piece.domain.effort}": f"{path}.{piece.domain.motion}"
@@ -121,26 +107,12 @@ def motions_of_efforts(assembly: Assembly) -> dict[str, str]:
 
 
 def top_part(name: str) -> str:
-    """Return the part of the assembly to which a hierarchical name belongs: names begin with it.
-
-    Parameters
-    ----------
-    name
-        Full name of a variable or of a part.
-    """
+    """Return the part of the assembly to which a hierarchical name belongs: names begin with it."""
     return name.partition(".")[0]
 
 
 def moving_bodies(assembly: Assembly, owners: Owners) -> tuple[MovingBody, ...]:
-    """Return the bodies that have a motion of their own, in written order.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    owners
-        Of the variables of its model.
-    """
+    """Return the bodies that have a motion of their own, in written order."""
     geared = {lead: tuple(w.name for w in train.wheels())[1:] for lead, train in trains(assembly).items()}
     bodies = []
     for name, part in assembly.parts:
@@ -183,13 +155,7 @@ def _motor(name: str, part: GearedMotor | ElectricMotor, drives: Iterable[str]) 
 
 @dataclass(frozen=True)
 class ModelParts:
-    """Bodies, springs and readings of a model.
-
-    Parameters
-    ----------
-    bodies, springs, readings
-        In written order.
-    """
+    """Bodies, springs and readings of a model."""
 
     bodies: tuple[MovingBody, ...]
     springs: tuple[SpringNames, ...]
@@ -200,13 +166,6 @@ class ModelParts:
 
         A body stays while it has motion and rate, a spring while it has motion and effort, a reading while
         it has its signal. Of inputs and inner states those stay that there are.
-
-        Parameters
-        ----------
-        names
-            Of all variables.
-        inputs
-            Names of the inputs.
         """
         return ModelParts(
             tuple(
@@ -221,13 +180,7 @@ class ModelParts:
         )
 
     def with_state(self, old: str, new: str) -> ModelParts:
-        """Return what there is where another inner state of a spring stands in the place of one.
-
-        Parameters
-        ----------
-        old, new
-            Names.
-        """
+        """Return what there is where another inner state of a spring stands in the place of one."""
 
         def exchanged(states: tuple[str, ...]) -> tuple[str, ...]:
             return tuple(new if state == old else state for state in states)

@@ -27,13 +27,7 @@ class Switch:
     jumps: bool
 
     def event_text(self, mode: int) -> str:
-        """Return what has happened when a mode begins.
-
-        Parameters
-        ----------
-        mode
-            −1, 0, 1, or 2 for a rebound.
-        """
+        """Return what has happened when a mode begins."""
         return dict(self.words)[mode]
 
 

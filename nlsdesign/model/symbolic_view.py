@@ -15,13 +15,13 @@ import sympy
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
-from ..errors import ExportError
-from .function_steps import read_instructions
+from ..foundation.errors import ExportError
+from .graph import Instruction, operation_name, read_graph
 
 LONGEST = 60
 """A definition with more operations than this is shown as a function of what it depends on."""
 
-_UNARY: dict[int, Callable[[Any], Any]] = {
+_FUNCTIONS: dict[int, Callable[..., Any]] = {
     ca.OP_ASSIGN: lambda a: a,
     ca.OP_NEG: lambda a: -a,
     ca.OP_EXP: sympy.exp,
@@ -47,8 +47,6 @@ _UNARY: dict[int, Callable[[Any], Any]] = {
     ca.OP_FLOOR: sympy.floor,
     ca.OP_CEIL: sympy.ceiling,
     ca.OP_INV: lambda a: 1 / a,
-}
-_BINARY: dict[int, Callable[[Any, Any], Any]] = {
     ca.OP_ADD: lambda a, b: a + b,
     ca.OP_SUB: lambda a, b: a - b,
     ca.OP_MUL: lambda a, b: a * b,
@@ -87,7 +85,7 @@ def _value(operation: int, operands: list[Any]) -> Any:
         # Not evaluated: SymPy would work out how conditions inside conditions may be merged.
         pair = (_number(operands[1]), _truth(operands[0]))
         return sympy.Piecewise(pair, (0, True), evaluate=False)
-    return (_UNARY.get(operation) or _BINARY[operation])(*map(_number, operands))
+    return _FUNCTIONS[operation](*map(_number, operands))
 
 
 @dataclass(frozen=True)
@@ -158,26 +156,7 @@ def read_equations(
     discrete: bool,
     longest: float = LONGEST,
 ) -> Equations:
-    """Return the equations of a function of named numbers.
-
-    Parameters
-    ----------
-    function
-        (t, x, u, p, w) -> (f, y, s, …), as in a flat model.
-    inputs
-        Names of the numbers in each argument.
-    results
-        Names of states, outputs and signals.
-    discrete
-        Whether the first result is the next state.
-    longest
-        Operations beyond which a definition is shown as a function of what it depends on.
-
-    Raises
-    ------
-    ExportError
-        If a law uses an operation that has no SymPy counterpart here.
-    """
+    """Return the equations of a function of named numbers."""
     reader = _Reader(function, inputs, longest)
     reader.run(results)
     derivatives = {n: reader.shown(reader.terms[reader.results[0, i]]) for i, n in enumerate(results[0])}
@@ -194,14 +173,14 @@ class _Reader:
         self.definitions: dict[str, sympy.Expr] = {}
 
     def run(self, results: list[list[str]]) -> None:
-        steps, self.results = read_instructions(self.function)
+        graph = read_graph(self.function)
+        self.results = graph.results
         names: dict[int, list[str]] = {}
-        for (port, index), step in self.results.items():
-            if port in (1, 2) and results[port][index] not in names.setdefault(step, []):
-                names[step].append(results[port][index])
-        for number, (operation, operands, extra) in enumerate(steps):
-            term = self._term(operation, [self.terms[i] for i in operands], extra)
-            self.terms.append(self._defined(term, names.get(number, []), operation))
+        for (port, index), number in self.results.items():
+            if port in (1, 2) and results[port][index] not in names.setdefault(number, []):
+                names[number].append(results[port][index])
+        for number, step in enumerate(graph.steps):
+            self.terms.append(self._defined(self._term(step), names.get(number, []), step.operation))
 
     def shown(self, term: _Term) -> Any:
         """Return a value; where it is too long, a function of what it depends on, rows named once."""
@@ -219,20 +198,21 @@ class _Reader:
         self.definitions |= {name: term.value for name in names if name != str(term.value)}
         return term
 
-    def _term(self, operation: int, operands: list[_Term], extra: Any) -> _Term:
+    def _term(self, step: Instruction) -> _Term:
+        operation, extra = step.operation, step.extra
         if operation == ca.OP_CONST:
-            whole = float(extra).is_integer()
+            whole = extra.is_integer()
             return _Term(sympy.Integer(int(extra)) if whole else sympy.Float(extra), 0, frozenset())
         if operation == ca.OP_INPUT:
             symbol = _symbol(self.inputs[extra[0]][extra[1]])
             return _Term(symbol, 0, frozenset([symbol]))
-        if operation not in {*_UNARY, *_BINARY, *_LOGIC, ca.OP_IF_ELSE_ZERO}:
+        if operation not in {*_FUNCTIONS, *_LOGIC, ca.OP_IF_ELSE_ZERO}:
             raise ExportError(
-                f"operation {operation}", "has no SymPy counterpart", next_step="add it in equations.py"
-            )
-        # CasADi names two operands also where there is one.
-        used = operands[:1] if operation in _UNARY or operation == ca.OP_NOT else operands
-        size = 1 + sum(term.size for term in used)
+                f"the function '{operation_name(operation)}' in the equations", "has no SymPy counterpart",
+                next_step="write the law with elementary functions",
+            )  # fmt: skip
+        operands = [self.terms[i] for i in step.operands]
+        size = 1 + sum(term.size for term in operands)
         # What is too long to be shown is not even built: written out, shared parts multiply.
-        value = _value(operation, [term.value for term in used]) if size <= self.longest else None
-        return _Term(value, size, frozenset().union(*[term.uses for term in used]))
+        value = _value(operation, [term.value for term in operands]) if size <= self.longest else None
+        return _Term(value, size, frozenset().union(*[term.uses for term in operands]))

@@ -13,23 +13,15 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ..errors import ArrangementError, unknown_name
-from ..symbolic import Expression, depends
+from ..foundation.errors import ArrangementError, unknown_name
+from ..foundation.symbolic import Expression, depends
 from .flat import FlatModel, Symbols, Variable
 from .structure import ModelParts
 from .switching import Switching
 
 
 def named(model: FlatModel, symbols: Symbols) -> dict[str, Expression]:
-    """Return the expression of every parameter, signal, output, input and state by name.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    symbols
-        What ``model.symbols()`` gave.
-    """
+    """Return the expression of every parameter, signal, output, input and state by name."""
     groups = (
         (model.parameters, symbols.parameter),
         (model.signals, symbols.signal),
@@ -69,20 +61,6 @@ def with_signal(
 ) -> FlatModel:
     """Return a copy with one more named signal.
 
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    variable
-        Name, unit and description.
-    value
-        Takes the expressions of everything by name and returns that of the signal.
-
-    Raises
-    ------
-    ArrangementError
-        If the name is taken.
-
     Examples
     --------
     >>> from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
@@ -111,23 +89,6 @@ def replace_state(model: FlatModel, old: str, signal: str) -> FlatModel:
 
     With s = α + β·x, where α and β may depend on all other states, the derivative of the new state is
     ∂s/∂t + Σ ∂s/∂xᵢ·ẋᵢ, and x = (s − α)/β goes on as a signal.
-
-    Parameters
-    ----------
-    model
-        Continuous.
-    old
-        Name of the state to replace, for instance ``"spring.rubber.relaxing.dashpot.strain"``.
-    signal
-        Name of a signal that is affine in it, for instance ``"spring.rubber.relaxing.stress"``.
-
-    Raises
-    ------
-    UnknownNameError
-        If a name does not exist.
-    ArrangementError
-        If the model is discrete, or the signal cannot stand for the state: it is not affine in it, has no
-        slope in it at the start, or depends on an input, whose derivative is not known.
     """
     if old not in {v.name for v in model.states}:
         raise unknown_name("state", old, (v.name for v in model.states))
@@ -160,22 +121,6 @@ def cut(model: FlatModel, names: Sequence[str], *, keep: bool = False) -> FlatMo
 
     What lay only before the cut drops out of the equations behind it. It works on the graph of the
     expressions: everything computed from the signal's node follows the new input.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    names
-        Signals, for instance ``["spring.rubber.extension"]``.
-    keep
-        Whether signals stay what they were: then only derivatives, outputs and checks follow the new inputs.
-
-    Raises
-    ------
-    UnknownNameError
-        If a signal does not exist.
-    ArrangementError
-        If the signal is just another name of a state, input or parameter.
     """
     s = model.symbols()
     known = {v.name: s.signal[i] for i, v in enumerate(model.signals)}
@@ -204,12 +149,7 @@ def cut(model: FlatModel, names: Sequence[str], *, keep: bool = False) -> FlatMo
 def without_idle_states(model: FlatModel, roots: Sequence[str]) -> FlatModel:
     """Return the model without the states that neither these variables nor their derivatives depend on.
 
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    roots
-        What must stay: states, outputs or signals. They become the outputs.
+    ``roots``: what must stay: states, outputs or signals. They become the outputs.
     """
     s = model.symbols()
     known = named(model, s)
@@ -237,26 +177,12 @@ def without_idle_states(model: FlatModel, roots: Sequence[str]) -> FlatModel:
 
 
 def parts_of(model: FlatModel) -> ModelParts:
-    """Return bodies, springs and readings of a model together.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    """
+    """Return bodies, springs and readings of a model together."""
     return ModelParts(model.bodies, model.springs, model.readings)
 
 
 def with_parts(model: FlatModel, parts: ModelParts) -> FlatModel:
-    """Return the model made of other parts; what has no variables in it is left out.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    parts
-        Of the model that it came from.
-    """
+    """Return the model made of other parts; what has no variables in it is left out."""
     groups = (model.states, model.inputs, model.outputs, model.signals)
     names = {v.name for group in groups for v in group}
     kept = parts.within(names, {v.name for v in model.inputs})

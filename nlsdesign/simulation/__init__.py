@@ -1,8 +1,7 @@
 """Simulation of flat models over time."""
 
-from .events import Event
 from .integrate import simulate
-from .limits_reached import LimitReached, limits_reached
+from .limits_reached import limits_reached
 from .measure import measure
 from .prior import Prior, declared_prior
 from .signals import Sine, sine
@@ -10,8 +9,6 @@ from .simulated_batch import SimulatedBatch, simulate_batch
 from .trace import RangeWarning, Trace, range_warnings
 
 __all__ = [
-    "Event",
-    "LimitReached",
     "Prior",
     "RangeWarning",
     "SimulatedBatch",

@@ -7,21 +7,15 @@ from typing import TypeAlias
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..foundation.arrays import Array
+
 Translate: TypeAlias = Callable[[ca.Function], ca.Function]
 """Takes a function and returns one with the same arguments and results, for instance compiled code."""
 
 
 def as_it_is(function: ca.Function) -> ca.Function:
-    """Return a function unchanged; CasADi's own virtual machine runs it.
-
-    Parameters
-    ----------
-    function
-        Any.
-    """
+    """Return a function unchanged; CasADi's own virtual machine runs it."""
     return function
 
 

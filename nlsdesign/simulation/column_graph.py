@@ -17,48 +17,19 @@ from typing import TypeAlias
 import casadi as ca
 
 from ..model import Table
-from ..model.function_steps import read_instructions
+from ..model.graph import fold, read_graph
 
-ARITHMETIC = frozenset(
-    [
-        *(
-            ca.OP_ADD,
-            ca.OP_SUB,
-            ca.OP_MUL,
-            ca.OP_DIV,
-            ca.OP_NEG,
-            ca.OP_SQ,
-            ca.OP_TWICE,
-            ca.OP_INV,
-            ca.OP_SQRT,
-        ),
-        *(ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_LOG1P, ca.OP_EXPM1, ca.OP_HYPOT),
-        *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_ATAN2),
-        *(ca.OP_SINH, ca.OP_COSH, ca.OP_TANH, ca.OP_ASINH, ca.OP_ACOSH, ca.OP_ATANH, ca.OP_ERF),
-        *(ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_IF_ELSE_ZERO),
-        *(
-            ca.OP_FLOOR,
-            ca.OP_CEIL,
-            ca.OP_FMOD,
-            ca.OP_FABS,
-            ca.OP_SIGN,
-            ca.OP_COPYSIGN,
-            ca.OP_FMIN,
-            ca.OP_FMAX,
-        ),
-    ]
-)
+ARITHMETIC = frozenset([
+    ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_NEG, ca.OP_SQ, ca.OP_TWICE, ca.OP_INV, ca.OP_SQRT,
+    ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_LOG1P, ca.OP_EXPM1, ca.OP_HYPOT,
+    ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_ATAN2,
+    ca.OP_SINH, ca.OP_COSH, ca.OP_TANH, ca.OP_ASINH, ca.OP_ACOSH, ca.OP_ATANH, ca.OP_ERF,
+    ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_IF_ELSE_ZERO,
+    ca.OP_FLOOR, ca.OP_CEIL, ca.OP_FMOD, ca.OP_FABS, ca.OP_SIGN, ca.OP_COPYSIGN, ca.OP_FMIN, ca.OP_FMAX,
+])  # fmt: skip
 """Operations that are known by columns, as CasADi numbers them."""
 
-_ONE_OPERAND = frozenset(
-    [
-        *(ca.OP_NEG, ca.OP_SQ, ca.OP_TWICE, ca.OP_INV, ca.OP_SQRT, ca.OP_EXP, ca.OP_LOG, ca.OP_LOG1P),
-        *(ca.OP_EXPM1, ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_SINH),
-        *(ca.OP_COSH, ca.OP_TANH, ca.OP_ASINH, ca.OP_ACOSH, ca.OP_ATANH, ca.OP_ERF, ca.OP_NOT),
-        *(ca.OP_FLOOR, ca.OP_CEIL, ca.OP_FABS, ca.OP_SIGN),
-    ]
-)
-_CONDITIONS = frozenset([ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR])
+CONDITIONS = frozenset([ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR])
 _MOVED = frozenset([ca.OP_RESHAPE, ca.OP_VERTCAT, ca.OP_HORZCAT, ca.OP_VERTSPLIT, ca.OP_HORZSPLIT])
 
 
@@ -171,16 +142,10 @@ class ColumnGraph:
     @cached_property
     def conditions(self) -> frozenset[int]:
         """Numbers of the values that are 0 or 1."""
-        return frozenset(s.result for s in self.steps if isinstance(s, Operation) and s.code in _CONDITIONS)
+        return frozenset(s.result for s in self.steps if isinstance(s, Operation) and s.code in CONDITIONS)
 
     def new(self, number: int = 1) -> tuple[int, ...]:
-        """Return numbers of new values.
-
-        Parameters
-        ----------
-        number
-            How many.
-        """
+        """Return numbers of new values."""
         self.count += number
         return tuple(range(self.count - number, self.count))
 
@@ -188,22 +153,7 @@ class ColumnGraph:
 def column_graph(
     function: ca.Function, *, fixed: Sequence[int] = (), tables: Mapping[str, Table] | None = None
 ) -> ColumnGraph:
-    """Return a function as a graph of elementary operations.
-
-    Parameters
-    ----------
-    function
-        Of SX, or of MX that calls such functions and reads tables.
-    fixed
-        Numbers of the arguments that stay the same from call to call.
-    tables
-        Tables by the name of the function that reads them.
-
-    Raises
-    ------
-    NotByColumnsError
-        If it has an operation that is not known by columns.
-    """
+    """Return a function as a graph of elementary operations."""
     if function.class_name() == "SXFunction":
         places = [k for i in fixed for k in _places(function, i)]
         return _body(function, frozenset(places))
@@ -234,12 +184,12 @@ class _Builder:
             self._constants[key] = number
         return self._constants[key]
 
-    def operation(self, code: int, operands: tuple[int, ...]) -> int:
+    def operation(self, code: int, values: Sequence[int]) -> int:
+        operands = tuple(values)
         if code == ca.OP_ASSIGN:
             return operands[0]
         if code not in ARITHMETIC:
             raise NotByColumnsError(f"operation {code} of CasADi")
-        operands = operands[:1] if code in _ONE_OPERAND else operands
         key = (code, operands)
         if key not in self._known:
             (number,) = self.graph.new()
@@ -258,20 +208,11 @@ def _body(function: ca.Function, fixed: frozenset[int]) -> ColumnGraph:
     inputs = graph.new(sum(function.nnz_in(i) for i in range(function.n_in())))
     graph.fixed |= {inputs[k] for k in fixed}
     graph.arguments = tuple(tuple(inputs[k] for k in _places(function, i)) for i in range(function.n_in()))
-    steps, results = read_instructions(function)
-    values: list[int] = []
-    for each in steps:
-        if each.operation == ca.OP_CONST:
-            values.append(built.constant(float(each.extra)))
-        elif each.operation == ca.OP_INPUT:
-            values.append(inputs[firsts[each.extra[0]] + each.extra[1]])
-        else:
-            values.append(built.operation(each.operation, tuple(values[k] for k in each.operands)))
+    values = fold(
+        read_graph(function), lambda i, k: inputs[firsts[i] + k], built.constant, combined=built.operation
+    )
     graph.results = tuple(
-        tuple(
-            values[results[i, k]] if (i, k) in results else built.constant(0.0)
-            for k in range(function.nnz_out(i))
-        )
+        tuple(values[i, k] if (i, k) in values else built.constant(0.0) for k in range(function.nnz_out(i)))
         for i in range(function.n_out())
     )
     return graph

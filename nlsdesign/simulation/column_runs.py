@@ -12,16 +12,14 @@ from typing import Protocol, runtime_checkable
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
 from ..model import Table
 from .buffered import Translate, as_it_is
 from .column_graph import ColumnGraph, NotByColumnsError, column_graph
 from .numpy_columns import NumpyColumns
 from .sample_writer import SampleWriter
 from .sampled_system import SampledSystem
-
-Array = NDArray[np.float64]
 
 CHUNK = 250
 """Samples that one call computes; between calls a run can be interrupted."""
@@ -35,14 +33,8 @@ class ColumnRun(Protocol):
     def __call__(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
         """Return the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
 
-        Parameters
-        ----------
-        state
-            Shape (states, columns).
-        given
-            Shape (T, given, columns).
-        parameter
-            Shape (parameters, columns).
+        ``state``: shape (states, columns). ``given``: shape (T, given, columns). ``parameter``: shape
+        (parameters, columns).
         """
         ...
 
@@ -52,40 +44,19 @@ class ByColumns(Protocol):
     """A translation that also computes many columns together."""
 
     def __call__(self, function: ca.Function) -> ca.Function:
-        """Return a faster function with the same arguments and results.
-
-        Parameters
-        ----------
-        function
-            Any.
-        """
+        """Return a faster function with the same arguments and results."""
         ...
 
     def columns(self, graph: ColumnGraph) -> ColumnRun:
-        """Return what runs a graph of one sample.
-
-        Parameters
-        ----------
-        graph
-            (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
-        """
+        """Return what runs a graph of one sample."""
         ...
 
 
 def column_run(system: SampledSystem, keep: Sequence[str], *, translate: Translate, runs: int) -> ColumnRun:
     """Return what runs the samples of a system.
 
-    Parameters
-    ----------
-    system
-        The system.
-    keep
-        Full names of variables that are kept.
-    translate
-        One that computes by columns is asked for that; the unchanged function is evaluated with NumPy where
-        there are many runs.
-    runs
-        How many.
+    ``translate``: one that computes by columns is asked for that; the unchanged function is evaluated with
+    NumPy where there are many runs.
     """
     return _column_run(system, tuple(keep), translate, runs >= MANY)
 
@@ -136,10 +107,7 @@ class ColumnEvaluator:
     def __call__(self, arguments: Sequence[Array]) -> list[Array]:
         """Return the results, each of shape (numbers, columns).
 
-        Parameters
-        ----------
-        arguments
-            Each of shape (numbers, columns); matrices column by column.
+        ``arguments``: each of shape (numbers, columns); matrices column by column.
         """
         count = arguments[0].shape[1]
         many = count >= MANY

@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ..errors import ConvergenceError
+from ..foundation.arrays import Array
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from ..model.switching import Switch, Switching
-from .buffered import Array, Buffered
+from .buffered import Buffered
 
 LOCATED = 1e-12
 """Accuracy of an event time, as a share of the sample interval; at best four units in the last place."""
@@ -38,17 +39,7 @@ MOST_EVENTS, EVENT_WINDOW = 200, 1e-7
 
 @dataclass(frozen=True)
 class Event:
-    """A change of mode at a point in time.
-
-    Parameters
-    ----------
-    time
-        In s.
-    name
-        Full name of the element.
-    what
-        For instance "sticks".
-    """
+    """A change of mode at a point in time."""
 
     time: float
     name: str
@@ -63,14 +54,8 @@ def locate_event(lasts: Callable[[float], float], length: float, finest: float) 
 
     Source: Chandrupatla 1997, bracketing with inverse quadratic interpolation where that is safe.
 
-    Parameters
-    ----------
-    lasts
-        Event function of the step length, not negative while all modes last. Its last call has the result.
-    length
-        Length at which a mode has ended.
-    finest
-        Allowed uncertainty.
+    ``lasts``: event function of the step length, not negative while all modes last. Its last call has the
+    result.
     """
     # At length zero a mode may just have changed, so the event function is not evaluated there.
     one, at_one, other, at_other = length, lasts(length), 0.0, np.inf
@@ -155,11 +140,6 @@ class Modes:
         With switches.
     span
         Simulated time in s.
-
-    Raises
-    ------
-    ValueError
-        If the model has no switches.
     """
 
     def __init__(self, model: FlatModel, span: float) -> None:
@@ -190,12 +170,7 @@ class Modes:
     def settle(self, time: float, state: Array, inputs: Array, *, record: bool = True) -> None:
         """Change the modes that have ended, and the state where it jumps, until no mode ends.
 
-        Parameters
-        ----------
-        time, state, inputs
-            At the event; the state is changed in place.
-        record
-            Whether to record events.
+        ``time``, ``state``, ``inputs``: at the event; the state is changed in place.
         """
         before = self.now.copy()
         rebounds: list[int] = []
@@ -276,13 +251,7 @@ class Modes:
 
 
 def branch_of(switching: Switching | None, equations: ca.Function) -> ca.Function:
-    """Return (t, x, u, p, m) -> (f, c, v) of a model; m, c and v are empty where it has no switches.
-
-    Parameters
-    ----------
-    switching, equations
-        Of a continuous flat model.
-    """
+    """Return (t, x, u, p, m) -> (f, c, v) of a model; m, c and v are empty where it has no switches."""
     if switching is not None:
         return switching.branch
     given = [ca.SX.sym(name, equations.size1_in(i)) for i, name in enumerate("txup")]

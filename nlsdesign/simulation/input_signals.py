@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.arrays import Array
+from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import FlatModel
 from .signals import Sine
 
-Array = NDArray[np.float64]
 Drive: TypeAlias = Callable[[float], float] | Array | float
 
 
@@ -42,24 +41,7 @@ class Drives:
     def at(self, interval: int, moments: Array, out: Array | None = None) -> Array:
         """Return all inputs at moments within one interval between samples.
 
-        Parameters
-        ----------
-        interval
-            Number of the sample at its beginning.
-        moments
-            Times, shape (m,).
-        out
-            Where to write, shape (m, inputs); a new array otherwise.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (m, inputs).
-
-        Raises
-        ------
-        ValueRangeError
-            If a function gives no finite number.
+        ``out``: where to write, shape (m, inputs); a new array otherwise.
         """
         inputs = np.empty((len(moments), len(self.samples))) if out is None else out
         if len(self.functions) < len(self.samples):
@@ -78,26 +60,7 @@ class Drives:
 
 
 def drives_of(model: FlatModel, times: Array, given: Mapping[str, Drive], *, hold: bool) -> Drives:
-    """Return the inputs of a model over time.
-
-    Parameters
-    ----------
-    model
-        Its inputs that are not given rest at their start values.
-    times
-        Sample times, shape (n,).
-    given
-        By name: a function of time, samples of shape (n,), or a constant.
-    hold
-        Whether inputs, functions too, are held from one sample to the next.
-
-    Raises
-    ------
-    UnknownNameError
-        If an input does not exist.
-    ValueRangeError
-        If there are not n samples, or one is not finite.
-    """
+    """Return the inputs of a model over time."""
     names = [v.name for v in model.inputs]
     for name in given:
         if name not in names:

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError, unknown_name
+from ..foundation.arrays import Array
+from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from .buffered import Translate, as_it_is
 from .events import Event
@@ -20,8 +20,6 @@ from .input_signals import Drive, Drives, drives_of
 from .runge_kutta import TooStiffError, integrate_explicitly
 from .stiff import integrate_implicitly
 from .trace import Trace, range_warnings
-
-Array = NDArray[np.float64]
 
 RESIDUAL_LIMIT = 1e-6
 """Largest remainder of an implicit equation, relative to its terms and to 1 Pa, N or N·m."""
@@ -85,18 +83,7 @@ def simulate(
 
 
 def checked_times(times: Array) -> Array:
-    """Return sample times as an array.
-
-    Parameters
-    ----------
-    times
-        In s.
-
-    Raises
-    ------
-    ValueRangeError
-        If they do not ascend or are not finite, or there are fewer than two.
-    """
+    """Return sample times as an array."""
     grid = np.asarray(times, dtype=float)
     if grid.ndim != 1 or len(grid) < 2 or np.any(np.diff(grid) <= 0.0) or not np.all(np.isfinite(grid)):
         raise ValueRangeError("times", "must be at least two strictly ascending finite numbers in s")

@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..foundation.arrays import Array
+from ..foundation.quantity import with_unit
 from ..model import FlatModel
 from ..model.declared_limits import declared_reading
-from ..quantity import with_unit
 from .trace import Trace
 
-Array = NDArray[np.float64]
 _ROUNDING = 1e-9
 _AT = 1e-6
 """Share of the supply below its limit at which it counts as held there."""

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ConvergenceError
+from ..foundation.arrays import Array, Indices
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Translate
 from .column_runs import ColumnEvaluator
@@ -27,18 +27,9 @@ from .runge_kutta import (
     step_function,
 )
 
-Array = NDArray[np.float64]
-Places = NDArray[np.intp]
-
 
 class _OneColumn:
-    """Takes one column after the other through its events.
-
-    Parameters
-    ----------
-    model, drives, tolerance, translate
-        As for :class:`ManySteps`.
-    """
+    """Takes one column after the other through its events."""
 
     def __init__(self, model: FlatModel, drives: Drives, tolerance: float, translate: Translate) -> None:
         self._given = model, drives, tolerance, translate
@@ -51,15 +42,7 @@ class _OneColumn:
         return Stepper(model, drives, tolerance, modes.now, translate), modes
 
     def at(self, column: int, numbers: Array, state: Array, modes: Array) -> tuple[Stepper, Modes]:
-        """Return what steps a column and changes its modes, set to where it stands.
-
-        Parameters
-        ----------
-        column
-            Its number.
-        numbers, state, modes
-            Of all columns, the last axis.
-        """
+        """Return what steps a column and changes its modes, set to where it stands."""
         model, drives, *_ = self._given
         stepper, own = self._made
         assert model.switching is not None
@@ -77,7 +60,7 @@ def _span(drives: Drives) -> float:
     return float(drives.times[-1] - drives.times[0])
 
 
-def _inputs(drives: Drives, intervals: Places, moments: Array) -> Array:
+def _inputs(drives: Drives, intervals: Indices, moments: Array) -> Array:
     """Return the inputs at moments in intervals between samples, shape (steps, moments, inputs)."""
     since = moments - drives.times[intervals][:, None]
     inputs = since[:, :, None] * drives.slopes.T[intervals][:, None] + drives.samples.T[intervals][:, None]
@@ -148,13 +131,7 @@ class ManySteps:
         return states
 
     def events(self, column: int) -> tuple[Event, ...]:
-        """Return the events of a column.
-
-        Parameters
-        ----------
-        column
-            Its number.
-        """
+        """Return the events of a column."""
         return tuple(self._alone.logs[column].events) if column in self._alone.logs else ()
 
     def _fail(self, column: int, reason: str) -> None:
@@ -174,7 +151,7 @@ class ManySteps:
                 self._fail(column, str(error))
             self.state[:, column], self._modes[:, column] = stepper.state, modes.now
 
-    def _advance(self, going: Places) -> None:
+    def _advance(self, going: Indices) -> None:
         """Try one step of each column."""
         left = self._drives.times[self._interval[going] + 1] - self._now[going]
         # A very short last step would cost as much as a full one.
@@ -190,7 +167,7 @@ class ManySteps:
         self._keep(going[good], rate[:, good])
         self._check(going[self._done[going] > self._budget[going]])
 
-    def _tried(self, going: Places, length: Array) -> list[Array]:
+    def _tried(self, going: Indices, length: Array) -> list[Array]:
         """Return what a step of each column gives."""
         # Most columns stand at the same time, and a function of time need not be asked twice.
         steps = np.stack([self._now[going], length, self._interval[going]])
@@ -206,7 +183,7 @@ class ManySteps:
             ]
         )  # fmt: skip
 
-    def _move(self, columns: Places, lengths: tuple[Array, Array], error: Array) -> None:
+    def _move(self, columns: Indices, lengths: tuple[Array, Array], error: Array) -> None:
         """Move the time of the columns whose step is good enough; propose the next steps."""
         length, left = lengths
         with np.errstate(all="ignore"):
@@ -222,7 +199,7 @@ class ManySteps:
         moved = columns[good]
         self._now[moved] = np.where(whole[good], times[k[good] + 1], self._now[moved] + length[good])
 
-    def _keep(self, columns: Places, rate: Array) -> None:
+    def _keep(self, columns: Indices, rate: Array) -> None:
         """Project the rates that are held, where they have drifted."""
         if not np.any(self._holds):
             return
@@ -258,7 +235,7 @@ class ManySteps:
             self._fail(column, str(failed))
         self.state[:, column], self._modes[:, column] = stepper.state, modes.now
 
-    def _check(self, columns: Places) -> None:
+    def _check(self, columns: Indices) -> None:
         """Note the columns whose steps stability limits, and give the others a larger budget."""
         jumps = self._switching is not None and bool(self._switching.jumps)
         for column in columns[~self._gone[columns]].tolist():

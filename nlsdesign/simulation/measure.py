@@ -5,11 +5,11 @@ from __future__ import annotations
 import zlib
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
-from ..errors import UnitError, ValueRangeError, unknown_name
-from ..quantity import typeset_unit
+from ..foundation.arrays import Array
+from ..foundation.errors import UnitError, ValueRangeError, unknown_name
+from ..foundation.quantity import typeset_unit
 from .trace import Trace
 
 
@@ -59,7 +59,7 @@ def measure(run: Trace, assembly: Assembly, *, seed: int) -> Trace:
         )
     continuous = {f"{name}.reading" for name in sensors}
     truth = {n: v for n, v in run.signals.items() if n not in continuous}
-    readings: dict[str, NDArray[np.float64]] = {}
+    readings: dict[str, Array] = {}
     units = dict(run.units)
     for name, sensor in sensors.items():
         known = truth | readings

@@ -9,12 +9,12 @@ from typing import Any, TypeAlias
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
+from scipy.special import erf, erfinv
 
+from ..foundation.arrays import Array, Mask
 from ..model import Table
-from .column_graph import Call, ColumnGraph, Operation, TableReading
+from .column_graph import CONDITIONS, Call, ColumnGraph, Operation, TableReading
 
-Array = NDArray[np.float64]
 _Task: TypeAlias = tuple[Callable[..., Any], tuple[Any, ...]]
 
 AT_ONCE = 1024
@@ -30,12 +30,33 @@ _FUNCTIONS: Mapping[int, Callable[..., Any]] = {
     ca.OP_HYPOT: np.hypot, ca.OP_SIN: np.sin, ca.OP_COS: np.cos, ca.OP_TAN: np.tan,
     ca.OP_ASIN: np.arcsin, ca.OP_ACOS: np.arccos, ca.OP_ATAN: np.arctan, ca.OP_ATAN2: np.arctan2,
     ca.OP_SINH: np.sinh, ca.OP_COSH: np.cosh, ca.OP_TANH: np.tanh, ca.OP_ASINH: np.arcsinh,
-    ca.OP_ACOSH: np.arccosh, ca.OP_ATANH: np.arctanh, ca.OP_ERF: erf, ca.OP_FLOOR: np.floor,
-    ca.OP_CEIL: np.ceil, ca.OP_FMOD: np.fmod, ca.OP_FABS: np.abs, ca.OP_SIGN: np.sign,
+    ca.OP_ACOSH: np.arccosh, ca.OP_ATANH: np.arctanh, ca.OP_ERF: erf, ca.OP_ERFINV: erfinv,
+    ca.OP_FLOOR: np.floor, ca.OP_CEIL: np.ceil, ca.OP_FMOD: np.fmod, ca.OP_FABS: np.abs, ca.OP_SIGN: np.sign,
     ca.OP_COPYSIGN: np.copysign, ca.OP_FMIN: np.fmin, ca.OP_FMAX: np.fmax,
     ca.OP_LT: np.less, ca.OP_LE: np.less_equal, ca.OP_EQ: np.equal, ca.OP_NE: np.not_equal,
     ca.OP_NOT: np.logical_not, ca.OP_AND: np.logical_and, ca.OP_OR: np.logical_or,
 }  # fmt: skip
+"""What an operation of CasADi is in NumPy; a last argument may be the array for the result."""
+
+
+def _as_number(condition: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda *operands: condition(*operands) * 1.0
+
+
+ON_COLUMNS: Mapping[int, Callable[..., Any]] = {
+    **_FUNCTIONS,
+    # Truth is a number in CasADi, and sums of truths are counts.
+    **{operation: _as_number(_FUNCTIONS[operation]) for operation in CONDITIONS},
+    ca.OP_ASSIGN: lambda a: a,
+    ca.OP_LIFT: lambda a, b: a,
+    ca.OP_SQ: lambda a: np.multiply(a, a),
+    ca.OP_TWICE: lambda a: np.add(a, a),
+    ca.OP_INV: lambda a: np.divide(1.0, a),
+    ca.OP_REMAINDER: lambda a, b: a - b * np.rint(a / b),
+    ca.OP_IF_ELSE_ZERO: lambda a, b: np.where(a, b, 0.0),
+}
+"""The same as functions of numbers or arrays that return new ones."""
+
 _LOGICAL = frozenset([ca.OP_NOT, ca.OP_AND, ca.OP_OR])
 
 
@@ -57,14 +78,8 @@ class NumpyColumns:
     def __call__(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
         """Return the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
 
-        Parameters
-        ----------
-        state
-            Shape (states, columns).
-        given
-            Shape (T, given, columns).
-        parameter
-            Shape (parameters, columns).
+        ``state``: shape (states, columns). ``given``: shape (T, given, columns). ``parameter``: shape
+        (parameters, columns).
         """
         with self._lock:
             return self._run(state, given, parameter)
@@ -142,7 +157,7 @@ class _Program:
         self.graph, self._size = graph, size
         self.values: dict[int, Array] = {k: np.zeros(size) for k in given}
         self.values |= {k: np.full(size, value) for k, value in graph.constants.items()}
-        self._truths: dict[int, NDArray[np.bool_]] = {}
+        self._truths: dict[int, Mask] = {}
         self.once: list[_Task] = []
         self.tasks: list[_Task] = []
         self._numbers = {k for step in graph.steps for k in _as_numbers(step)}
@@ -235,7 +250,7 @@ def _results(body: _Program, places: Sequence[Array]) -> None:
         place[:] = body.values[number]
 
 
-def _selected(truth: NDArray[np.bool_], value: Array, result: Array) -> None:
+def _selected(truth: Mask, value: Array, result: Array) -> None:
     result.fill(0.0)
     np.copyto(result, value, where=truth)
 

@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.arrays import Array
+from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import FlatModel
-
-Array = NDArray[np.float64]
 
 LONGEST_ROW = 12
 """Numbers of a row beyond which it is the table of a shape, whose numbers share one factor: the contour of a

@@ -12,16 +12,14 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-from ..errors import ConvergenceError
+from ..foundation.arrays import Array
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Buffered, Translate, as_it_is
 from .events import LOCATED, Event, Modes, branch_of, locate_event
 from .input_signals import Drives
-
-Array = NDArray[np.float64]
 
 STAGES = int(DOP853.n_stages)
 NODES: Array = np.asarray(DOP853.C[:STAGES], dtype=float)
@@ -52,11 +50,8 @@ def step_function(branch: ca.Function) -> ca.Function:
     The error is relative to the tolerance. c is not negative if all modes last at the end of the step, d if
     they do in the middle too; v is the rate of each switch at the end.
 
-    Parameters
-    ----------
-    branch
-        (t, x, u, p, m) -> (f, c, v). U holds the inputs at the twelve stages and in the middle, one column
-        each.
+    ``branch``: (t, x, u, p, m) -> (f, c, v). U holds the inputs at the twelve stages and in the middle, one
+    column each.
     """
     n, m, parameters, switches = (branch.size1_in(i) for i in (1, 2, 3, 4))
     t, h, tolerance = ca.MX.sym("t"), ca.MX.sym("h"), ca.MX.sym("tolerance")
@@ -164,26 +159,6 @@ def integrate_explicitly(
     """Return the states at the sample times, shape (states, n), and the events.
 
     No step reaches across a sample or an event.
-
-    Parameters
-    ----------
-    model
-        Continuous, with at least one state.
-    drives
-        Inputs.
-    x0
-        States at the first time.
-    tolerance
-        Error allowed per step, relative to the state and to its nominal size.
-    translate
-        Makes the function of a step a faster one.
-
-    Raises
-    ------
-    TooStiffError
-        If stability limits the steps; it carries the result so far.
-    ConvergenceError
-        If no step is short enough, or events accumulate.
     """
     times = drives.times.tolist()
     modes = Modes(model, times[-1] - times[0]) if model.switching else None
@@ -227,19 +202,7 @@ def integrate_explicitly(
 
 
 def limited_by_stability(model: FlatModel, drives: Drives, interval: int, x: Array, length: float) -> bool:
-    """Tell whether a step length is near the stability limit of the fastest pole.
-
-    Parameters
-    ----------
-    model, drives
-        What is integrated.
-    interval
-        Number of the interval between samples.
-    x
-        States.
-    length
-        Of the step in s.
-    """
+    """Tell whether a step length is near the stability limit of the fastest pole."""
     s = model.symbols()
     slope = ca.Function(
         "slope", [s.time, s.state, s.input, s.parameter], [ca.jacobian(s.derivative, s.state)]

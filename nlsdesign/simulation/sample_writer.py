@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from ..errors import unknown_name
+from ..foundation.errors import unknown_name
 from ..model import FlatModel, Table
 from ..model.transform import named
 from .sampled_system import PLANT, SampledSystem

@@ -15,15 +15,14 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..foundation.arrays import Array, Mask
+from ..foundation.errors import ValueRangeError, unknown_name
 from .buffered import Translate, as_it_is
 from .column_runs import CHUNK, column_run
 from .sample_writer import SampleWriter
 from .sampled_system import PLANT, SampledSystem
 
-Array = NDArray[np.float64]
 Course = Callable[[float], float] | float | Array
 """An input: a function of time, a constant, or values at the samples, shape (T,) or (runs, T)."""
 
@@ -54,16 +53,10 @@ class BatchTrace:
     time: Array
     signals: Mapping[str, Array]
     final: Array
-    finite: NDArray[np.bool_]
+    finite: Mask
 
     def __getitem__(self, name: str) -> Array:
-        """Return one signal, shape (runs, T).
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return one signal, shape (runs, T)."""
         if name not in self.signals:
             raise unknown_name("signal of the batch", name, self.signals)
         return self.signals[name]

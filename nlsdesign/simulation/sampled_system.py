@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from ..model import FlatModel
 
 PLANT = "plant"

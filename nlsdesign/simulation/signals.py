@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..foundation.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -31,16 +32,10 @@ class Sine:
     phase: float = 0.0
 
     def __call__(self, time: float) -> float:
-        """Return the value at a time.
-
-        Parameters
-        ----------
-        time
-            In s.
-        """
+        """Return the value at a time."""
         return self.offset + self.amplitude * math.sin(2.0 * math.pi * self.frequency * time + self.phase)
 
-    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, times: Array) -> Array:
         """Return the values at many times at once.
 
         Parameters
@@ -49,7 +44,7 @@ class Sine:
             In s, any shape.
         """
         phase = 2.0 * math.pi * self.frequency * times + self.phase
-        result: NDArray[np.float64] = self.offset + self.amplitude * np.sin(phase)
+        result: Array = self.offset + self.amplitude * np.sin(phase)
         return result
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError, unknown_name
+from ..foundation.arrays import Array, Mask
+from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from ..model.transform import named
 from .buffered import Translate, as_it_is
@@ -18,8 +18,6 @@ from .events import Event
 from .input_signals import Drive, Drives, drives_of
 from .integrate import RESIDUAL_LIMIT, checked_times, simulate
 from .many_steps import ManySteps
-
-Array = NDArray[np.float64]
 
 _NOT_SOLVED = "a state is not finite, or an implicit equation was not solved"
 _EVALUATED = 200
@@ -51,23 +49,12 @@ class SimulatedBatch:
     events: tuple[tuple[Event, ...], ...]
 
     @property
-    def done(self) -> NDArray[np.bool_]:
+    def done(self) -> Mask:
         """Whether each column was simulated to the end, shape (columns,)."""
         return np.array([i not in self.failures for i in range(len(self.events))])
 
     def __getitem__(self, name: str) -> Array:
-        """Return one signal, shape (columns, T).
-
-        Parameters
-        ----------
-        name
-            Full name.
-
-        Raises
-        ------
-        UnknownNameError
-            If it was not kept.
-        """
+        """Return one signal, shape (columns, T)."""
         if name not in self.signals:
             raise unknown_name("signal of the batch", name, self.signals)
         return self.signals[name]
@@ -150,7 +137,7 @@ def _check(model: FlatModel, keep: Sequence[str]) -> None:
         raise ValueRangeError(
             f"model '{model.name}'",
             "is discrete or has no states; a batch needs a continuous model with states",
-            next_step="run a sampled loop with nlsdesign.control.loop_over_spread",
+            next_step="run a sampled loop with nlsdesign.feedback.control.loop_over_spread",
         )
     known = named(model, model.symbols())
     for name in keep:

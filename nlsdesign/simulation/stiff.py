@@ -9,13 +9,11 @@ from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ConvergenceError
+from ..foundation.arrays import Array
+from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
 from .input_signals import Drives
-
-Array = NDArray[np.float64]
 
 _PLACES = (1.0 - np.cos(np.pi * np.arange(6) / 5)) / 2
 _TO_COEFFICIENTS = np.linalg.inv(np.vander(_PLACES, increasing=True))
@@ -45,23 +43,7 @@ def _pieces(
 def integrate_implicitly(model: FlatModel, drives: Drives, first: int, x0: Array, tolerance: float) -> Array:
     """Return the states at the sample times from number ``first`` on, shape (states, n − first).
 
-    Parameters
-    ----------
-    model
-        Continuous, with at least one state.
-    drives
-        Inputs; functions of time are approximated piecewise by polynomials of degree five.
-    first
-        Number of the sample at which to begin.
-    x0
-        States there.
-    tolerance
-        Error allowed per step, relative to the state and to its nominal size.
-
-    Raises
-    ------
-    ConvergenceError
-        If CVODES stops early.
+    ``drives``: inputs; functions of time are approximated piecewise by polynomials of degree five.
     """
     times, parameters = drives.times.tolist(), model.start(model.parameters)
     nominal = np.array([v.nominal for v in model.states])

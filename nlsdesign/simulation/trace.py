@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..data_frames import Axis, data_frame, data_set
-from ..errors import MeasurementError, unknown_name
+from ..foundation.arrays import Array
+from ..foundation.data_frames import Axis, data_frame, data_set
+from ..foundation.errors import MeasurementError, unknown_name
+from ..foundation.quantity import parse_unit, with_unit
+from ..foundation.text_files import write_table
 from ..model import Variable
-from ..quantity import parse_unit, with_unit
-from ..writing import write_table
 from .events import Event
 
-Array = NDArray[np.float64]
 _ROUNDING = 1e-9
 """Excess over a range that is rounding, relative to the nominal size."""
 
@@ -139,13 +138,7 @@ class Trace:
                 )
 
     def __getitem__(self, name: str) -> Array:
-        """Return one signal.
-
-        Parameters
-        ----------
-        name
-            Full name.
-        """
+        """Return one signal."""
         if name not in self.signals:
             raise unknown_name("signal", name, self.signals)
         return self.signals[name]

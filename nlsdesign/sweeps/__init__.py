@@ -3,23 +3,19 @@
 The report of a sweep and the command import it. It decides no physics: questions ask the rooms below.
 """
 
-from .axes import AxisSet, BoundAxes, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import Subject
-from .design_question import DesignQuestion
-from .diagnosis_question import DiagnosisQuestion
-from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
-from .preferences import LargerIsBetter, NearIsBetter, NotAbove, NotBelow, SmallerIsBetter
-from .run_sweep import SweepSettings, SweepTask, sweep, sweep_task
-from .saltelli_sample import SaltelliSample
-from .sweep_file import read_sweep_file
-from .sweep_plan import PointPlan
+from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
+from .questions import AngleQuestion, DesignQuestion, DiagnosisQuestion, LoopQuestion, SpreadQuestion
+from .run_sweep import SweepTask, sweep
+from .saltelli import SaltelliSample
+from .sweep_columns import SweepColumn
 from .sweep_question import FunctionQuestion, SweepQuestion
-from .sweep_table import SweepColumn, SweepTable, read_sweep
+from .sweep_table import SweepTable, read_sweep
 
 __all__ = [
     "AngleQuestion",
     "AxisSet",
-    "BoundAxes",
     "DesignQuestion",
     "DiagnosisQuestion",
     "FunctionQuestion",
@@ -29,9 +25,7 @@ __all__ = [
     "Listed",
     "LoopQuestion",
     "NearIsBetter",
-    "NotAbove",
     "NotBelow",
-    "PointPlan",
     "RandomDraws",
     "SaltelliSample",
     "SmallerIsBetter",
@@ -40,11 +34,8 @@ __all__ = [
     "Subject",
     "SweepColumn",
     "SweepQuestion",
-    "SweepSettings",
     "SweepTable",
     "SweepTask",
     "read_sweep",
-    "read_sweep_file",
     "sweep",
-    "sweep_task",
 ]

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, brief, unknown_name
+from ..foundation.arrays import Array
+from ..foundation.errors import ValueRangeError, brief, unknown_name
 from ..model import flatten
 from ..simulation.prior import LONGEST_ROW, declared_prior
 from .axis_values import Given, Subject
@@ -29,17 +29,7 @@ MOST_HELD: Final = 10_000_000
 
 @dataclass(frozen=True, eq=False)
 class BoundAxes:
-    """A set of axes with its values.
-
-    Parameters
-    ----------
-    columns
-        Of the axes.
-    count
-        Number of rows.
-    row
-        The values of one row, by its number.
-    """
+    """A set of axes with its values."""
 
     columns: tuple[SweepColumn, ...]
     count: int
@@ -75,20 +65,7 @@ def _count(name: str, count: int, least: int = 1, most: int = MOST_HELD) -> None
 
 
 def require_seed(name: str, seed: int) -> None:
-    """Refuse what is no seed.
-
-    Parameters
-    ----------
-    name
-        Of the set of axes.
-    seed
-        A whole number, 0 or larger.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is not one.
-    """
+    """Refuse what is no seed."""
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise ValueRangeError(f"{name}: seed = {brief(seed)}", "must be a whole number from 0 on",
                               next_step="take for instance 1")  # fmt: skip
@@ -142,7 +119,7 @@ class GridAxis(AxisSet):
                 next_step='take spacing = "even"',
             )  # fmt: skip
         space = np.geomspace if self.spacing == "ratio" else np.linspace
-        values: NDArray[np.float64] = space(lower, upper, self.count)
+        values: Array = space(lower, upper, self.count)
         if not np.all(np.diff(values) > 0.0):
             _distinct(self.name, values.tolist())
         return BoundAxes((column,), self.count, lambda number: (float(values[number]),))
@@ -210,13 +187,13 @@ class SobolSample(AxisSet):
         columns, lower, upper = _box(subject, self.ranges, "sobol")
 
         @functools.lru_cache(maxsize=2)
-        def block(number: int) -> NDArray[np.float64]:
+        def block(number: int) -> Array:
             from scipy.stats import qmc
 
             sampler = qmc.Sobol(len(columns), scramble=True, seed=np.random.default_rng(self.seed))
             if number:
                 sampler.fast_forward(number * _BLOCK)
-            unit: NDArray[np.float64] = sampler.random(_BLOCK)
+            unit: Array = sampler.random(_BLOCK)
             return unit
 
         def row(number: int) -> tuple[float, ...]:
@@ -323,7 +300,7 @@ class RandomDraws(AxisSet):
         return BoundAxes(tuple(columns), self.count, row)
 
 
-def _ends_of(ends: NDArray[np.float64], at: list[int], shapes: Any, without: float) -> NDArray[np.float64]:
+def _ends_of(ends: Array, at: list[int], shapes: Any, without: float) -> Array:
     return np.where(shapes, without, ends[at]) if len(ends) else np.full(len(at), without)
 
 
@@ -350,7 +327,7 @@ def _ends(column: SweepColumn, ends: tuple[Any, ...]) -> tuple[float, float]:
 
 def _box(
     subject: Subject, ranges: Mapping[str, tuple[Given, Given]], kind: str
-) -> tuple[tuple[SweepColumn, ...], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[tuple[SweepColumn, ...], Array, Array]:
     if not ranges:
         raise ValueRangeError(
             "sample", "has no ranges", next_step='write ranges = {"NAME" = ["1 mm", "2 mm"]}'
@@ -368,20 +345,7 @@ def _box(
 
 
 def require_fractions(subject: Subject, name: str) -> None:
-    """Refuse a sample over whole numbers: its points lie between them.
-
-    Parameters
-    ----------
-    subject
-        What the axis changes.
-    name
-        Of the axis.
-
-    Raises
-    ------
-    ValueRangeError
-        If the axis takes whole numbers only.
-    """
+    """Refuse a sample over whole numbers: its points lie between them."""
     if subject.is_whole(name):
         raise ValueRangeError(f"range of {name}", "takes whole numbers only, a sample has others",
                               next_step="list them (Listed), or take a GridAxis in steps of one")  # fmt: skip

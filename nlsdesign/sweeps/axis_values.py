@@ -12,9 +12,9 @@ import numpy as np
 
 from ..components import materials
 from ..components.assembly.named_parts import Assembly
-from ..errors import NlsError, UnitError, ValueRangeError, brief, unknown_name
-from ..quantity import BASE, Quantity, parse_unit, same_dimension
-from ..written_numbers import split_number
+from ..foundation.errors import NlsError, UnitError, ValueRangeError, brief, unknown_name
+from ..foundation.quantity import BASE, Quantity, parse_unit, same_dimension
+from ..foundation.written_numbers import split_number
 from .changes import ASK, DECK, pieces_of_rubber, row_of_factor
 from .sweep_columns import SweepColumn
 
@@ -46,11 +46,6 @@ _KNOWN_UNITS: Final = (
 
 def si_unit(unit: str) -> str:
     """Return the unit of a number once it is in SI.
-
-    Parameters
-    ----------
-    unit
-        As given, for instance ``"mm"``.
 
     Examples
     --------
@@ -249,13 +244,8 @@ def _number(name: str, given: Given, unit: str) -> float:
 def question_settings(question: Any, prefix: str = ASK) -> dict[str, Any]:
     """Return what an axis can change in a question: single numbers and words, by name.
 
-    Parameters
-    ----------
-    question
-        A dataclass; also those that it holds are looked through. In a row of them each goes by the name of
-        its class, for instance ``ask.keep.MaximumCamRadius.radius``.
-    prefix
-        Of the names.
+    ``question``: a dataclass; also those that it holds are looked through. In a row of them each goes by the
+    name of its class, for instance ``ask.keep.MaximumCamRadius.radius``.
     """
     known: dict[str, Any] = {}
     for name, value in _inner(question).items():
@@ -270,26 +260,12 @@ def question_settings(question: Any, prefix: str = ASK) -> dict[str, Any]:
 
 
 def in_unit(default: float, unit: str) -> Any:
-    """Return a field of a question for a number in SI whose unit is checked where it is read.
-
-    Parameters
-    ----------
-    default
-        In SI.
-    unit
-        In SI.
-    """
+    """Return a field of a question for a number in SI whose unit is checked where it is read."""
     return dataclasses.field(default=default, metadata={_UNIT: unit})
 
 
 def unit_of_field(field: dataclasses.Field[Any]) -> str | None:
-    """Return the unit in SI that a field of a question states, or ``None``.
-
-    Parameters
-    ----------
-    field
-        Of the question.
-    """
+    """Return the unit in SI that a field of a question states, or ``None``."""
     unit: str | None = field.metadata.get(_UNIT)
     return unit
 
@@ -316,17 +292,7 @@ def _is_whole(holder: Any, field: str) -> bool:
 
 
 def with_settings(question: Any, values: Mapping[str, Any], units: Mapping[str, str]) -> Any:
-    """Return a copy of a question with other numbers and words.
-
-    Parameters
-    ----------
-    question
-        A dataclass.
-    values
-        By full name, in SI.
-    units
-        In SI, by full name.
-    """
+    """Return a copy of a question with other numbers and words."""
     for name, value in values.items():
         question = _changed(question, name.split(".")[1:], value, units.get(name, ""))
     return question

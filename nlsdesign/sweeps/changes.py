@@ -10,7 +10,7 @@ from ..components import material, with_rubber
 from ..components.assembly.named_parts import Assembly
 from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen
-from ..errors import unknown_name
+from ..foundation.errors import unknown_name
 
 DECK: Final = "deck"
 """Name of the axis whose words are decks."""
@@ -22,13 +22,7 @@ _kept: dict[tuple[int, str, str], tuple[Assembly, Assembly]] = {}
 
 
 def pieces_of_rubber(assembly: Assembly) -> tuple[str, ...]:
-    """Return the paths of the pieces of rubber of an assembly.
-
-    Parameters
-    ----------
-    assembly
-        To look through.
-    """
+    """Return the paths of the pieces of rubber of an assembly."""
     inner = ((path, part.element if isinstance(part, Tie) else part) for path, part in assembly.walk())
     return tuple(path for path, part in inner if isinstance(part, Specimen))
 
@@ -39,19 +33,7 @@ def changed_assembly(bases: Mapping[str, Assembly], values: Mapping[str, Any]) -
     The deck comes first, then rubbers, then numbers, so that a number that is swept is not undone by a
     rubber that brings its own.
 
-    Parameters
-    ----------
-    bases
-        Assemblies by the name of their deck; the first is taken where no axis names a deck.
-    values
-        Numbers in SI and words by the name of their axis.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such deck, material, piece of rubber or number.
-    NlsError
-        If a number or a rubber is refused by the part that it belongs to.
+    ``bases``: assemblies by the name of their deck; the first is taken where no axis names a deck.
     """
     name = str(values.get(DECK, next(iter(bases))))
     if name not in bases:
@@ -91,12 +73,6 @@ def _with_rubber(base: Assembly, piece: str, rubber: str) -> Assembly:
 
 
 def row_of_factor(name: str) -> str | None:
-    """Return the name within ``factor(NAME)``, which stands for all numbers of a row times one factor.
-
-    Parameters
-    ----------
-    name
-        Of an axis.
-    """
+    """Return the name within ``factor(NAME)``, which stands for all numbers of a row times one factor."""
     inside = re.fullmatch(r"factor\((.+)\)", name)
     return inside[1] if inside else None

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ..components.assembly.deck_writer import deck_text, declare
 from ..components.assembly.named_parts import Assembly
-from ..deck import read_deck
-from ..errors import MeasurementError, NlsError
+from ..foundation.deck import read_deck
+from ..foundation.errors import MeasurementError, NlsError
 from .changes import changed_assembly
 from .sweep_table import SweepTable
 
@@ -18,42 +18,13 @@ def point_deck_text(table: SweepTable, point: int) -> str:
 
     Axes that belong to the question and not to the machine, such as a target or a seed, stand above it as
     comments.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    point
-        Number of the point, from 0.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such point.
-    MeasurementError
-        If the deck that was swept does not stand beside the table.
-    NlsError
-        If a part refuses a number of the point, which is then why the point failed.
     """
     row = table.row_of(point)
     return _text(table, row, _bases(table))
 
 
 def point_deck_texts(table: SweepTable, points: Iterable[int]) -> Iterator[tuple[int, str | NlsError]]:
-    """Yield the deck behind each point, or why it has none; decks that were swept are read once.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    points
-        Numbers of the points.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such point.
-    """
+    """Yield the deck behind each point, or why it has none; decks that were swept are read once."""
     bases: dict[str, Assembly] | NlsError
     try:
         bases = _bases(table)

@@ -1,16 +1,16 @@
-"""What is better in an answer of a sweep, and what a point must keep: objects that the user chooses."""
+"""What is better in an answer of a sweep, what a point must keep, and the order of the points."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..quantity import three_digits, with_unit
-
-Floats = NDArray[np.float64]
+from ..foundation.arrays import Array, Indices, Mask
+from ..foundation.errors import ValueRangeError, unknown_name
+from ..foundation.quantity import three_digits, with_unit
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Preference(ABC):
     answer: str
 
     @abstractmethod
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return numbers of which the smaller is the better one; not a number stays so.
 
         Parameters
@@ -50,7 +50,7 @@ class Preference(ABC):
 class SmallerIsBetter(Preference):
     """The smaller, the better; minus ten is better than one."""
 
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return the values."""
         return np.asarray(values, dtype=float)
 
@@ -63,7 +63,7 @@ class SmallerIsBetter(Preference):
 class LargerIsBetter(Preference):
     """The larger, the better."""
 
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return the negative values."""
         return -np.asarray(values, dtype=float)
 
@@ -84,7 +84,7 @@ class NearIsBetter(Preference):
 
     value: float
 
-    def cost(self, values: Floats) -> Floats:
+    def cost(self, values: Array) -> Array:
         """Return the distances from the value."""
         return np.abs(np.asarray(values, dtype=float) - self.value)
 
@@ -109,7 +109,7 @@ class Requirement(ABC):
     value: float
 
     @abstractmethod
-    def kept(self, values: Floats) -> NDArray[np.bool_]:
+    def kept(self, values: Array) -> Mask:
         """Return which values keep it; one that is not a number does not.
 
         Parameters
@@ -133,7 +133,7 @@ class Requirement(ABC):
 class NotAbove(Requirement):
     """The answer is at most a value."""
 
-    def kept(self, values: Floats) -> NDArray[np.bool_]:
+    def kept(self, values: Array) -> Mask:
         """Return which values are at most this one."""
         return np.asarray(np.asarray(values, dtype=float) <= self.value)
 
@@ -146,10 +146,104 @@ class NotAbove(Requirement):
 class NotBelow(Requirement):
     """The answer is at least a value."""
 
-    def kept(self, values: Floats) -> NDArray[np.bool_]:
+    def kept(self, values: Array) -> Mask:
         """Return which values are at least this one."""
         return np.asarray(np.asarray(values, dtype=float) >= self.value)
 
     def words(self, unit: str) -> str:
         """Return it as text."""
         return f"at least {with_unit(three_digits(self.value), unit or '1')}"
+
+
+@dataclass(frozen=True, eq=False)
+class RankedPoints:
+    """Which points are on the front, and which do not count.
+
+    Parameters
+    ----------
+    preferences, requirements
+        As given.
+    failed
+        Points without an answer, shape (n,).
+    missed
+        Points with an answer that does not keep a requirement.
+    incomplete
+        Points that keep all requirements, with an answer to compare that is no finite number.
+    front
+        Indices of the points that no other betters in all preferences, the best in the first one first; empty
+        without preferences.
+    misses
+        How many points miss each requirement, in their order.
+    """
+
+    preferences: tuple[Preference, ...]
+    requirements: tuple[Requirement, ...]
+    failed: Mask
+    missed: Mask
+    incomplete: Mask
+    front: Indices
+    misses: tuple[int, ...]
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Names of the answers with a direction or a requirement, each once."""
+        names = [each.answer for each in self.preferences] + [each.answer for each in self.requirements]
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def compared(self) -> Mask:
+        """Points that were compared with one another."""
+        return ~(self.failed | self.missed | self.incomplete)
+
+
+def rank_points(
+    answers: Mapping[str, Array],
+    done: Mask,
+    *,
+    preferences: Sequence[Preference] = (),
+    requirements: Sequence[Requirement] = (),
+) -> RankedPoints:
+    """Return which points no other betters; failures, misses and what is no finite number are set aside.
+
+    ``preferences``: what is better; a point is on the front where no other is at least as good in all and
+    better in one.
+    """
+    named = [each.answer for each in preferences]
+    for name in (*named, *(each.answer for each in requirements)):
+        if name not in answers:
+            raise unknown_name("answer", name, answers)
+    for name in named:
+        if named.count(name) > 1:
+            raise ValueRangeError(f"answer '{name}'", "has two directions", next_step="state one of them")
+    done = np.asarray(done, dtype=bool)
+    kept = [each.kept(answers[each.answer]) for each in requirements]
+    missed = done & ~np.all(kept, axis=0) if kept else np.zeros_like(done)
+    costs = (
+        np.array([each.cost(answers[each.answer]) for each in preferences]).reshape(len(named), len(done)).T
+    )
+    whole = np.all(np.isfinite(costs), axis=1) if named else done
+    incomplete = done & ~missed & ~whole
+    rows = np.flatnonzero(done & ~missed & ~incomplete)
+    front = rows[nondominated(costs[rows])] if named else np.zeros(0, dtype=np.intp)
+    if len(front):
+        front = front[np.lexsort((front, costs[front, 0]))]
+    counts = tuple(int(np.sum(done & ~each)) for each in kept)
+    return RankedPoints(tuple(preferences), tuple(requirements), ~done, missed, incomplete, front, counts)
+
+
+def nondominated(costs: Array) -> Indices:
+    """Return the rows that no other row betters: at most as large in each column and smaller in one.
+
+    Equal rows are kept together.
+
+    ``costs``: finite numbers, shape (n, k); the smaller, the better.
+    """
+    unique, places = np.unique(np.asarray(costs, dtype=float), axis=0, return_inverse=True)
+    # In the order of the columns a later row never betters an earlier one.
+    best = np.empty_like(unique)
+    kept: list[int] = []
+    for number, row in enumerate(unique):
+        if not np.any(np.all(best[: len(kept)] <= row, axis=1)):
+            best[len(kept)] = row
+            kept.append(number)
+    return np.flatnonzero(np.isin(places.ravel(), kept))

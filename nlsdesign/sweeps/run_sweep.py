@@ -1,4 +1,8 @@
-"""The run of a sweep: points go out, rows come in, parts are written, and at the end the table."""
+"""The run of a sweep: points go out, rows come in, parts are written, and at the end the table.
+
+Batches within a point run as compiled code where there is a compiler, else in CasADi, with the same bits.
+NumPy has elementary functions of its own, so a table would depend on who computed it.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +14,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import casadi as ca
+
 from ..components.assembly.named_parts import Assembly
-from ..errors import ArrangementError, NlsError, ValueRangeError
-from ..progress import Progress, Quiet
-from ..work_sharing import Executor, PointOutcome, Processes, shared_map
-from .arrow_columns import libraries
+from ..export import natively, quickest
+from ..foundation.errors import ArrangementError, ExportError, NlsError, ValueRangeError
+from ..foundation.progress import Progress, Quiet
+from ..foundation.work_sharing import Executor, PointOutcome, Processes, shared_map
+from ..simulation.column_graph import ColumnGraph, NotByColumnsError
+from ..simulation.column_runs import ColumnRun
 from .axes import AxisSet
 from .axis_values import Subject
 from .changes import DECK
-from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn
+from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn, libraries
 from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
 from .sweep_parts import Parts
 from .sweep_plan import PointPlan
@@ -88,22 +96,7 @@ def _answers(columns: Sequence[SweepColumn]) -> tuple[str, ...]:
 def sweep_task(
     actuator: Assembly | Mapping[str, Assembly], *, axes: Sequence[AxisSet], ask: SweepQuestion
 ) -> SweepTask:
-    """Check a sweep before anything is computed.
-
-    Parameters
-    ----------
-    actuator, axes, ask
-        As for :func:`sweep`.
-
-    Raises
-    ------
-    ArrangementError
-        If there is no deck, or several and no axis ``deck``.
-    ValueRangeError
-        If axes collide, or an answer has the name of an axis.
-    NlsError
-        If a name does not exist, or a value does not fit it.
-    """
+    """Check a sweep before anything is computed."""
     assemblies = {actuator.name: actuator} if isinstance(actuator, Assembly) else dict(actuator)
     if not assemblies:
         raise ArrangementError("sweep", "has no deck", next_step="give an assembly")
@@ -131,18 +124,7 @@ def sweep_task(
 
 
 def require_askable(task: SweepTask) -> None:
-    """Refuse a question that fits no deck of a sweep, nor its first point, whose structure may differ.
-
-    Parameters
-    ----------
-    task
-        That was checked otherwise.
-
-    Raises
-    ------
-    NlsError
-        If the question names what is not there.
-    """
+    """Refuse a question that fits no deck of a sweep, nor its first point, whose structure may differ."""
     first: NlsError | None = None
     for assembly in task.assemblies.values():
         try:
@@ -219,24 +201,7 @@ def sweep(
 def run_task(
     task: SweepTask, folder: Path, *, executor: Executor, settings: SweepSettings, progress: Progress
 ) -> SweepTable:
-    """Run a checked sweep; see :func:`sweep`.
-
-    Parameters
-    ----------
-    task
-        The sweep.
-    folder
-        Of the results.
-    executor, settings, progress
-        As for :func:`sweep`.
-
-    Raises
-    ------
-    ExportError
-        If the folder cannot be written, is full, or holds another sweep.
-    WorkSharingError
-        If workers run other code, or their scheduler is not there.
-    """
+    """Run a checked sweep; see :func:`sweep`."""
     with only_run(folder):
         parts = opened(folder, task.about, task.columns, task.plan, again=settings.again)
         written_about(folder, task.about, task.columns, task.assemblies)
@@ -312,11 +277,6 @@ class _Watch:
 def duration(seconds: float) -> str:
     """Return a time in words of two units at most.
 
-    Parameters
-    ----------
-    seconds
-        Not negative.
-
     Examples
     --------
     >>> duration(8.2), duration(754), duration(7600), duration(200000)
@@ -328,3 +288,30 @@ def duration(seconds: float) -> str:
             part = {"h": 3600, "min": 60, "s": 1}[small]
             return f"{whole // size} {large} {whole % size // part} {small}"
     return f"{whole} s"
+
+
+@dataclass(frozen=True)
+class SameBits:
+    """Compiled code where that is to be had, and CasADi where it is not: a worker may lack a compiler."""
+
+    def __call__(self, function: ca.Function) -> ca.Function:
+        """Return a function as compiled code, or as it is."""
+        if quickest() is not natively:
+            return function
+        try:
+            return natively(function)
+        except ExportError:  # the cache of a worker may be full
+            return function
+
+    def columns(self, graph: ColumnGraph) -> ColumnRun:
+        """Return compiled code that runs samples of many columns."""
+        if quickest() is not natively:
+            raise NotByColumnsError
+        try:
+            return natively.columns(graph)
+        except ExportError:
+            raise NotByColumnsError from None
+
+
+same_bits = SameBits()
+"""What questions of a sweep give to batches."""

@@ -15,12 +15,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import missing_library
-from .axis_dependence import codes, dependent_axes
-from .saltelli_plan import SaltelliForm, saltelli_plan
+from ..foundation.arrays import Array, Mask
+from ..foundation.errors import missing_library
+from .answer_statistics import codes, dependent_axes
+from .saltelli import SaltelliForm, saltelli_plan
 from .sweep_columns import SALTELLI
 
-Floats = NDArray[np.float64]
 FEWEST_POINTS: Final = 200
 FEWEST_BLOCKS: Final = 16
 MOST_FAILED: Final = 0.1
@@ -84,29 +84,12 @@ class AnswerSensitivity:
 
 def sensitivity(
     axes: Mapping[str, NDArray[Any]],
-    answers: Mapping[str, Floats],
-    done: NDArray[np.bool_],
+    answers: Mapping[str, Array],
+    done: Mask,
     *,
     kinds: Mapping[str, str] | None = None,
 ) -> list[AnswerSensitivity]:
-    """Return how each answer depends on each axis.
-
-    Parameters
-    ----------
-    axes
-        Numbers or words of each axis, shape (n,), in the order of the points.
-    answers
-        Numbers of each answer, shape (n,).
-    done
-        Which points have answers.
-    kinds
-        How each axis was made, where that is known, as the column of a sweep states it.
-
-    Raises
-    ------
-    MissingLibraryError
-        If SALib is not installed.
-    """
+    """Return how each answer depends on each axis."""
     varying = {name: values for name, values in axes.items() if len(np.unique(codes(values))) > 1}
     plan = saltelli_plan(np.column_stack([codes(v) for v in varying.values()])) if varying else None
     if plan is None and any((kinds or {}).get(name) == SALTELLI for name in varying):
@@ -119,8 +102,8 @@ def sensitivity(
 def _of_answer(
     name: str,
     axes: Mapping[str, NDArray[Any]],
-    values: Floats,
-    done: NDArray[np.bool_],
+    values: Array,
+    done: Mask,
     plan: SaltelliForm | None,
 ) -> AnswerSensitivity:
     values = np.asarray(values, dtype=float)
@@ -185,7 +168,7 @@ def _full_grid(axes: Mapping[str, NDArray[Any]]) -> bool:
     ) == len(columns)
 
 
-def _by_grid(axes: Mapping[str, NDArray[Any]], values: Floats) -> list[SensitivityIndex]:
+def _by_grid(axes: Mapping[str, NDArray[Any]], values: Array) -> list[SensitivityIndex]:
     places = [np.unique(codes(column), return_inverse=True)[1].ravel() for column in axes.values()]
     table = np.full([1 + int(place.max()) for place in places], np.nan)
     table[tuple(places)] = values
@@ -199,9 +182,7 @@ def _by_grid(axes: Mapping[str, NDArray[Any]], values: Floats) -> list[Sensitivi
     return result
 
 
-def _by_plan(
-    name: str, axes: list[str], values: Floats, good: NDArray[np.bool_], plan: SaltelliForm
-) -> AnswerSensitivity:
+def _by_plan(name: str, axes: list[str], values: Array, good: Mask, plan: SaltelliForm) -> AnswerSensitivity:
     """Return Sobol indices of the whole blocks of a Saltelli plan."""
     blocks = good[: plan.blocks * plan.rows].reshape(plan.blocks, plan.rows)
     whole = np.all(blocks, axis=1)
@@ -242,7 +223,7 @@ def _by_plan(
 
 
 def _from_data(
-    name: str, axes: Mapping[str, NDArray[Any]], values: Floats, remarks: list[str]
+    name: str, axes: Mapping[str, NDArray[Any]], values: Array, remarks: list[str]
 ) -> AnswerSensitivity:
     smooth = {
         axis: column.astype(float) for axis, column in axes.items()
@@ -276,7 +257,7 @@ def _from_data(
     return AnswerSensitivity(name, "; ".join(methods), len(values), _ordered(indices), tuple(remarks))
 
 
-def _correlation_ratio(column: NDArray[Any], values: Floats) -> tuple[float, float]:
+def _correlation_ratio(column: NDArray[Any], values: Array) -> tuple[float, float]:
     """Return the share of the variance between groups, corrected for their number, and half its interval."""
     groups = np.unique(codes(column), return_inverse=True)[1].ravel()
     random = np.random.default_rng(_SEED)
@@ -287,7 +268,7 @@ def _correlation_ratio(column: NDArray[Any], values: Floats) -> tuple[float, flo
     return _between_groups(groups, values), float(1.96 * np.nanstd(drawn, ddof=1))
 
 
-def _between_groups(groups: NDArray[Any], values: Floats) -> float:
+def _between_groups(groups: NDArray[Any], values: Array) -> float:
     sizes = np.bincount(groups)
     present = sizes > 0
     means = np.bincount(groups, weights=values)[present] / sizes[present]

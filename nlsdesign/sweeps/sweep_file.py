@@ -9,21 +9,27 @@ from typing import Any, Final
 
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
-from ..control import TorqueGains
-from ..deck import Deck, load_deck, read_deck
 from ..design import Target
 from ..design.jobs.job_file import built, job_in
-from ..errors import DeckError, NlsError, UnitError, brief, unknown_name
-from ..quantity import parse_unit, same_dimension
-from ..reading import text_of
-from ..written_numbers import split_number
+from ..feedback.control import TorqueGains
+from ..foundation.deck import Deck, load_deck, read_deck
+from ..foundation.errors import DeckError, NlsError, UnitError, brief, unknown_name
+from ..foundation.quantity import parse_unit, same_dimension
+from ..foundation.text_files import text_of
+from ..foundation.written_numbers import split_number
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import unit_of_field
-from .design_question import QUICK, DesignQuestion
-from .diagnosis_question import RECORDS, DiagnosisQuestion
-from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
+from .questions import (
+    QUICK,
+    RECORDS,
+    AngleQuestion,
+    DesignQuestion,
+    DiagnosisQuestion,
+    LoopQuestion,
+    SpreadQuestion,
+)
 from .run_sweep import SweepTask, require_askable, sweep_task
-from .saltelli_sample import SaltelliSample
+from .saltelli import SaltelliSample
 from .sweep_question import SweepQuestion
 
 _TABLES: Final = ("decks", "axes", "ask")
@@ -53,20 +59,6 @@ def read_sweep_file(path: Path | str) -> SweepTask:
     ``decks`` names the deck that is swept, or several for an axis ``deck``. ``[[axes]]`` begins each set of
     axes, ``[ask.QUESTION]`` holds the question, both with the names and fields of the Python objects. Numbers
     carry their unit; bare ones are in SI. A design is asked with the tables of a design file.
-
-    Parameters
-    ----------
-    path
-        The file.
-
-    Raises
-    ------
-    DeckError
-        If the file cannot be read, or a table is of the wrong kind; file, line and column are named.
-    UnknownNameError
-        If there is no such table, axis, question, field or deck, with the nearest that exists.
-    NlsError
-        If axes collide, or a number is refused by what it is for.
 
     Examples
     --------

@@ -17,11 +17,10 @@ import numpy as np
 
 from ..components.assembly.deck_writer import deck_digest, deck_text
 from ..components.assembly.named_parts import Assembly
-from ..errors import ExportError, MeasurementError
-from ..work_sharing import CodeIdentity, code_identity
-from ..writing import make_folder, write_text
-from .arrow_columns import arrow_column, libraries, numpy_column, read_columns
-from .sweep_columns import RESULTS_FILE, SweepColumn
+from ..foundation.errors import ExportError, MeasurementError
+from ..foundation.text_files import make_folder, write_text
+from ..foundation.work_sharing import CodeIdentity, code_identity
+from .sweep_columns import RESULTS_FILE, SweepColumn, arrow_column, libraries, numpy_column, read_columns
 from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
 from .sweep_plan import PointPlan
 from .sweep_table import ABOUT_FILE, DECK_FILE, DECKS_FOLDER, about_text, read_about
@@ -38,18 +37,7 @@ def about_sweep(
 ) -> dict[str, Any]:
     """Return what ``sweep.json`` says of a sweep; the same wherever it is computed.
 
-    Parameters
-    ----------
-    assemblies
-        By the name of their deck; the first is swept.
-    plan
-        Its points.
-    question
-        Kind of question.
-    asked
-        The question in full.
-    seeds
-        Of the axes.
+    ``assemblies``: by the name of their deck; the first is swept.
     """
     code = code_identity()
     first, base = next(iter(assemblies.items()))
@@ -72,33 +60,14 @@ def about_sweep(
 def contents_of(
     words: Mapping[str, Sequence[str]], stands_for: Callable[[str, str], str]
 ) -> dict[str, dict[str, str]]:
-    """Return a digest of what the words of axes stand for, by axis and word; nothing for mere words.
-
-    Parameters
-    ----------
-    words
-        By the name of their axis.
-    stands_for
-        Of the question: what a word of an axis stands for, as text.
-    """
+    """Return a digest of what the words of axes stand for, by axis and word; nothing for mere words."""
     known = {name: {text: stands_for(name, text) for text in given} for name, given in words.items()}
     return {name: given for name, given in known.items() if any(given.values())}
 
 
 @contextlib.contextmanager
 def only_run(folder: Path) -> Iterator[None]:
-    """Make the folder and hold it for this run until the end of the block, or of this process.
-
-    Parameters
-    ----------
-    folder
-        Of the sweep.
-
-    Raises
-    ------
-    ExportError
-        If the folder cannot be made or written, or another run is at work in it.
-    """
+    """Make the folder and hold it for this run until the end of the block, or of this process."""
     make_folder(folder)
     try:
         handle = os.open(folder / LOCK_FILE, os.O_CREAT | os.O_RDWR, 0o644)
@@ -138,21 +107,7 @@ def opened(
 ) -> Parts:
     """Return the parts of a sweep that goes on, or begins; points of other axes that fit are taken over.
 
-    Parameters
-    ----------
-    folder
-        Of the sweep; held by this run.
-    about, columns
-        Of the sweep that is to be run.
-    plan
-        Its points.
-    again
-        Whether everything that the folder holds of a sweep is thrown away first.
-
-    Raises
-    ------
-    ExportError
-        If the folder holds another sweep, one that other code computed, or files of something else.
+    ``folder``: of the sweep; held by this run.
     """
     if again:
         _emptied(folder)
@@ -192,17 +147,7 @@ def written_about(
     columns: tuple[SweepColumn, ...],
     assemblies: Mapping[str, Assembly],
 ) -> None:
-    """Write what is asked, the decks and the digests of the code.
-
-    Parameters
-    ----------
-    folder
-        Of the sweep.
-    about, columns
-        Of the sweep.
-    assemblies
-        By the name of their deck.
-    """
+    """Write what is asked, the decks and the digests of the code."""
     for number, (name, assembly) in enumerate(assemblies.items()):
         write_text(
             folder / DECKS_FOLDER / f"{name}.toml" if number else folder / DECK_FILE, deck_text(assembly)
@@ -300,19 +245,7 @@ def standing_points(
 ) -> int:
     """Return how many points of a sweep stand in a folder; nothing is written.
 
-    Parameters
-    ----------
-    folder
-        That may not exist.
-    about, columns
-        Of the sweep.
-    plan
-        Its points; those of other axes count that it has too.
-
-    Raises
-    ------
-    ExportError
-        If the folder holds another sweep.
+    ``plan``: its points; those of other axes count that it has too.
     """
     if not (folder / ABOUT_FILE).exists():
         return 0

@@ -15,10 +15,19 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExportError, MeasurementError
-from ..writing import draft
-from .arrow_columns import arrow_column, give_back, libraries, numpy_column, read_columns
-from .sweep_columns import DONE, RESULTS_FILE, SweepColumn
+from ..foundation.arrays import Mask
+from ..foundation.errors import ExportError, MeasurementError
+from ..foundation.text_files import draft
+from .sweep_columns import (
+    DONE,
+    RESULTS_FILE,
+    SweepColumn,
+    arrow_column,
+    give_back,
+    libraries,
+    numpy_column,
+    read_columns,
+)
 
 PARTS_FOLDER: Final = "parts"
 TIMINGS_FILE: Final = "timings.parquet"
@@ -37,28 +46,14 @@ def _kind(pyarrow: Any, column: SweepColumn, words: bool) -> Any:
 
 
 def holds_words(column: SweepColumn) -> bool:
-    """Tell whether a column holds words: states do, and axes without a range.
-
-    Parameters
-    ----------
-    column
-        Of a sweep.
-    """
+    """Tell whether a column holds words: states do, and axes without a range."""
     if column.role == "state":
         return column.name != "point"
     return column.role == "axis" and column.lower is None
 
 
 def schema(columns: Sequence[SweepColumn], *, timed: bool = False) -> Any:
-    """Return the schema of the table, or of its parts.
-
-    Parameters
-    ----------
-    columns
-        Of the table.
-    timed
-        Whether durations and places belong to it, as in parts.
-    """
+    """Return the schema of the table, or of its parts."""
     pyarrow, _ = libraries()
     fields = [(column.name, _kind(pyarrow, column, holds_words(column))) for column in columns]
     if timed:
@@ -71,26 +66,12 @@ _SECONDS, _WORKER = "(seconds)", "(worker)"
 
 
 def part_files(folder: Path) -> list[Path]:
-    """Return the parts of a sweep in the order in which they were written.
-
-    Parameters
-    ----------
-    folder
-        Of the sweep.
-    """
+    """Return the parts of a sweep in the order in which they were written."""
     return sorted((folder / PARTS_FOLDER).glob("[0-9]*.parquet"))
 
 
 class Parts:
-    """The parts of one sweep.
-
-    Parameters
-    ----------
-    folder
-        Of the sweep.
-    columns
-        Of its table.
-    """
+    """The parts of one sweep."""
 
     def __init__(self, folder: Path, columns: Sequence[SweepColumn]) -> None:
         self._folder, self._columns = folder, tuple(columns)
@@ -112,16 +93,8 @@ class Parts:
                 with contextlib.suppress(OSError):
                     path.rename(path.with_suffix(".damaged"))
 
-    def standing(self, count: int, *, with_failed: bool = True) -> NDArray[np.bool_]:
-        """Return which points stand in the parts.
-
-        Parameters
-        ----------
-        count
-            Number of points of the sweep.
-        with_failed
-            Whether points that failed count too.
-        """
+    def standing(self, count: int, *, with_failed: bool = True) -> Mask:
+        """Return which points stand in the parts."""
         mask = np.zeros(count, dtype=bool)
         for table in self._tables(["point", "status"]):
             points = numpy_column(table.column("point"))
@@ -136,18 +109,7 @@ class Parts:
             yield read_columns(path, names)
 
     def write(self, rows: Sequence[Row]) -> None:
-        """Write rows as one more part.
-
-        Parameters
-        ----------
-        rows
-            By name of the column.
-
-        Raises
-        ------
-        ExportError
-            If the folder cannot be written or is full.
-        """
+        """Write rows as one more part."""
         if not rows:
             return
         pyarrow, _ = libraries()
@@ -171,13 +133,7 @@ class Parts:
             path.unlink(missing_ok=True)
 
     def replace_all(self, tables: Iterator[Any]) -> None:
-        """Replace all parts by other tables; the old ones go when the new ones stand.
-
-        Parameters
-        ----------
-        tables
-            Of the schema of parts.
-        """
+        """Replace all parts by other tables; the old ones go when the new ones stand."""
         old = part_files(self._folder)
         for table in tables:
             self._write_table(table)
@@ -262,20 +218,7 @@ def _places(rows: NDArray[Any]) -> Any:
 
 
 def rows_in_order(folder: Path, columns: Sequence[SweepColumn]) -> dict[str, NDArray[Any]]:
-    """Return the columns of a sweep that is not finished, sorted by point.
-
-    Parameters
-    ----------
-    folder
-        Of the sweep.
-    columns
-        Of its table.
-
-    Raises
-    ------
-    MeasurementError
-        If a part is damaged.
-    """
+    """Return the columns of a sweep that is not finished, sorted by point."""
     pyarrow, _ = libraries()
     try:
         blocks = list(_Order(folder, columns).blocks([column.name for column in columns]))

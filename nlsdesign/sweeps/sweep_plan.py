@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ..errors import ValueRangeError
+from ..foundation.errors import ValueRangeError
 from .axes import AxisSet, BoundAxes
 from .axis_values import Subject
 from .changes import row_of_factor
@@ -21,22 +21,7 @@ _MOST_POINTS = 100_000_000
 
 
 class PointPlan:
-    """Points by number; the last set of axes changes first.
-
-    Parameters
-    ----------
-    axes
-        Sets of axes.
-    subject
-        What they change.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are no axes, two of them change the same number, or a Saltelli plan is crossed with others.
-    NlsError
-        If a name does not exist, or a value does not fit it.
-    """
+    """Points by number; the last set of axes changes first."""
 
     def __init__(self, axes: Sequence[AxisSet], subject: Subject) -> None:
         if not axes:
@@ -53,13 +38,7 @@ class PointPlan:
         return math.prod(each.count for each in self._sets)
 
     def point(self, number: int) -> tuple[Any, ...]:
-        """Return the values of a point, in the order of the columns.
-
-        Parameters
-        ----------
-        number
-            Of the point, from 0.
-        """
+        """Return the values of a point, in the order of the columns."""
         rows: list[tuple[Any, ...]] = []
         for each in reversed(self._sets):
             number, inner = divmod(number, each.count)

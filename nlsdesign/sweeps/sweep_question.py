@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from ..components.assembly.named_parts import Assembly
-from ..errors import ValueRangeError, WorkSharingError, brief
-from ..quantity import Quantity
+from ..foundation.errors import ValueRangeError, WorkSharingError, brief
+from ..foundation.quantity import Quantity
 from .axis_values import with_settings
 from .changes import ASK, changed_assembly
 from .sweep_columns import SweepColumn
@@ -131,10 +131,7 @@ class FunctionQuestion(SweepQuestion):
 def answer(name: str, unit: str, description: str) -> SweepColumn:
     """Return the column of an answer.
 
-    Parameters
-    ----------
-    name, unit, description
-        As for a column; the unit in SI.
+    ``name``, ``unit``, ``description``: as for a column; the unit in SI.
     """
     return SweepColumn(name, "" if unit == "1" else unit, description, "answer")
 
@@ -161,18 +158,7 @@ class PointWork:
     answers: tuple[str, ...]
 
     def __call__(self, values: tuple[Any, ...]) -> tuple[float, ...]:
-        """Return the answers of a point.
-
-        Parameters
-        ----------
-        values
-            In the order of the axes.
-
-        Raises
-        ------
-        NlsError
-            If there is no answer.
-        """
+        """Return the answers of a point."""
         question, assembly = self.at(values)
         given = question.ask(assembly)
         if not isinstance(given, Mapping) or set(given) != set(self.answers):
@@ -184,18 +170,7 @@ class PointWork:
         return tuple(_number(name, given[name]) for name in self.answers)
 
     def at(self, values: tuple[Any, ...]) -> tuple[SweepQuestion, Assembly]:
-        """Return the question of a point, and the assembly of which it is asked.
-
-        Parameters
-        ----------
-        values
-            In the order of the axes.
-
-        Raises
-        ------
-        NlsError
-            If a number or a word does not fit.
-        """
+        """Return the question of a point, and the assembly of which it is asked."""
         named = {name: value for (name, _), value in zip(self.axes, values, strict=True)}
         asked = {name: value for name, value in named.items() if name.startswith(f"{ASK}.")}
         question = with_settings(self.question, asked, dict(self.axes)) if asked else self.question
@@ -210,15 +185,7 @@ def _number(name: str, value: object) -> float:
 
 
 def worst(values: Any, *, of: Callable[[Any], Any]) -> float:
-    """Return the least or largest of numbers, not a number where one of them is none.
-
-    Parameters
-    ----------
-    values
-        Numbers.
-    of
-        ``min`` or ``max``.
-    """
+    """Return the least or largest of numbers, not a number where one of them is none."""
     numbers = [float(each) for each in values]
     return math.nan if not numbers or any(math.isnan(each) for each in numbers) else float(of(numbers))
 
@@ -255,16 +222,6 @@ def source_of(function: Callable[..., Any]) -> str:
     """Return name and source of a function with what it holds, so that a change of it is noticed.
 
     The whole file counts in which it stands, since functions call their neighbours.
-
-    Parameters
-    ----------
-    function
-        A function, a ``functools.partial`` of one, or an object that can be called.
-
-    Raises
-    ------
-    WorkSharingError
-        If what it holds cannot be pickled.
     """
     if isinstance(function, functools.partial):
         given = f"{_described(function.args)}, {_described(function.keywords)}"

@@ -13,15 +13,19 @@ from numpy.typing import NDArray
 
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
-from ..deck import read_deck
-from ..errors import DeckError, MeasurementError, unknown_name
-from ..reading import is_there, text_of
-from .arrow_columns import give_back, libraries, numpy_column, read_columns
+from ..foundation.arrays import Mask
+from ..foundation.deck import read_deck
+from ..foundation.errors import DeckError, MeasurementError, unknown_name
+from ..foundation.text_files import is_there, text_of
 from .changes import changed_assembly
-from .sweep_columns import DONE, RESULTS_FILE, STATE_COLUMNS, SweepColumn
+from .sweep_columns import DONE, RESULTS_FILE, SweepColumn, give_back, libraries, numpy_column, read_columns
 from .sweep_parts import rows_in_order
 
-__all__ = ["STATE_COLUMNS", "SweepColumn", "SweepTable", "about_text", "read_about", "read_sweep"]
+__all__ = [
+    "SweepColumn",
+    "SweepTable",
+    "read_sweep",
+]
 
 FORMAT: Final = "nlsdesign sweep 1"
 ABOUT_FILE: Final = "sweep.json"
@@ -73,9 +77,9 @@ class SweepTable:
         return tuple(column for column in self.columns if column.role == "answer")
 
     @property
-    def done(self) -> NDArray[np.bool_]:
+    def done(self) -> Mask:
         """Which points have answers."""
-        result: NDArray[np.bool_] = self.values["status"] == DONE
+        result: Mask = self.values["status"] == DONE
         return result
 
     def column(self, name: str) -> SweepColumn:
@@ -142,32 +146,13 @@ class SweepTable:
 
 
 def about_text(about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> str:
-    """Return what stands in ``sweep.json``.
-
-    Parameters
-    ----------
-    about
-        What was asked.
-    columns
-        Of the table.
-    """
+    """Return what stands in ``sweep.json``."""
     content = {"format": FORMAT, **about, "columns": [asdict(column) for column in columns]}
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
 def read_about(folder: Path) -> tuple[dict[str, Any], tuple[SweepColumn, ...]]:
-    """Return what ``sweep.json`` says, and the columns.
-
-    Parameters
-    ----------
-    folder
-        Of a sweep.
-
-    Raises
-    ------
-    MeasurementError
-        If there is no such file, or it is of another format.
-    """
+    """Return what ``sweep.json`` says, and the columns."""
     path = folder / ABOUT_FILE
     if not is_there(path):
         raise MeasurementError(str(path), "no such file",

@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import nlsdesign as nls
-from nlsdesign.analysis.rest import rest_states
 from nlsdesign.components import Driven, Encoder, flat_relaxation
+from nlsdesign.feedback.analysis.rest import rest_states
+from nlsdesign.feedback.observer import CascadeGain, ObserverDesign
+from nlsdesign.foundation.arrays import Array
 from nlsdesign.model import Variable
 from nlsdesign.model.transform import with_signal
-from nlsdesign.observer import CascadeGain, ObserverDesign
 from nlsdesign.simulation.sampled_batch import run_batch
 
 from .candidates import BRANCHES, without_loss
-
-Array = NDArray[np.float64]
 
 SAMPLE = 1e-3
 """Sample time in s of the published bench."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import nlsdesign as nls
 from nlsdesign.components import KnownLoss, Material, flat_relaxation, loss_of, materials, relaxing_law_of
 from nlsdesign.design import AreaRange, CamDesign, DesignSettings, Target
-from nlsdesign.errors import ArrangementError
+from nlsdesign.foundation.errors import ArrangementError
 
 from .._designed import with_machined_contour
 from .._published import declared_actuator

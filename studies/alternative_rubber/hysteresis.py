@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nlsdesign.components import Material
+from nlsdesign.foundation.arrays import Array
 
 from .bench import Bench, Measured, Rubber, Run
 from .candidates import TARGET, designed, with_loss
 from .merits import AT, GAIN_MARGIN, HELD, HIGH, largest_gains
-
-Array = NDArray[np.float64]
 
 LOSSES = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3)
 """Loss tangents of the rubber."""

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 import nlsdesign as nls
 from nlsdesign.design import CamDesign
-from nlsdesign.errors import ConvergenceError, NlsError
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.errors import ConvergenceError, NlsError
 
 from .bench import Bench, Rubber, Run
 from .candidates import Candidate, designed
-
-Array = NDArray[np.float64]
 
 LOW, HIGH = 0.3, 2.8
 """Amplitudes of the torque in N·m: a tenth of, and all of, that of the published measurements."""
@@ -143,11 +141,6 @@ def largest_gains(bench: Bench, rubbers: Sequence[Rubber]) -> Array:
     """Return the gain at which the loop begins to limit-cycle while it holds a torque, for each rubber.
 
     Within 1 %, by three searches that are each eight times as fine.
-
-    Raises
-    ------
-    ConvergenceError
-        If a loop limit-cycles at every gain that is tried, or at none.
     """
     count = len(rubbers)
     low, high = np.full(count, 4.0), np.full(count, 400.0)
@@ -173,15 +166,8 @@ def largest_gains(bench: Bench, rubbers: Sequence[Rubber]) -> Array:
 def measured(bench: Bench, rubbers: Sequence[Rubber], gains: Array) -> dict[str, Array]:
     """Return the figures of merit of a loop with each rubber; not a number where the loop limit-cycles.
 
-    Parameters
-    ----------
-    bench
-        Of the design.
-    rubbers
-        In the plant.
-    gains
-        Of the loop with each loss, at the declared modulus, shape (n,). The modulus of a spring that was
-        weighed is known, so the gain is lowered by as much as it is stiffer.
+    ``gains``: of the loop with each loss, at the declared modulus, shape (n,). The modulus of a spring that
+    was weighed is known, so the gain is lowered by as much as it is stiffer.
     """
     asked = [(torque, 0.0, 0.0) for torque in HELD] + [(LOW, f, 0.0) for f in SWEPT]
     asked += [(HIGH, f, 0.0) for f in (AT, *SWEPT)] + [(0.0, MOVED_AT, MOVED)]
@@ -209,12 +195,7 @@ def measured(bench: Bench, rubbers: Sequence[Rubber], gains: Array) -> dict[str,
 def bandwidths(frequencies: Sequence[float], sizes: Array) -> Array:
     """Return the frequencies in Hz at which the response has fallen by 3 dB; not a number if nowhere.
 
-    Parameters
-    ----------
-    frequencies
-        In Hz, shape (m,).
-    sizes
-        Torque over what was wanted, shape (n, m).
+    ``sizes``: torque over what was wanted, shape (n, m).
     """
     return np.array([_fall(np.array(frequencies), row) for row in sizes])
 

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from nlsdesign.foundation.arrays import Array
 
 from .merits import METRICS, MORE_IS_BETTER, Merits
-
-Array = NDArray[np.float64]
 
 DRAWS = 4000
 PUBLISHED = "PMC-770"

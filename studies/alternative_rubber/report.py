@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.report import Chapter, FigureSection, Section, TableSection, TextSection
+from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, TextSection
 
 from .hysteresis import ALLOWED, WRONG, Hysteresis
 from .merits import AT, GAIN_MARGIN, HELD, HIGH, METRICS, Merits

@@ -27,15 +27,7 @@ CHAPTERS = {
 
 
 def main(out: Path, fast: bool = False) -> Results:
-    """Check every statement, print the table of verdicts and write page, data and text.
-
-    Parameters
-    ----------
-    out
-        Folder for everything.
-    fast
-        Without effect: the whole audit takes some seconds.
-    """
+    """Check every statement, print the table of verdicts and write page, data and text."""
     steps, chapters = nls.progress.Steps(), {}
     for title, findings in CHAPTERS.items():
         with steps.step(title.lower()):

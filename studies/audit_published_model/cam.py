@@ -7,10 +7,20 @@ import sympy as sp
 from scipy.optimize import least_squares
 
 import nlsdesign as nls
+from nlsdesign.foundation.arrays import Array
 
-from .._published import Array, figure_points
+from .._published import figure_points
 from . import paper as p
-from .finding import AGAINST_FIGURES, FAILS, HOLDS, NOTES, PAPER, Finding, equal, step
+from .finding import (
+    AGAINST_FIGURES,
+    FAILS,
+    HOLDS,
+    NOTES,
+    PAPER,
+    Finding,
+    equal,
+    step,
+)
 
 _TORQUE, _TORQUE_SLOPE, _SLOPE = sp.symbols("τ dτ/dθ K_t", real=True)
 

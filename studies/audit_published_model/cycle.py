@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._published import Array
+from nlsdesign.foundation.arrays import Array
+
 from . import paper as p
 
 SAMPLES = 4096

@@ -7,7 +7,8 @@ import math
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from .._published import Array
+from nlsdesign.foundation.arrays import Array
+
 from . import paper as p
 from .finding import FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
 
@@ -16,15 +17,7 @@ PRINTED_INERTIA, NOTED_INERTIA = 8.83e-5, 5.97e-4  # kg·m²
 
 
 def rise_time(inertia: float, load: str) -> float:
-    """Return the time in s from rest to 53° at full current.
-
-    Parameters
-    ----------
-    inertia
-        In kg·m².
-    load
-        Resisting torque: ``"none"``, ``"target"`` (the curve of 2014) or ``"line"`` (a linear spring).
-    """
+    """Return the time in s from rest to 53° at full current."""
     torque = p.GEARED_CONSTANT * p.CURRENT_LIMIT
 
     def against(angle: float) -> float:

@@ -7,10 +7,21 @@ import sympy as sp
 from matplotlib.figure import Figure
 
 import nlsdesign as nls
+from nlsdesign.foundation.arrays import Array
 
-from .._published import FIG6_SAMPLE, Array, element_loop, figure_points
+from .._published import FIG6_SAMPLE, element_loop, figure_points
 from . import paper as p
-from .finding import AGAINST_FIGURES, FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
+from .finding import (
+    AGAINST_FIGURES,
+    FAILS,
+    HOLDS,
+    NOTES,
+    OPEN,
+    PAPER,
+    Finding,
+    equal,
+    step,
+)
 
 
 def stretch_period(degrees: int) -> float:

@@ -9,7 +9,13 @@ import sympy as sp
 from matplotlib.figure import Figure
 
 import nlsdesign as nls
-from nlsdesign.report import OUTCOMES, CalculationSection, CalculationStep, FigureSection, Section
+from nlsdesign.presentation.report import (
+    OUTCOMES,
+    CalculationSection,
+    CalculationStep,
+    FigureSection,
+    Section,
+)
 
 HOLDS, FAILS = "holds", "does not hold"
 OPEN, AGAINST_FIGURES = "cannot be decided", "contradicts the figures"

@@ -7,7 +7,7 @@ import sympy as sp
 from matplotlib.figure import Figure
 
 import nlsdesign as nls
-from nlsdesign.report import Section, TableSection
+from nlsdesign.presentation.report import Section, TableSection
 
 from .._published import element_loop
 from . import paper as p

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import sympy as sp
 
-from .._published import Array
+from nlsdesign.foundation.arrays import Array
+
 from . import paper as p
 from .cycle import CAMS, cycle, extension_of
 from .finding import FAILS, HOLDS, NOTES, Finding, equal, step

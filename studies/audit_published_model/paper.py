@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from .._published import Array
+from nlsdesign.foundation.arrays import Array
 
 AREA, REST_LENGTH = 1e-4, 0.0125  # m², m
 STIFFNESS_PER_MODULUS = AREA / REST_LENGTH  # a, m

@@ -8,11 +8,22 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq, nnls
 
 import nlsdesign as nls
+from nlsdesign.foundation.arrays import Array
 
-from .._published import Array, element_loop, figure_points
+from .._published import element_loop, figure_points
 from . import paper as p
 from .cycle import CAMS, Cam, cycle, fig8_energy, loss
-from .finding import AGAINST_FIGURES, FAILS, HOLDS, NOTES, OPEN, PAPER, Finding, equal, step
+from .finding import (
+    AGAINST_FIGURES,
+    FAILS,
+    HOLDS,
+    NOTES,
+    OPEN,
+    PAPER,
+    Finding,
+    equal,
+    step,
+)
 
 STATED_LOSS = {0.1: 0.04, 1.0: 0.4, 4.0: 1.5, 9.0: 3.3}  # Hz: per cent, 45°
 

@@ -7,8 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.report import Chapter, FileSection, KeyNumber, NumbersSection, Section, TableSection
-from nlsdesign.writing import write_text
+from nlsdesign.foundation.text_files import write_text
+from nlsdesign.presentation.report import (
+    Chapter,
+    FileSection,
+    KeyNumber,
+    NumbersSection,
+    Section,
+    TableSection,
+)
 
 from .finding import Finding, Results
 from .law import unit_table

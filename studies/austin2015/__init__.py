@@ -26,15 +26,7 @@ from .tracking import follow_sines
 
 
 def main(out: Path, fast: bool = False) -> Results:
-    """Run every step of the workbench and write ``report.html``, with all files beside it.
-
-    Parameters
-    ----------
-    out
-        Folder for everything.
-    fast
-        Shorter runs, fewer angles and made springs, for a first look.
-    """
+    """Run every step of the workbench and write ``report.html``, with all files beside it."""
     steps = nls.progress.Steps()
     with steps.step("deck and assembly"):
         actuator = declared_actuator()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.discrepancy import Verdict
-from nlsdesign.progress import Progress
+from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.foundation.progress import Progress
 
 from .._published import bench_records, with_bench_sensors
 

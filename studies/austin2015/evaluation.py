@@ -8,7 +8,8 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import (
+from nlsdesign.export import natively
+from nlsdesign.feedback.control import (
     LimitCycleOnset,
     LoopMargins,
     SineResponse,
@@ -19,9 +20,8 @@ from nlsdesign.control import (
     output_impedance,
     sine_response,
 )
-from nlsdesign.control.evaluation.impedance import OutputImpedance
-from nlsdesign.export import natively
-from nlsdesign.observer import ObserverDesign
+from nlsdesign.feedback.control.evaluation.margins import OutputImpedance
+from nlsdesign.feedback.observer import ObserverDesign
 
 AMPLITUDES = (0.8, 2.8)  # N·m; the small and the large sine of Fig. 10 of the paper
 GAIN = "controller.proportional"

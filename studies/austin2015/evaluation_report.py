@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.figures.loop_evaluation import passivity_words
-from nlsdesign.report import Chapter, FigureSection, Section, TableSection
+from nlsdesign.presentation.figures.loop_evaluation import passivity_words
+from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
 
 from .evaluation import AMPLITUDES, KP
 from .results import ActuatorResults, Results

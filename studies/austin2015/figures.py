@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
+from nlsdesign.bench.identification import Agreement, agreement
 from nlsdesign.components import TRANSLATION, Driven
-from nlsdesign.identification import Agreement, agreement
+from nlsdesign.foundation.arrays import Array
 
-from .._published import Array, element_loop, figure_points
+from .._published import element_loop, figure_points
 
 FIG1_FREQUENCY = 1.0  # Hz; assumed, the paper does not print it
 FIG6_FREQUENCY = 10.8  # Hz; from its time axis, the caption says 4 Hz

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.identification import rmse
-from nlsdesign.observer import choose_observer
+from nlsdesign.bench.identification import rmse
+from nlsdesign.feedback.observer import choose_observer
 
 from .torque_loop import FROM_ENCODER, TorqueLoop, export_and_cosimulate
 
@@ -107,19 +107,7 @@ def code_of_three_decks(
     out: Path,
     stop: float,
 ) -> GeneratedCode:
-    """Export the diagnosed actuator, and run it under the code of each deck.
-
-    Parameters
-    ----------
-    better
-        As the diagnosis left it.
-    others
-        Plants and observers of the other decks, by name.
-    out
-        Folder for code and FMUs of the diagnosed actuator.
-    stop
-        End of the co-simulation in s.
-    """
+    """Export the diagnosed actuator, and run it under the code of each deck."""
     model = nls.flatten(better, outputs=["motor.angle", "motor_encoder.reading", "spring.torque"])
     # Records know its numbers far better than the spreads in the deck say: the cascade takes them as exact.
     cascade = nls.observer.design_observer_with_details(model).model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import nlsdesign as nls
-from nlsdesign.report import Chapter, FigureSection, Section, TableSection
+from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
 
 from .generated import AMPLITUDE, CYCLES, FREQUENCY, GeneratedCode
 

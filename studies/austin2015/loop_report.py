@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.report import Chapter, FigureSection, Section, TableSection
+from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
 
 from .results import ActuatorResults, Results
 from .tracking import AMPLITUDE, PROPORTIONAL, SETTLED

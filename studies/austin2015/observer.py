@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.analysis import Chart
-from nlsdesign.identification import rmse
-from nlsdesign.observer import ObserverDesign
+from nlsdesign.bench.identification import rmse
+from nlsdesign.feedback.analysis import Chart
+from nlsdesign.feedback.observer import ObserverDesign
 
 SETTLED = 1.0  # s; from here on errors count
 STIFFER, WIDER = 1.10, 1.05  # of the rubber's moduli and section: one declared spread each

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.quantity import three_digits
-from nlsdesign.report import Chapter, FigureSection, Section, TableSection, TextSection
+from nlsdesign.foundation.quantity import three_digits
+from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, TextSection
 
 from .observer import STIFFER, WIDER
 from .results import ActuatorResults, Results
@@ -135,9 +135,9 @@ def _spread_sections(name: str, results: ActuatorResults) -> list[Section]:
 def _bounds(results: Results) -> TableSection:
     rows = []
     for name, each in results.both.items():
-        bound = each.spread.certificate.torque
+        bound = each.spread.certificate.proof.torque
         proved = "none" if isinstance(bound, str) else f"{1e3 * bound.total:.1f}"
-        decay, condition = each.spread.certificate.decay, each.spread.certificate.condition
+        decay, condition = each.spread.certificate.proof.decay, each.spread.certificate.proof.condition
         rows.append((name, f"{decay:.1f}", three_digits(condition), proved))
     return TableSection(
         "What is proved of one constant gain",

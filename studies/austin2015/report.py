@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.report import (
+from nlsdesign.presentation.report import (
     CamSection,
     Chapter,
     EquationsSection,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.analysis import Chart
-from nlsdesign.discrepancy import Verdict
+from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.feedback.analysis import Chart
 
 from .._designed import MadeCam
 from .evaluation import LoopEvaluation
@@ -115,8 +115,8 @@ class Results:
                 f"{name}_nominal_error_published_form_mNm_rms": 1e3 * each.observers.published_error,
                 f"{name}_expected_over_spread_cascade_mNm_rms": 1e3 * each.spread.chosen.expected[0],
                 f"{name}_expected_over_spread_best_mNm_rms": 1e3 * min(each.spread.chosen.expected),
-                f"{name}_certified_decay_per_s": each.spread.certificate.decay,
-                f"{name}_certified_condition": each.spread.certificate.condition,
+                f"{name}_certified_decay_per_s": each.spread.certificate.proof.decay,
+                f"{name}_certified_condition": each.spread.certificate.proof.condition,
                 f"{name}_onset_of_limit_cycling_Kp": each.evaluation.onset.value,
                 f"{name}_error_with_stiffer_rubber_mNm_rms": 1e3 * each.observers.stiffer_error,
             }

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.analysis import RankDrops, rank_drops
 from nlsdesign.export import CSource, natively
-from nlsdesign.observer import (
+from nlsdesign.feedback.analysis import RankDrops, rank_drops
+from nlsdesign.feedback.observer import (
     Certificate,
     CertifiedGain,
+    Contraction,
     ObserverOfChoice,
     SpreadErrors,
     certify,
@@ -20,9 +21,8 @@ from nlsdesign.observer import (
     declared_assumptions,
     observer_bench,
     observer_errors,
-    write_certificate,
 )
-from nlsdesign.observer.certificates.certificate import hashes_of_code
+from nlsdesign.feedback.observer.certificates.certificate import hashes_of_code
 
 from .observer import ObserverComparison
 
@@ -48,7 +48,7 @@ class ObserverOverSpread:
     chosen: ObserverOfChoice
     errors: SpreadErrors
     drops: RankDrops
-    certificate: Certificate
+    certificate: Certificate[Contraction]
     code: CSource
     file: Path
 
@@ -75,9 +75,6 @@ def over_spread(
     design = nls.observer.design_observer_with_details(model, gain=CertifiedGain())
     text = deck.read_text(encoding="utf-8")
     proved = certify(model, design, assumptions=declared_assumptions(model, design), deck=(deck.stem, text))
-    words = f"{design.model.description}; certified, see certificate.json: {' '.join(proved.statement)}"
-    code = nls.export_c(replace(design.model, description=words), out / "certified", name="observer")
-    hashes = hashes_of_code(out / "certified")
-    named = {path.name: hashes[path.name] for path in (code.header, code.source)}
-    file = write_certificate(replace(proved, code=named), out / "certified" / "certificate.json")
+    code = nls.export_c(proved.stated(design.model), out / "certified", name="observer")
+    file = proved.write_beside(code.header, code.source)
     return ObserverOverSpread(chosen, errors, drops, proved, code, file)

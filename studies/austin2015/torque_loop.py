@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import joined
 from nlsdesign.export import CSource, Wire
-
-from .._published import Array
+from nlsdesign.feedback.control import joined
+from nlsdesign.foundation.arrays import Array
 
 READING = "plant.motor_encoder.reading"
 FROM_ENCODER = {"observer.motor.angle": READING, "controller.motor.angle": READING}

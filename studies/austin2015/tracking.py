@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import LoopVerdict, TorqueGains, sine_response
+from nlsdesign.bench.identification import rmse
 from nlsdesign.export import natively
-from nlsdesign.identification import rmse
-from nlsdesign.observer import ObserverDesign
+from nlsdesign.feedback.control import LoopVerdict, TorqueGains, sine_response
+from nlsdesign.feedback.observer import ObserverDesign
 
 from .torque_loop import FROM_ENCODER
 

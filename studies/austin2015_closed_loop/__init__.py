@@ -17,7 +17,12 @@ from .._published import figure_points
 from . import statements as stated
 from .benches import DECKS, NONLINEAR, SOFT, STIFF
 from .felt_torque import FeltTorque, felt_torque
-from .followed_torque import GENTLE, LATE_TORQUE, FollowedTorque, followed_torque
+from .followed_torque import (
+    GENTLE,
+    LATE_TORQUE,
+    FollowedTorque,
+    followed_torque,
+)
 from .report import write_page
 from .scheduled_law import ScheduledLaw, scheduled_law
 from .statement import Statement
@@ -74,17 +79,7 @@ class Results:
 
 
 def main(out: Path, fast: bool = False, draws: int = DRAWS) -> Results:
-    """Simulate all figures, decide all statements, and write ``report.html`` with its figures.
-
-    Parameters
-    ----------
-    out
-        Folder for everything.
-    fast
-        Fewer frequencies, causes and draws.
-    draws
-        Of the spread of the deck, for the scheduled law.
-    """
+    """Simulate all figures, decide all statements, and write ``report.html`` with its figures."""
     points = figure_points("fig08_torque_profile_nls")
     error = stated.static_torque(NONLINEAR, points[:, 0]) - points[:, 1]
     fig8 = float(np.sqrt(np.mean(error**2)))

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 import nlsdesign as nls
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import (
+from nlsdesign.export import natively
+from nlsdesign.feedback.control import (
     ClosedLoop,
     SineResponse,
     TorqueGains,
@@ -22,12 +20,10 @@ from nlsdesign.control import (
     torque_controller,
     zero_torque,
 )
-from nlsdesign.export import natively
-from nlsdesign.observer import CascadeGain, GridByTolerance
+from nlsdesign.feedback.observer import CascadeGain, GridByTolerance
+from nlsdesign.foundation.arrays import Array
 
 from .late_torque import late_torque
-
-Array = NDArray[np.float64]
 
 NONLINEAR, SOFT, STIFF = "nonlinear", "soft", "stiff"
 DECKS = {

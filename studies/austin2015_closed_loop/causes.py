@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import nlsdesign as nls
 from nlsdesign.components import Backlash, Rounded, Tie
-from nlsdesign.control import LoopJudge, TorqueGains, with_fine_counts
+from nlsdesign.feedback.control import LoopJudge, TorqueGains, with_fine_counts
 
 from .benches import NONLINEAR, Bench, Cause, angle_of, linear_spring
 

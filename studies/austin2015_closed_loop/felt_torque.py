@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import TorqueGains, ZeroTorque
+from nlsdesign.feedback.control import TorqueGains, ZeroTorque
+from nlsdesign.foundation.arrays import Array
 
 from .._published import figure_points
-from .benches import DECKS, FILES, NONLINEAR, POWER_LAW, SOFT, STIFF, Array, Bench
+from .benches import DECKS, FILES, NONLINEAR, POWER_LAW, SOFT, STIFF, Bench
 from .causes import ADDED, LATE
 
 FIRST = 0.45  # Hz; below it the published torques are those of a few counts

@@ -7,28 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsdesign.control import SineResponse, TorqueGains
+from nlsdesign.feedback.control import SineResponse, TorqueGains
+from nlsdesign.foundation.arrays import Array
 
 from .._published import figure_points
-from .benches import DECKS, FILES, HIGH, LOW, Array, Bench
+from .benches import DECKS, FILES, HIGH, LOW, Bench
 
 AMPLITUDES = {"low": LOW, "high": HIGH}
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Gains that are tried on all springs at both amplitudes; the paper prints none.
-
-    Parameters
-    ----------
-    name
-        In words.
-    gains
-        Of the PID.
-    late
-        Samples of 1 ms by which the controller gets the torque late. The response is then that of the late
-        torque, which such a machine would record.
-    """
+    """Gains that are tried on all springs at both amplitudes; the paper prints none."""
 
     name: str
     gains: TorqueGains

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.figures import Figure, PointPanel
-from nlsdesign.report import Chapter, FigureSection, Section, TableSection, write_report
+from nlsdesign.presentation.figures import Figure, PointPanel
+from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, write_report
 
 from .._published import figure_points
 from .benches import DECKS, FILES, NONLINEAR, SOFT

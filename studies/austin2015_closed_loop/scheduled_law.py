@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsdesign.control import LoopSpread, LoopVerdict, ScheduledTorque, loop_over_spread, tracking
 from nlsdesign.export import natively
+from nlsdesign.feedback.control import LoopSpread, LoopVerdict, ScheduledTorque, loop_over_spread, tracking
 from nlsdesign.simulation import Sine
 
 from .benches import HIGH, NONLINEAR, Bench

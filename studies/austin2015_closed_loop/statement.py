@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nlsdesign.control import SineResponse
+from nlsdesign.feedback.control import SineResponse
 
 REPRODUCED, NOT_REPRODUCED = "reproduced", "not reproduced"
 OTHERWISE = "explained otherwise"

@@ -7,14 +7,34 @@ import math
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import SineResponse, TorqueGains, loop_margins
+from nlsdesign.feedback.control import SineResponse, TorqueGains, loop_margins
 from nlsdesign.model.linear import rest_state
 
 from . import causes
-from .benches import AS_IT_IS, DECKS, HIGH, LOW, NONLINEAR, SOFT, STIFF, Bench, Cause, angle_of
+from .benches import (
+    AS_IT_IS,
+    DECKS,
+    HIGH,
+    LOW,
+    NONLINEAR,
+    SOFT,
+    STIFF,
+    Bench,
+    Cause,
+    angle_of,
+)
 from .felt_torque import FeltTorque, held_motor
 from .followed_torque import GENTLE, FollowedTorque
-from .statement import NOT_REPRODUCED, OTHERWISE, REPRODUCED, LoopRun, Statement, in_words, lost_at, settles
+from .statement import (
+    NOT_REPRODUCED,
+    OTHERWISE,
+    REPRODUCED,
+    LoopRun,
+    Statement,
+    in_words,
+    lost_at,
+    settles,
+)
 
 OVERSHOOT = np.array([2.0, 3.0, 4.0, 5.0])  # Hz
 STRONG = TorqueGains(proportional=32.0, integral=800.0)

@@ -15,22 +15,29 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import loss_of, material
-from nlsdesign.control import LoopChoice, best_choices
 from nlsdesign.design import CamDesign
-from nlsdesign.errors import NlsError
-from nlsdesign.quantity import three_digits
-from nlsdesign.report import FigureSection, TableSection
+from nlsdesign.feedback.control import LoopChoice, best_choices
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.errors import NlsError
+from nlsdesign.foundation.quantity import three_digits
+from nlsdesign.presentation.report import FigureSection, TableSection
 
 from ..alternative_rubber.bench import Bench, Rubber
 from ..alternative_rubber.candidates import designed
 from ..alternative_rubber.merits import HIGH, MOVED_AT, largest_gains, measured
-from .under_margins import DECKS, DRAWS, LIMITS, Line, front_of, lines_of, published, stiffness_felt
-
-Array = NDArray[np.float64]
+from .under_margins import (
+    DECKS,
+    DRAWS,
+    LIMITS,
+    Line,
+    front_of,
+    lines_of,
+    published,
+    stiffness_felt,
+)
 
 RUBBER = "PMC-770"
 ANGLES, SHAPES = (40.0, 53.0, 65.0), (0.2, 1.0, 2.5)

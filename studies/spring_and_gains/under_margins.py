@@ -11,12 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 import nlsdesign as nls
-from nlsdesign.analysis.rest import rest_states
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import (
+from nlsdesign.feedback.analysis.rest import rest_states
+from nlsdesign.feedback.control import (
     ClosedLoop,
     LoopChoice,
     LoopLimits,
@@ -30,12 +29,11 @@ from nlsdesign.control import (
     largest_gain,
     saturation_line,
 )
-from nlsdesign.errors import InfeasibleError, ValueRangeError
-from nlsdesign.observer import CascadeGain
+from nlsdesign.feedback.observer import CascadeGain
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.errors import InfeasibleError, ValueRangeError
 
 from ..alternative_rubber.merits import HELD, MOVED_AT
-
-Array = NDArray[np.float64]
 
 DECKS = {
     "nonlinear": "austin2015_figure_consistent",
@@ -200,13 +198,7 @@ def loops_of(actuator: nls.Assembly) -> Callable[[Law], ClosedLoop]:
 
 
 def angles_of(actuator: nls.Assembly) -> Array:
-    """Return the angles in rad at which the spring holds the torques of :data:`HELD`, shape (3,).
-
-    Raises
-    ------
-    ValueRangeError
-        If it does not reach the largest.
-    """
+    """Return the angles in rad at which the spring holds the torques of :data:`HELD`, shape (3,)."""
     model = nls.flatten(actuator, outputs=["motor.angle", "spring.torque"])
     ends = [model.values[cam.last_angle] for s in model.springs for cam in s.cams if cam.last_angle]
     swept = np.linspace(0.0, min(ends, default=nls.degrees(120.0)), _SWEPT)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from nlsdesign.errors import NlsError, visible
+from nlsdesign.foundation.errors import NlsError, visible
 
 REFUSED, ACCEPTED = "refused", "accepted"
 WRONG = ("traceback", "read back differently", "unreadable message", "too long", "crashed", "left over")

@@ -13,7 +13,7 @@ from pathlib import Path
 import click
 
 from nlsdesign.cli.main import main, program
-from nlsdesign.written_files import LIST_NAME
+from nlsdesign.foundation.text_files import LIST_NAME
 
 from .cases import ACCEPTED, REFUSED, Case, Outcome, signature
 from .records import _JOB, _MAPPING, _TARGET, Records

@@ -8,13 +8,20 @@ from pathlib import Path
 
 from nlsdesign.components.assembly.deck_reader import component_classes
 from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
-from nlsdesign.deck import load_deck, read_deck
-from nlsdesign.errors import NlsError
-from nlsdesign.locations import folder
+from nlsdesign.foundation.deck import load_deck, read_deck
+from nlsdesign.foundation.errors import NlsError
+from nlsdesign.foundation.locations import folder
 from nlsdesign.model import flatten
 
 from .cases import ACCEPTED, Case, Outcome
-from .mutators import EVIL_NUMBERS, EVIL_TEXTS, EVIL_UNITS, damaged_bytes, damaged_lines, damaged_tokens
+from .mutators import (
+    EVIL_NUMBERS,
+    EVIL_TEXTS,
+    EVIL_UNITS,
+    damaged_bytes,
+    damaged_lines,
+    damaged_tokens,
+)
 
 _VALUE = re.compile(r"value = (\[[^\]]*\]|[^,}\n]+)")
 _UNIT = re.compile(r'unit = "[^"]*"')

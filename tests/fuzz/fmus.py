@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
 from nlsdesign.export import Stepping, cosimulate, export_fmu
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 
 from ..child_processes import children

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from nlsdesign.export import export_fmu
-from nlsdesign.written_files import LIST_NAME
+from nlsdesign.foundation.text_files import LIST_NAME
 
 from ..hand_built import controller
 from .cases import ACCEPTED, REFUSED, Case, Outcome

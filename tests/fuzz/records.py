@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from nlsdesign.calibration import read_joint_numbers
+from nlsdesign.bench.calibration import read_joint_numbers
+from nlsdesign.bench.identification import load_records
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.materials.library import materials
-from nlsdesign.deck import load_deck
 from nlsdesign.design import read_job, read_task
 from nlsdesign.design.curves.target_files import read_band, read_target
-from nlsdesign.identification import load_records
-from nlsdesign.locations import bundled
-from nlsdesign.locations import folder as distributed
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.locations import bundled
+from nlsdesign.foundation.locations import folder as distributed
 from nlsdesign.model import flatten
 
 from .cases import ACCEPTED, Case, Outcome

@@ -11,14 +11,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.deck import ParentDeck
-from nlsdesign.export.c.c_text import real_type
+from nlsdesign.export.c.c_text import Real
 from nlsdesign.export.c.controller_code import header_text, source_text
+from nlsdesign.export.c.writer import CWriter
 from nlsdesign.export.fmi.fmu import fmu_texts
+from nlsdesign.foundation.deck import ParentDeck
+from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import Plausibility
 from nlsdesign.model.flat import FlatModel, Table, Variable
 from nlsdesign.model.origin import Origin
-from nlsdesign.quantity import quantity
 from tests.hand_built import plant
 
 STORED = Path(__file__).with_name("export")
@@ -69,9 +70,9 @@ def damper() -> FlatModel:
 @cache
 def texts() -> dict[str, str]:
     found = {
-        "scheduled_damper.h": header_text(damper(), "scheduled_damper", real_type("double")),
-        "scheduled_damper.c": source_text(damper(), "scheduled_damper", real_type("double")),
-        "scheduled_damper_float.c": source_text(damper(), "scheduled_damper", real_type("float")),
+        "scheduled_damper.h": header_text(CWriter(damper(), "scheduled_damper", Real.DOUBLE)),
+        "scheduled_damper.c": source_text(CWriter(damper(), "scheduled_damper", Real.DOUBLE)),
+        "scheduled_damper_float.c": source_text(CWriter(damper(), "scheduled_damper", Real.FLOAT)),
     }
     for model, word in ((damper(), "damper"), (plant(), "plant")):
         for version in ("2.0", "3.0"):

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from models import cam_rubber_actuator
+from nlsdesign.bench.discrepancy import diagnose
+from nlsdesign.bench.discrepancy.screening.causality import lagging_forces
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.residuals import loop_of
 from nlsdesign.components import TRANSLATION, Assembly, Driven, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy import diagnose
-from nlsdesign.discrepancy.screening.causality import lagging_forces
-from nlsdesign.identification import RecordSet, load_records
-from nlsdesign.identification.statistics.loop_work import loop_of
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 
 FIGURES = Path(__file__).parents[2] / "studies" / "austin2015_figures"

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import rest_state
 

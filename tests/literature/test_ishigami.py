@@ -12,9 +12,10 @@ import pytest
 pytest.importorskip("SALib")
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.sweeps import FunctionQuestion, PointPlan, SaltelliSample, Subject
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.sweeps import FunctionQuestion, SaltelliSample, Subject
 from nlsdesign.sweeps.sensitivity import AnswerSensitivity, sensitivity
+from nlsdesign.sweeps.sweep_plan import PointPlan
 
 PARTS = (0.5 * (1.0 + 0.1 * np.pi**4 / 5.0) ** 2, 7.0**2 / 8.0, 8.0 * 0.1**2 * np.pi**8 / 225.0)
 FIRST = {"x1": PARTS[0] / sum(PARTS), "x2": PARTS[1] / sum(PARTS), "x3": 0.0}

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.analysis import Observability, over_angle
+from nlsdesign.feedback.analysis import Observability, over_angle
 from nlsdesign.model.paper_form import paper_form
 from tests import observed as ob
 

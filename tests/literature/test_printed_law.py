@@ -15,7 +15,7 @@ import pytest
 from nlsdesign.components import TRANSLATION, Assembly, Driven, Specimen, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import rest_state
 from nlsdesign.simulation import Trace, simulate

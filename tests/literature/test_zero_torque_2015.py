@@ -17,11 +17,11 @@ import pytest
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import ClosedLoop, TorqueGains, encoder_loop, torque_controller, zero_torque
-from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
+from nlsdesign.feedback.control import ClosedLoop, TorqueGains, encoder_loop, torque_controller, zero_torque
+from nlsdesign.feedback.observer import CascadeGain, design_observer
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
-from nlsdesign.observer import CascadeGain, design_observer
 
 FREQUENCIES = [0.5, 1.0, 2.0]
 PUBLISHED = {

@@ -1,6 +1,7 @@
 """Mutation run: break the package one spot at a time, run the tests that reach the spot, list what they miss.
 
-    python -m tests.mutation nlsdesign/model nlsdesign/observer --count 100 --seed 1 --out out/mutation
+    python -m tests.mutation nlsdesign/model nlsdesign/feedback/observer --count 100 --seed 1 --out
+    out/mutation
 
 The first step runs the quick tests once with coverage, to know which tests reach which line; the second
 breaks one spot after the other in a copy of the project and runs those tests until one fails. What was tried

@@ -35,7 +35,6 @@ from nlsdesign.components import (
     Specimen,
     Spring,
     StrainStiffening,
-    Strength,
     StretchyCable,
     StribeckFriction,
     Strip,
@@ -48,6 +47,7 @@ from nlsdesign.components import (
     series,
     tie,
 )
+from nlsdesign.components.materials.specimen import Strength
 
 SPRING, STEEL, HOUSING = (
     Spring(stiffness=2500.0),

@@ -17,7 +17,7 @@ from nlsdesign.components import (
     ResistiveMotor,
     SpeedLoop,
 )
-from nlsdesign.quantity import Quantity
+from nlsdesign.foundation.quantity import Quantity
 
 _GAIN, _SPEED_GAIN = Quantity(8.5, "V/rad"), Quantity(0.6, "V*s/rad")
 _LIMIT = Quantity(7.4, "V")

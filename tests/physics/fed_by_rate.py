@@ -12,8 +12,8 @@ import casadi as ca
 
 from nlsdesign.components.core.element import TRANSLATION, Domain, Element, Scope
 from nlsdesign.components.core.part import parameter
-from nlsdesign.quantity import Quantity
-from nlsdesign.symbolic import Expression
+from nlsdesign.foundation.quantity import Quantity
+from nlsdesign.foundation.symbolic import Expression
 
 
 @dataclass(frozen=True, kw_only=True)

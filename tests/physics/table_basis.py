@@ -6,7 +6,7 @@ from nlsdesign import components as c
 from tests.physics.table import Row
 
 _RUBBER, _BACKLASH = "test_rubber_laws.py::test_", "test_backlash_and_friction.py::test_"
-_POWER, _SENSOR = "test_power_balance.py::test_", "../unit/test_sensors.py::test_"
+_POWER, _SENSOR = "test_power_balance.py::test_", "../unit/components/test_sensors.py::test_"
 
 ROWS: tuple[Row, ...] = (
     Row(

@@ -7,25 +7,29 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from nlsdesign.analysis.rest import rest_states
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.export import CompiledStep, export_c
+from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.transform import named
-from nlsdesign.observer import (
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.feedback.analysis.rest import rest_states
+from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
-    Duty,
-    SensedTorque,
     design_adaptive_observer,
     estimator_bound,
 )
-from nlsdesign.observer.adaptive.adaptive_step import _matrices, _Side
-from nlsdesign.observer.adaptive.directions import UncertainDirections, uncertain_directions
-from nlsdesign.observer.adaptive.filter_equations import pairs, within_a_count
-from nlsdesign.observer.scheduling.forms import minimal_form
+from nlsdesign.feedback.observer.adaptive.adaptive_step import _matrices, _Side
+from nlsdesign.feedback.observer.adaptive.duty_and_directions import (
+    Duty,
+    UncertainDirections,
+    uncertain_directions,
+)
+from nlsdesign.feedback.observer.adaptive.estimator_bound import SensedTorque
+from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, truncated_update
+from nlsdesign.feedback.observer.scheduling.angle_form import minimal_form
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model.transform import named
 from nlsdesign.simulation import simulate
 from nlsdesign.simulation.prior import declared_prior
 
@@ -108,13 +112,13 @@ def test_a_reading_cuts_the_prediction_at_the_edges_of_a_count(off: float, devia
     half = np.sqrt(3.0)
     edges = (off - half) / deviation, (off + half) / deviation
     mean, variance = truncnorm.stats(*edges, scale=deviation, moments="mv")
-    moved, kept = (float(ca.evalf(v)) for v in within_a_count(ca.SX(off), ca.SX(deviation**2)))
+    moved, kept = (float(ca.evalf(v)) for v in truncated_update(ca.SX(off), ca.SX(deviation**2)))
     assert moved == pytest.approx(float(mean), abs=1e-9)
     assert kept == pytest.approx(float(variance) / deviation**2, abs=1e-9)
 
 
 def test_a_wide_prediction_is_corrected_as_by_kalman() -> None:
-    moved, kept = (float(ca.evalf(v)) for v in within_a_count(ca.SX(-30.0), ca.SX(400.0)))
+    moved, kept = (float(ca.evalf(v)) for v in truncated_update(ca.SX(-30.0), ca.SX(400.0)))
     assert moved == pytest.approx(-30.0 * 400.0 / 401.0)
     assert kept == pytest.approx(1.0 / 401.0)
 

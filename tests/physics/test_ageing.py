@@ -32,7 +32,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.components.core.springs import LinearElastic
-from nlsdesign.errors import ArrangementError
+from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 

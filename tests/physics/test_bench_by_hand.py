@@ -19,7 +19,7 @@ from scipy.interpolate import BSpline
 
 from nlsdesign.components import Driven
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import jacobian_function, linearise, rest_state
 from nlsdesign.simulation import simulate

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.calibration import Estimate, estimate
-from nlsdesign.calibration.bench_response import bench_response
-from nlsdesign.calibration.bench_test import LoadCellTest
+from nlsdesign.bench.calibration import estimate
+from nlsdesign.bench.calibration.bench_response import bench_response
+from nlsdesign.bench.calibration.bench_test import LoadCellTest
+from nlsdesign.bench.calibration.estimate import Estimate
 from nlsdesign.model import flatten
 from tests.calibrated import deck, misses, read, recorded, truth
 from tests.renamed import exchanged, renamed

@@ -11,23 +11,23 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from nlsdesign.calibration import (
-    BoughtBy,
+from nlsdesign.bench.calibration import (
     CalibrationPlan,
     FreeRunTest,
     HungWeightTest,
     what_calibration_buys,
 )
+from nlsdesign.bench.calibration.plan import BoughtBy
 from nlsdesign.cli.calibrate import calibrate
-from nlsdesign.model import flatten
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     CascadeGain,
-    Duty,
     design_observer,
     least_torque_error,
     observer_bench,
     observer_errors,
 )
+from nlsdesign.feedback.observer.adaptive.duty_and_directions import Duty
+from nlsdesign.model import flatten
 from nlsdesign.simulation import Prior, declared_prior
 from tests.calibrated import LINEAR, deck
 from tests.renamed import SCHEMES, renamed

@@ -8,18 +8,12 @@ from scipy.integrate import solve_ivp
 
 from nlsdesign.components import Assembly, Element, LinearElastic, StrainStiffening
 from nlsdesign.components.core.element import Scope
-from nlsdesign.design import (
-    CamProfile,
-    PowerTorque,
-    cam_from_profile,
-    elastic_law,
-    energy_profile,
-    equilibrium_torque,
-    torque_check,
-)
-from nlsdesign.errors import InfeasibleError
+from nlsdesign.design import PowerTorque, cam_from_profile, elastic_law, equilibrium_torque
+from nlsdesign.design.optimisation.checks import torque_check
+from nlsdesign.design.statics.energy import CamProfile, energy_profile
+from nlsdesign.foundation.errors import InfeasibleError
+from nlsdesign.foundation.symbolic import Expression
 from nlsdesign.model import flatten
-from nlsdesign.symbolic import Expression
 from tests.cam_cases import CONCAVE, CONVEX, TARGET, actuator
 
 LAWS: dict[str, Element] = {

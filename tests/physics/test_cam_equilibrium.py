@@ -24,7 +24,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.design import elastic_law, equilibrium_torque
-from nlsdesign.errors import ArrangementError, UnknownNameError
+from nlsdesign.foundation.errors import ArrangementError, UnknownNameError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import simulate
 from tests.cam_cases import CONCAVE, CONVEX, actuator

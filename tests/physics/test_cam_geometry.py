@@ -15,7 +15,7 @@ from nlsdesign.design import (
     contour_from_lever_arm,
     contour_of_cam,
 )
-from nlsdesign.errors import ArrangementError, ValueRangeError
+from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
 from tests.cam_cases import CONCAVE, actuator
 
 ANCHORS = [22e-3, 40e-3, 1e6]

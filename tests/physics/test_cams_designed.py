@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 from scipy.optimize import brentq
@@ -24,10 +23,10 @@ from nlsdesign.design import (
     contour_of_cam,
     design_cam,
 )
-from nlsdesign.quantity import degrees
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.quantity import degrees
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, TARGET, actuator
 
-Floats = NDArray[np.float64]
 RUBBER = 84.56
 """Modulus times area of the neo-Hookean rubber of ``cam_cases`` in N; its rest length is 12.5 mm."""
 
@@ -40,7 +39,7 @@ def with_cam(cam: AnchoredCam | OneSidedCam, *, pretension: float = 0.0) -> Asse
     )
 
 
-def force(extension: Floats | float) -> Floats:
+def force(extension: Array | float) -> Array:
     stretch = 1.0 + np.asarray(extension) / 12.5e-3
     return np.asarray(RUBBER * (stretch - stretch**-2))
 

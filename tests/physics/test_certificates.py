@@ -12,26 +12,27 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     Assumptions,
     CascadeGain,
     Certificate,
     CertifiedGain,
     ConstantGain,
+    Contraction,
     ObserverDesign,
     certify,
     clamped_estimate_bound,
     design_observer_with_details,
     observe,
-    torque_bound,
     verify,
 )
+from nlsdesign.feedback.observer.certificates.torque_bound import torque_bound
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace
 from tests import renamed as rn
 
@@ -39,7 +40,6 @@ DECKS = ("austin2015_as_printed", "austin2015_figure_consistent")
 VISCOSITY, MODULUS = "spring.rubber.relaxing.dashpot.viscosity", "spring.rubber.relaxing.spring.modulus"
 STRAIN = "spring.rubber.relaxing.dashpot.strain"
 TIME = 1e-3
-Array = NDArray[np.float64]
 
 
 def plant(deck: str, viscosity: float | None = None) -> FlatModel:
@@ -47,7 +47,7 @@ def plant(deck: str, viscosity: float | None = None) -> FlatModel:
     return model if viscosity is None else model.with_values({VISCOSITY: viscosity})
 
 
-def without_torque(model: FlatModel, design: ObserverDesign) -> Certificate:
+def without_torque(model: FlatModel, design: ObserverDesign) -> Certificate[Contraction]:
     """Certify over a short range of angles: the contraction is for all angles anyway."""
     return certify(model, design, assumptions=Assumptions((0.3, 0.32)))
 
@@ -67,16 +67,16 @@ def test_both_decks_are_certified_with_their_dry_friction(deck: str, viscosity: 
     design = design_observer_with_details(model, gain=CertifiedGain())
     found = without_torque(model, design)
     relaxation = model.values[MODULUS] / viscosity
-    low, high = found.polytope.friction
+    low, high = found.proof.polytope.friction
     assert low < 0.01, "stuck is in the sector"
     assert high > 0.99, "and sliding"
-    assert found.decay >= 0.8 * min(relaxation, 2.0 * math.pi * 20.0)
-    assert found.decay < relaxation
-    assert np.linalg.cond(found.lyapunov) <= 100.0
-    root = np.linalg.cholesky(found.lyapunov).T
-    norms = np.linalg.norm(root @ found.polytope.corners() @ np.linalg.inv(root), 2, axis=(1, 2))
-    assert np.max(norms) <= math.exp(-found.decay * TIME)
-    assert np.max(norms) > math.exp(-1.1 * found.decay * TIME), "the proof is not far from what is true"
+    assert found.proof.decay >= 0.8 * min(relaxation, 2.0 * math.pi * 20.0)
+    assert found.proof.decay < relaxation
+    assert np.linalg.cond(found.proof.lyapunov) <= 100.0
+    root = np.linalg.cholesky(found.proof.lyapunov).T
+    norms = np.linalg.norm(root @ found.proof.polytope.corners() @ np.linalg.inv(root), 2, axis=(1, 2))
+    assert np.max(norms) <= math.exp(-found.proof.decay * TIME)
+    assert np.max(norms) > math.exp(-1.1 * found.proof.decay * TIME), "the proof is not far from what is true"
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_two_runs_approach_each_other_in_every_sample(
     model = plant(deck)
     design = design_observer_with_details(model, gain=gain, sample_time=time)
     found = without_torque(model, design)
-    draw, names = np.random.default_rng(3), found.polytope.states
+    draw, names = np.random.default_rng(3), found.proof.polytope.states
     end = 1.2 * float(design.compact.angles[-1])
     for size, current in ((end, 20.0), (2e-3, 0.5)):
         angle = size * draw.uniform(-1.0, 1.0, 400)
@@ -107,16 +107,16 @@ def test_two_runs_approach_each_other_in_every_sample(
         for _ in range(2):
             wrong = {
                 f"{n}.memory": 0.3 * s * draw.normal()
-                for n, s in zip(names, found.polytope.sizes, strict=True)
+                for n, s in zip(names, found.proof.polytope.sizes, strict=True)
             }
             run = observe(design.model, record, start=wrong)
             runs.append(np.array([run[n if n != "motor.angle" else "motor.angle.estimate"] for n in names]))
-        apart = (runs[0] - runs[1]) / np.array(found.polytope.sizes)[:, None]
-        energy = np.sqrt(np.einsum("ik,ij,jk->k", apart, found.lyapunov, apart))
+        apart = (runs[0] - runs[1]) / np.array(found.proof.polytope.sizes)[:, None]
+        energy = np.sqrt(np.einsum("ik,ij,jk->k", apart, found.proof.lyapunov, apart))
         seen = energy[:-1] > 1e-9
         assert np.sum(seen) > 20
         ratio = energy[1:][seen] / energy[:-1][seen]
-        assert np.max(ratio) <= math.exp(-found.decay * time) * (1.0 + 1e-6)
+        assert np.max(ratio) <= math.exp(-found.proof.decay * time) * (1.0 + 1e-6)
 
 
 def test_a_gain_without_certificate_is_told() -> None:
@@ -215,8 +215,8 @@ def test_names_do_not_matter() -> None:
         certify(m, design_observer_with_details(m), assumptions=Assumptions((0.3, 0.32), angle_error=1e-4))
         for m in (one, other)
     ]
-    assert found[0].decay == pytest.approx(found[1].decay, rel=1e-6)
-    assert found[0].torque.total == pytest.approx(found[1].torque.total, rel=1e-6)  # type: ignore[union-attr]
+    assert found[0].proof.decay == pytest.approx(found[1].proof.decay, rel=1e-6)
+    assert found[0].proof.torque.total == pytest.approx(found[1].proof.torque.total, rel=1e-6)  # type: ignore[union-attr]
     assert verify(found[1], model=other).holds
 
 
@@ -239,7 +239,7 @@ def test_a_wrong_decay_is_refuted_by_the_mathematics() -> None:
     model = plant("austin2015_as_printed", 31e3)
     found = without_torque(model, design_observer_with_details(model))
     assert verify(found).holds
-    forged = verify(replace(found, decay=1.1 * found.decay))
+    forged = verify(replace(found, proof=replace(found.proof, decay=1.1 * found.proof.decay)))
     assert [c.name for c in forged.checks if c.holds is False] == ["contraction", "condition of P"]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
-from nlsdesign.control import DisturbanceObserver, ScheduledTorque, VelocityLoop
+from nlsdesign.feedback.control import DisturbanceObserver, ScheduledTorque, VelocityLoop
 
 WIRES = {
     "observer.motor.angle": "plant.motor_encoder.reading",

@@ -9,9 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from nlsdesign.bench.discrepancy import Refit, predict, refit
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import RecordSet
+from nlsdesign.bench.identification.equation_error.block_noise import rate_span
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.mapping import Column
+from nlsdesign.bench.identification.records.measurement import Record
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
@@ -22,17 +28,10 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import Assembly
-from nlsdesign.discrepancy import Refit, predict, refit
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.errors import MeasurementError
-from nlsdesign.identification import Column, RecordSet
-from nlsdesign.identification.equation_error.evidence import Bench
-from nlsdesign.identification.equation_error.filter_choice import rate_span
-from nlsdesign.identification.records.measurement import Record
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
-
-Array = NDArray[np.float64]
 
 TRUE = {"stage.inertia": 0.05, "viscous.damping": 0.08, "dry.sliding_effort": 0.06}
 FINE, TORQUE_NOISE = 1e-4, 0.01

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
+from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.discrepancy.selection.criteria import Criteria
+from nlsdesign.bench.discrepancy.selection.hypothesis import excesses
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components import Assembly
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.criteria import Criteria
-from nlsdesign.discrepancy.selection.excess import excesses
-from nlsdesign.identification import RecordSet, load_records
-from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
 from tests.diagnosed import declared_rig
@@ -94,5 +94,6 @@ def test_what_is_hidden_is_not_taken_for_noise(tmp_path: Path, effect: str) -> N
     declared, records = bench_set(tmp_path, {effect: 1.5})
     noise = Bench(records, blocks_of(flatten(declared), records.signals)).noise
     assert noise.deviation(FORCE) == pytest.approx(WHITE, rel=0.15)
-    weights = np.full(9, 1.0 / 9.0)
-    assert noise.behind(FORCE, weights, 0.002) == pytest.approx(WHITE / 3.0, rel=0.15)
+    # A Gaussian that leaves as much of white noise as the mean of nine samples.
+    width = 9.0 / (2.0 * np.sqrt(np.pi)) * 0.002
+    assert noise.behind(FORCE, 0.002, width=width) == pytest.approx(WHITE / 3.0, rel=0.15)

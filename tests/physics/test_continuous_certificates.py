@@ -15,12 +15,9 @@ import pytest
 from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.paper_form import GEOMETRIC, paper_form
-from nlsdesign.observer import (
-    ContinuousCertificate,
+from nlsdesign.feedback.observer import (
+    Certificate,
+    ContinuousContraction,
     Minimal,
     PaperForm,
     certify_continuous,
@@ -28,12 +25,16 @@ from nlsdesign.observer import (
     verify,
     write_certificate,
 )
-from nlsdesign.observer.certificates.error_system import hull
+from nlsdesign.feedback.observer.certificates.error_system import hull
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model.paper_form import GEOMETRIC, paper_form
 from tests import renamed as rn
 
 DECKS = ("austin2015_as_printed", "austin2015_figure_consistent")
 VISCOSITY, MODULUS = "spring.rubber.relaxing.dashpot.viscosity", "spring.rubber.relaxing.spring.modulus"
-Array = NDArray[np.float64]
 
 
 def plant(deck: str, viscosity: float | None = None) -> FlatModel:
@@ -41,9 +42,12 @@ def plant(deck: str, viscosity: float | None = None) -> FlatModel:
     return model if viscosity is None else model.with_values({VISCOSITY: viscosity})
 
 
-def fall(model: FlatModel, proved: ContinuousCertificate, *, draws: int, reach: float) -> float:
+def fall(
+    model: FlatModel, certificate: Certificate[ContinuousContraction], *, draws: int, reach: float
+) -> float:
     """Return the smallest rate at which V falls, over pairs of states at one angle and one current."""
-    published = isinstance(proved.form, PaperForm)
+    proved = certificate.proof
+    published = isinstance(proved.states, PaperForm)
     carried = paper_form(model) if published else model
     names, draw = [v.name for v in carried.states], np.random.default_rng(4)
     system, size = proved.system, np.array(proved.system.sizes)
@@ -60,7 +64,7 @@ def fall(model: FlatModel, proved: ContinuousCertificate, *, draws: int, reach: 
             u[0] = 0.0  # what the rate of the extension does is known at the measured angle
         states = np.zeros((2, len(names)))
         states[:, place] = pair
-        states[:, names.index(proved.measured)] = angle
+        states[:, names.index(certificate.measured)] = angle
         if published:  # at one angle all extensions are the one that follows from it: A is taken there
             extension = next(n for n in names if n.endswith("extension"))
             first = float(np.array(_signal(carried, states[0], u, f"{extension}.{GEOMETRIC}")))
@@ -106,15 +110,15 @@ def test_both_decks_are_certified_in_continuous_time(
     assert model.values["dry_friction.sliding_effort"] > 0.0
     proved = certify_continuous(model, form=form)
     relaxation = model.values[MODULUS] / viscosity
-    assert proved.decay >= 0.8 * min(relaxation, 125.0)
-    assert proved.decay < relaxation
-    assert np.linalg.cond(proved.lyapunov) <= 100.0
+    assert proved.proof.decay >= 0.8 * min(relaxation, 125.0)
+    assert proved.proof.decay < relaxation
+    assert np.linalg.cond(proved.proof.lyapunov) <= 100.0
     stuck = model.values["dry_friction.sliding_effort"] / (
         model.values["dry_friction.creep_speed"] * model.values["motor.inertia"]
     )
-    assert -proved.system.friction[0] >= stuck, "the corner of dry friction is in the sector"
+    assert -proved.proof.system.friction[0] >= stuck, "the corner of dry friction is in the sector"
     found = fall(model, proved, draws=400, reach=1.0)
-    assert proved.decay <= found
+    assert proved.proof.decay <= found
     assert found < 3.0 * relaxation
 
 
@@ -122,8 +126,8 @@ def test_faster_than_a_prototype_with_the_same_condition() -> None:
     """A throw-away prototype had 60, 9.35 and 0.706 1/s for the printed deck, with conditions of 25 to 60."""
     for viscosity, reached in ((411.0, 60.0), (31e3, 9.35), (411e3, 0.706)):
         proved = certify_continuous(plant(DECKS[0], viscosity), condition=60.0, decay=1.2 * reached)
-        assert proved.decay == pytest.approx(1.2 * reached)
-        assert np.linalg.cond(proved.lyapunov) <= 60.0
+        assert proved.proof.decay == pytest.approx(1.2 * reached)
+        assert np.linalg.cond(proved.proof.lyapunov) <= 60.0
 
 
 def test_what_is_too_fast_is_answered_with_the_fastest() -> None:
@@ -134,13 +138,13 @@ def test_what_is_too_fast_is_answered_with_the_fastest() -> None:
     named = re.search(r"proved is ([\d.e+-]+) 1/s", str(refused.value))
     assert named is not None
     assert 0.9 * limit < float(named[1]) < limit
-    assert certify_continuous(model, decay=0.98 * float(named[1])).decay == 0.98 * float(named[1])
+    assert certify_continuous(model, decay=0.98 * float(named[1])).proof.decay == 0.98 * float(named[1])
 
 
 def test_names_do_not_matter() -> None:
     machine = rn.renamed(declare(load_deck(DECKS[1])), rn.exchanged)
     one, other = (certify_continuous(m, decay=40.0) for m in (plant(DECKS[1]), flatten(machine.assembly)))
-    assert np.array(one.gain) == pytest.approx(np.array(other.gain), rel=1e-3)
+    assert np.array(one.proof.gain) == pytest.approx(np.array(other.proof.gain), rel=1e-3)
     assert verify(other, model=flatten(machine.assembly)).holds
 
 
@@ -150,18 +154,18 @@ def test_a_file_is_checked_again_and_forgeries_are_refuted(tmp_path: Path) -> No
     proved = certify_continuous(model, decay=40.0)
     path = write_certificate(proved, tmp_path / "certificate.json")
     again, untouched = read_certificate(path)
-    assert isinstance(again, ContinuousCertificate)
+    assert isinstance(again.proof, ContinuousContraction)
     assert untouched
     assert verify(again, untouched=untouched, model=model).holds
-    narrow = [list(row) for row in proved.system.lower]
-    speed = proved.system.moving[1]
+    narrow = [list(row) for row in proved.proof.system.lower]
+    speed = proved.proof.system.moving[1]
     narrow[speed][0] *= 0.9
-    claimed = replace(proved.system, lower=tuple(map(tuple, narrow)))
+    claimed = replace(proved.proof.system, lower=tuple(map(tuple, narrow)))
     for forged, failing in (
-        (replace(proved, decay=80.0), ["decay", "condition of P"]),
-        (replace(proved, system=claimed), ["ranges of A"]),
+        (replace(proved.proof, decay=80.0), ["decay", "condition of P"]),
+        (replace(proved.proof, system=claimed), ["ranges of A"]),
     ):
-        read, untouched = read_certificate(write_certificate(forged, path))
+        read, untouched = read_certificate(write_certificate(replace(proved, proof=forged), path))
         assert untouched
         found = verify(read, untouched=untouched, model=model)
         assert [c.name for c in found.checks if c.holds is False] == failing

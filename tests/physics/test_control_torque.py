@@ -9,10 +9,10 @@ from scipy.linalg import expm
 from nlsdesign.components import ROTATION, Driven, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.control import ClosedLoop, TorqueGains, sine_response, torque_controller, zero_torque
-from nlsdesign.deck import load_deck
+from nlsdesign.feedback.control import ClosedLoop, TorqueGains, sine_response, torque_controller, zero_torque
+from nlsdesign.feedback.observer import design_observer_with_details
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import design_observer_with_details
 from tests import observed as ob
 
 MOVED = {"observer.motor.angle": "plant.spring.angle", "controller.motor.angle": "plant.motor.angle"}

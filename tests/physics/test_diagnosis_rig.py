@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nlsdesign.bench.discrepancy import diagnose, predict, write_verdict
+from nlsdesign.bench.identification import load_records
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy import diagnose, predict, write_verdict
-from nlsdesign.identification import load_records
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig, names, verdict_of
 from tests.rig import ACTUATORS, truth

@@ -32,7 +32,7 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import ArrangementError, ConvergenceError
+from nlsdesign.foundation.errors import ArrangementError, ConvergenceError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate
 

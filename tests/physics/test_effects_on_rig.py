@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.effects import ALL, backlash
-from nlsdesign.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.criteria import Criteria
-from nlsdesign.discrepancy.selection.excess import excesses
-from nlsdesign.discrepancy.selection.measures import total_excess
-from nlsdesign.identification import load_records
-from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.bench.discrepancy.effects import ALL, backlash
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
+from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.discrepancy.selection.criteria import Criteria
+from nlsdesign.bench.discrepancy.selection.hypothesis import excesses
+from nlsdesign.bench.discrepancy.selection.measures import total_excess
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import load_records
+from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig, with_true_contact
 from tests.rig import ACTUATORS, make_records, with_slack_cable, write_set

@@ -36,11 +36,11 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.components.sensing.sensors import Sensor
-from nlsdesign.errors import ArrangementError
+from nlsdesign.foundation.errors import ArrangementError
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.model.transform import with_outputs
-from nlsdesign.quantity import Quantity
 from nlsdesign.simulation import simulate
 
 MOTOR = {"inertia": 0.01, "gear_ratio": 25.0, "torque_constant": 0.03}

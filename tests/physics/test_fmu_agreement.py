@@ -13,14 +13,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from models import cam_rubber_actuator
-from nlsdesign.deck import load_deck
-from nlsdesign.export import CompiledStep, export_c, export_fmu
+from nlsdesign.export import export_c, export_fmu
 from nlsdesign.export.c.guarded_step import GuardedModel
+from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import compile_library
 from nlsdesign.export.fmi.fmu import fmu_texts
+from nlsdesign.feedback.observer import CascadeGain, design_observer
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel, Variable
-from nlsdesign.observer import CascadeGain, design_observer
 from nlsdesign.simulation import simulate
 from tests.fmu_unit import opened
 from tests.hand_built import plant

@@ -13,19 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ValueRangeError
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import (
+from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
     Assumptions,
     CascadeGain,
     FixedGrid,
-    HeldEstimateCertificate,
+    HeldEstimate,
     Trust,
     certify_held_estimate,
     design_adaptive_observer,
@@ -34,13 +30,15 @@ from nlsdesign.observer import (
     verify,
     write_certificate,
 )
-from nlsdesign.observer.certificates import held_estimate_bound
+from nlsdesign.feedback.observer.certificates.held_estimate import held_estimate_bound
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation.prior import declared_prior
 
 STRAIN = "spring.rubber.relaxing.dashpot.strain"
 GRID = FixedGrid(-1.1, 1.1, 45)
 RANGES = Assumptions((0.3, 0.32), 15.0, 4e-4)
-Array = NDArray[np.float64]
 
 
 def plant(deck: str = "austin2015_figure_consistent") -> FlatModel:
@@ -141,11 +139,13 @@ def test_a_file_is_checked_again_with_the_observer(tmp_path: Path) -> None:
     proved = certify_held_estimate(model, design, assumptions=ranges, settings=asdict(design.trust))
     path = write_certificate(proved, tmp_path / "certificate.json")
     again, untouched = read_certificate(path)
-    assert isinstance(again, HeldEstimateCertificate)
+    assert isinstance(again.proof, HeldEstimate)
     assert untouched
     assert verify(again, untouched=untouched, model=model, design=design).holds
-    assert [c.holds for c in verify(again, model=model).checks] == [True, None]
-    forged = replace(proved, bound=replace(proved.bound, learned=0.9 * proved.bound.learned))
+    assert [c.holds for c in verify(again).checks] == [True, None]
+    assert [c.holds for c in verify(again, model=model).checks] == [True, True], "designed again"
+    smaller = replace(proved.proof.bound, learned=0.9 * proved.proof.bound.learned)
+    forged = replace(proved, proof=replace(proved.proof, bound=smaller))
     read, untouched = read_certificate(write_certificate(forged, path))
     found = verify(read, untouched=untouched, model=model, design=design)
     assert untouched

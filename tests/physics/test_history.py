@@ -39,7 +39,7 @@ from nlsdesign.components import (
     specimen,
     tie,
 )
-from nlsdesign.errors import ArrangementError, ValueRangeError
+from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate
 from tests.stretched import AREA, LENGTH, VOLUME, pulled, run

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from nlsdesign.components import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.foundation.errors import ValueRangeError
 from tests.stretched import pulled, stress_at
 
 MODULI, EXPONENTS = (0.618e6, 1.18e3, -9.81e3), (1.3, 5.0, -2.0)

@@ -11,11 +11,11 @@ from scipy.special import ellipk
 
 from nlsdesign import components as c
 from nlsdesign.components import ROTATION, Assembly, assembly, tie
-from nlsdesign.errors import ArrangementError
+from nlsdesign.foundation.errors import ArrangementError
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.model.transform import with_outputs
-from nlsdesign.quantity import Quantity
 from nlsdesign.simulation import simulate
 from tests.physics.table import Row
 

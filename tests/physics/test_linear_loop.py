@@ -10,7 +10,9 @@ import pytest
 from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import (
+from nlsdesign.design import equilibrium_torque
+from nlsdesign.export import natively
+from nlsdesign.feedback.control import (
     ClosedLoop,
     FrozenTables,
     StuckPlant,
@@ -18,7 +20,6 @@ from nlsdesign.control import (
     coupled_stability,
     encoder_loop,
     largest_torque,
-    linear_loop,
     loop_margins,
     output_impedance,
     saturation_line,
@@ -28,11 +29,10 @@ from nlsdesign.control import (
     with_fine_counts,
     zero_torque,
 )
-from nlsdesign.deck import load_deck
-from nlsdesign.design import equilibrium_torque
-from nlsdesign.export import natively
+from nlsdesign.feedback.control.evaluation.linear_loop import linear_loop
+from nlsdesign.feedback.observer import CascadeGain, design_observer
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import CascadeGain, design_observer
 from nlsdesign.simulation.sampled_batch import run_batch
 from tests.physics.test_control_torque import linear_actuator, sampled_response
 from tests.renamed import SCHEMES, renamed

@@ -9,14 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlsdesign.analysis import Observability, over_angle
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
 from nlsdesign.design.optimisation.result import Miss
-from nlsdesign.errors import NlsError, ValueRangeError
-from nlsdesign.live import (
+from nlsdesign.feedback.analysis import Observability, over_angle
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import NlsError, ValueRangeError
+from nlsdesign.live.answers import LiveAnswer
+from nlsdesign.live.background import BackgroundWork
+from nlsdesign.live.edits import (
     AddPoint,
     ChangeLimit,
     ChooseDeck,
@@ -24,19 +26,16 @@ from nlsdesign.live import (
     DropLimit,
     FreeNumber,
     HoldNumber,
-    LiveAnswer,
-    LiveDesign,
-    LiveQuestion,
     MovePoint,
     SetNumber,
-    SettleDesign,
-    gallery_question,
-    question_of,
-    reopened,
 )
-from nlsdesign.live.background import BackgroundWork
 from nlsdesign.live.full_design import full_answer, whole_design
+from nlsdesign.live.gallery import gallery_question, question_of
+from nlsdesign.live.live_design import LiveDesign
 from nlsdesign.live.live_snapshots import MOST_SNAPSHOTS
+from nlsdesign.live.question import LiveQuestion
+from nlsdesign.live.saved import reopened
+from nlsdesign.live.work import SettleDesign
 from tests.renamed import in_words, renamed
 
 SAME = 2e-4
@@ -483,7 +482,7 @@ def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A program takes tens of megabytes: a step whose program is gone gives the same design and goes on."""
-    monkeypatch.setattr("nlsdesign.live.quick_design._MOST_PROGRAMS", 1)
+    monkeypatch.setattr("nlsdesign.design.parametric.parametric_solver._MOST_PROGRAMS", 1)
     before = template.answer.design
     point = template.question.points[2]
     template.apply(AddPoint(0.5, 0.21))

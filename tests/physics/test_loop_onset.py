@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.control import (
+from nlsdesign.export import natively
+from nlsdesign.feedback.control import (
     ClosedLoop,
     TorqueGains,
     encoder_loop,
-    linear_onset,
     onset_of_limit_cycling,
     torque_controller,
 )
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import UnknownNameError, ValueRangeError
-from nlsdesign.export import natively
+from nlsdesign.feedback.control.evaluation.onset import linear_onset
+from nlsdesign.feedback.observer import CascadeGain, design_observer
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
-from nlsdesign.observer import CascadeGain, design_observer
 from nlsdesign.simulation.sampled_batch import run_batch
 
 GAIN = "controller.proportional"
@@ -79,7 +79,7 @@ def test_the_published_amplitudes_of_the_issue(loop: ClosedLoop) -> None:
     """Kp = 70 at 2.8 N·m held: the current swings between its limits at 40 Hz."""
     from dataclasses import replace
 
-    from nlsdesign.control import held_torque
+    from nlsdesign.feedback.control import held_torque
 
     hard = replace(loop, controller=loop.controller.with_values({GAIN: 70.0}))
     verdict = held_torque(hard, [2.8], translate=natively).verdicts[0]

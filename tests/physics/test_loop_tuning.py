@@ -10,7 +10,8 @@ import pytest
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import (
+from nlsdesign.export import natively
+from nlsdesign.feedback.control import (
     ClosedLoop,
     LoopChoice,
     LoopLimits,
@@ -21,16 +22,15 @@ from nlsdesign.control import (
     best_choices,
     encoder_loop,
     largest_gain,
-    linear_loop,
     loop_margins,
     sine_response,
     torque_controller,
 )
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ConvergenceError, InfeasibleError, UnknownNameError
-from nlsdesign.export import natively
+from nlsdesign.feedback.control.evaluation.linear_loop import linear_loop
+from nlsdesign.feedback.observer import CascadeGain, design_observer
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ConvergenceError, InfeasibleError, UnknownNameError
 from nlsdesign.model import flatten
-from nlsdesign.observer import CascadeGain, design_observer
 
 GAIN = "controller.proportional"
 SPRINGS = {

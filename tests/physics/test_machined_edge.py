@@ -24,7 +24,7 @@ from nlsdesign.design import (
     contour_from_lever_arm,
     write_drawings,
 )
-from nlsdesign.quantity import quantity
+from nlsdesign.foundation.quantity import quantity
 from tests.dxf_reading import TautString, header_of, offset_points, polylines_of
 
 CABLE = quantity(0.25, "mm", source="example: cable of 0.5 mm")

@@ -24,8 +24,8 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
 from nlsdesign.export import export_fmu
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
 from tests.fmu_unit import Unit, opened

@@ -18,8 +18,9 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 from models import elastomer_specimen, positioning_drive
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
-from nlsdesign.deck import load_deck, read_deck
-from nlsdesign.export import CompiledStep, export_c, export_fmu
+from nlsdesign.export import export_c, export_fmu
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.simulation import Trace, simulate

@@ -29,7 +29,7 @@ from nlsdesign.components import (
     series,
     standard_linear_solid,
 )
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.model.linear import linearise
 from tests.stretched import AREA, LENGTH, VOLUME, pulled, run
 

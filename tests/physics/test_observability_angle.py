@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import sympy
 
-from nlsdesign.analysis import EstimateDeviation, Observability, over_angle
-from nlsdesign.analysis.rest import rest_states
+from nlsdesign.feedback.analysis import EstimateDeviation, Observability, over_angle
+from nlsdesign.feedback.analysis.rest import rest_states
 from nlsdesign.model import FlatModel
 from nlsdesign.model.linear import linearise
 from nlsdesign.model.paper_form import paper_form

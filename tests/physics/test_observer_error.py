@@ -9,13 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.analysis import Stability, over_angle
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.paper_form import PaperFormNames
-from nlsdesign.model.transform import replace_state
-from nlsdesign.observer import (
+from nlsdesign.feedback.analysis import Stability, over_angle
+from nlsdesign.feedback.observer import (
     CascadeGain,
     FixedGrid,
     GridByTolerance,
@@ -23,11 +19,14 @@ from nlsdesign.observer import (
     PaperForm,
     PolePlacement,
     SteadyStateKalman,
-    check_stability,
     design_observer_with_details,
     observe,
 )
-from nlsdesign.observer.scheduling.check import error_matrices
+from nlsdesign.feedback.observer.scheduling.scheduled import check_stability, error_matrices
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model.paper_form import PaperFormNames
+from nlsdesign.model.transform import replace_state
 from nlsdesign.simulation import Trace, simulate
 from tests import observed as ob
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nlsdesign.feedback.observer import CascadeGain, FixedGrid, ObserverDesign, design_observer_with_details
 from nlsdesign.model import flatten
-from nlsdesign.observer import CascadeGain, FixedGrid, ObserverDesign, design_observer_with_details
 from tests import observed as ob
 
 TIME = 1e-3

@@ -19,11 +19,12 @@ from scipy.interpolate import BSpline
 from scipy.optimize import brentq
 
 from models import one_sided_cable_drive
-from nlsdesign.analysis import Observability, Stability, over_angle
 from nlsdesign.components import VoltageDrivenMotor
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
-from nlsdesign.deck import load_deck, read_deck
-from nlsdesign.export import CompiledStep, export_c, export_fmu
+from nlsdesign.export import export_c, export_fmu
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.feedback.analysis import Observability, Stability, over_angle
+from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, measure, simulate
 

@@ -9,15 +9,6 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from nlsdesign.analysis import (
-    Stability,
-    empirical_gramian,
-    least_damped,
-    over_angle,
-    rank_drops,
-    rest_points,
-    sampled_poles,
-)
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
@@ -32,11 +23,22 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import Assembly, assembly
-from nlsdesign.deck import load_deck
-from nlsdesign.locations import folder
+from nlsdesign.feedback.analysis import (
+    Stability,
+    empirical_gramian,
+    over_angle,
+    rest_points,
+    sampled_poles,
+)
+from nlsdesign.feedback.analysis import (
+    observability as rank_drops,
+)
+from nlsdesign.feedback.analysis.stability import least_damped
+from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
+from nlsdesign.feedback.observer.scheduling.scheduled import error_matrices
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.locations import folder
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import CascadeGain, FixedGrid, design_observer
-from nlsdesign.observer.scheduling.check import error_matrices
 
 J, K, BRANCH, ETA, VISCOUS, LEVEL, CREEP = 2e-3, 5.0, 3.0, 0.04, 1e-3, 0.02, 0.02
 

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from nlsdesign.components import TRANSLATION, Dashpot, Driven, Element, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import ArrangementError
+from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import LinearModel, linearise, rest_state
 

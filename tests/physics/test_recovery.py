@@ -18,11 +18,8 @@ import pytest
 import nlsdesign as nls
 from nlsdesign.components import Encoder, ReadingLimits
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import TorqueGains, joined
-from nlsdesign.errors import NlsError
-from nlsdesign.export import CompiledStep
-from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.c.status_bits import (
+from nlsdesign.export.c.c_text import member_paths
+from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_JUMPED,
     INPUT_OUT_OF_RANGE,
@@ -31,11 +28,14 @@ from nlsdesign.export.c.status_bits import (
     RECOVERED,
     STATE_RESTARTED,
     WAITING,
+    GuardedModel,
     index_bit,
 )
-from nlsdesign.export.c.structures import member_paths
-from nlsdesign.export.compilation.cross_compiler import compile_program
-from nlsdesign.observer import design_adaptive_observer, design_observer_with_details
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.feedback.control import TorqueGains, joined
+from nlsdesign.feedback.observer import design_adaptive_observer, design_observer_with_details
+from nlsdesign.foundation.errors import NlsError
+from tests.compiling import compile_program
 from tests.unguarded import unguarded
 
 DECK = "austin2015_figure_consistent"

@@ -13,20 +13,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import Record, RecordSet
+from nlsdesign.bench.identification.equation_error import block_noise
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.identification import Column, Record, RecordSet
-from nlsdesign.identification.equation_error import evidence
-from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
 
-Array = NDArray[np.float64]
 Rate = Callable[[float, Array], list[float]]
 TEMPLATES = Path(__file__).parents[2] / "models" / "templates"
 FINE = {"motor_encoder.quantum": 5e-6}
@@ -149,12 +149,12 @@ def test_dry_friction_that_turns_over_between_samples_is_no_missing_effect(
     machine = rubbed_spring(step)
     assert max(squares(*machine, "motor").values()) < NOISE_ALONE
     if step == 5e-3:
-        monkeypatch.setattr(evidence, "_reverses", lambda rate: np.zeros(len(rate), dtype=bool))
+        monkeypatch.setattr(block_noise, "_reverses", lambda rate: np.zeros(len(rate), dtype=bool))
         assert max(squares(*machine, "motor").values()) > NOISE_ALONE, "or the test would show nothing"
 
 
 def test_noise_that_a_lossy_gear_rectifies_is_no_missing_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     machine = geared_limb()
     assert max(squares(*machine, "motor").values()) < NOISE_ALONE
-    monkeypatch.setattr(evidence, "rectified", lambda *_: {})
+    monkeypatch.setattr(block_noise, "rectified", lambda *_: {})
     assert max(squares(*machine, "motor").values()) > NOISE_ALONE, "or the test would show nothing"

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.control import joined, torque_controller
-from nlsdesign.deck import load_deck
 from nlsdesign.export import export_fmu
+from nlsdesign.feedback.control import joined, torque_controller
+from nlsdesign.feedback.observer import CascadeGain, design_observer
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel
-from nlsdesign.observer import CascadeGain, design_observer
 from tests.fmu_unit import Refused, Unit, opened
 from tests.hand_built import observer
 

@@ -12,7 +12,9 @@ from scipy.linalg import expm
 import nlsdesign as nls
 from nlsdesign.components import ROTATION, Driven, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.control import (
+from nlsdesign.export import export_c, natively
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.feedback.control import (
     ClosedLoop,
     DisturbanceObserver,
     ScheduledTorque,
@@ -22,9 +24,8 @@ from nlsdesign.control import (
     tracking,
     zero_torque,
 )
-from nlsdesign.export import CompiledStep, export_c, natively
+from nlsdesign.feedback.observer import CascadeGain
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import CascadeGain
 from nlsdesign.simulation import Sine, simulate
 from nlsdesign.simulation.prior import declared_prior
 from nlsdesign.simulation.sampled_batch import BatchTrace, SampledSystem, run_batch

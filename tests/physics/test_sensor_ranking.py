@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm, solve_discrete_are
 
-from nlsdesign.analysis import RankingAssumptions, SensorCandidate, rank_sensors
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
@@ -20,10 +19,12 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import load_deck
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.feedback.analysis import SensorCandidate, rank_sensors
+from nlsdesign.feedback.analysis.sensor_ranking import RankingAssumptions
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.quantity import quantity
 
 J, RATIO, CONSTANT, STIFF, DAMPING, LEVEL, COUNT = 6e-4, 4.0, 0.055, 3.0, 2e-3, 0.02, 1e-3
 GIVEN = RankingAssumptions(wander=20.0, current_error=0.05, current_time=0.02)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import ROTATION, CoulombFriction, Dashpot, RigidStop, Spring
-from nlsdesign.errors import UnknownNameError, ValueRangeError
 from nlsdesign.export import natively
+from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Sine, Trace, column_runs, simulate, simulate_batch, simulated_batch
 from nlsdesign.simulation.buffered import Translate, as_it_is

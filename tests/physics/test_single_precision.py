@@ -10,6 +10,7 @@ the product of the steps' Jacobians, whose absolute value is taken last.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -18,19 +19,16 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
-from nlsdesign.control import joined
-from nlsdesign.export import CompiledStep
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.observer import design_observer_with_details
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.feedback.control import joined
+from nlsdesign.feedback.observer import design_observer_with_details
+from nlsdesign.model.graph import applied, as_results, fold, read_graph
 from tests.unguarded import unguarded
 
 ROUNDOFF = 2.0**-24
 LIBRARY = {ca.OP_EXP, ca.OP_EXPM1, ca.OP_TANH, ca.OP_SQRT, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW}
 ULPS = 4.0  # of an elementary function, docs/targets.md
-BINARY = {
-    ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_FMIN, ca.OP_FMAX, ca.OP_LT, ca.OP_LE, ca.OP_EQ,
-    ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_IF_ELSE_ZERO, ca.OP_COPYSIGN, ca.OP_FMOD,
-}  # fmt: skip
 EXACT = {
     ca.OP_FMIN, ca.OP_FMAX, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT, ca.OP_NEG,
     ca.OP_FABS, ca.OP_SIGN, ca.OP_IF_ELSE_ZERO, ca.OP_FLOOR, ca.OP_COPYSIGN, ca.OP_TWICE, ca.OP_ASSIGN,
@@ -46,31 +44,25 @@ def machine(which: str) -> nls.FlatModel:
 
 def rounded(function: ca.Function, arguments: list[ca.SX]) -> tuple[list[ca.SX], ca.SX, list[float]]:
     """Return the results with a relative error δ on every value, the δ, and how many roundoffs each has."""
-    results = [ca.SX.zeros(*function.size_out(i)) for i in range(function.n_out())]
-    work: dict[int, ca.SX] = {}
     errors: list[ca.SX] = []
     sizes: list[float] = []
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        read, written = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_OUTPUT:
-            results[written[0]][written[1]] = work[read[0]]
-            continue
-        if operation == ca.OP_INPUT:
-            work[written[0]] = arguments[read[0]][read[1]]
-            continue
-        if operation == ca.OP_CONST:
-            value = ca.SX(function.instruction_constant(k))
-        elif operation in BINARY:
-            value = ca.SX.binary(operation, work[read[0]], work[read[1]])
-        else:
-            value = ca.SX.unary(operation, work[read[0]])
-        if operation not in EXACT:
-            errors.append(ca.SX.sym(f"d{len(errors)}"))
-            sizes.append(ULPS if operation in LIBRARY else 1.0)
-            value = value * (1 + errors[-1])
-        work[written[0]] = value
-    return results, ca.vertcat(*errors), sizes
+
+    def erring(value: ca.SX, size: float) -> ca.SX:
+        errors.append(ca.SX.sym(f"d{len(errors)}"))
+        sizes.append(size)
+        return value * (1 + errors[-1])
+
+    def combined(operation: int, operands: Sequence[ca.SX]) -> ca.SX:
+        value = applied(operation, operands)
+        return value if operation in EXACT else erring(value, ULPS if operation in LIBRARY else 1.0)
+
+    values = fold(
+        read_graph(function),
+        lambda argument, element: arguments[argument][element],
+        lambda value: erring(ca.SX(value), 1.0),
+        combined=combined,
+    )
+    return as_results(function, values), ca.vertcat(*errors), sizes
 
 
 class Bound:

@@ -34,15 +34,15 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import (
+from nlsdesign.export.c.controller_code import check_discrete
+from nlsdesign.export.fmi.fmu import fmu_texts
+from nlsdesign.foundation.errors import (
     ArrangementError,
     ConvergenceError,
     ExportError,
     UnknownNameError,
     ValueRangeError,
 )
-from nlsdesign.export.c.controller_code import check_discrete
-from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 

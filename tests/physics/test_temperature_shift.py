@@ -26,7 +26,7 @@ from nlsdesign.components import (
     maxwell,
     series,
 )
-from nlsdesign.errors import ArrangementError, ValueRangeError
+from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
 from tests.stretched import VOLUME, pulled, run
 
 from .test_networks import complex_modulus

@@ -33,15 +33,15 @@ from nlsdesign.design import (
     SpreadRules,
     Trim,
     UniformSpread,
-    draw_deviations,
     equilibrium_torque,
     tolerance_analysis,
-    torque_check,
 )
+from nlsdesign.design.optimisation.checks import torque_check
+from nlsdesign.design.tolerance.causes import draw_deviations
 from nlsdesign.design.tolerance.declared_spreads import spring_causes
 from nlsdesign.design.tolerance.made_spring import MadeSpring, made_spring
+from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten
-from nlsdesign.quantity import quantity
 from tests.cam_cases import NeoHooke
 from tests.taut_string import arc_lip, pulled
 

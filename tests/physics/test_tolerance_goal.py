@@ -30,9 +30,9 @@ from nlsdesign.design import (
 from nlsdesign.design.optimisation.problem import design_problem
 from nlsdesign.design.tolerance.declared_spreads import spring_causes
 from nlsdesign.design.tolerance.made_spring import made_spring
-from nlsdesign.errors import ArrangementError, UnitError, UnknownNameError, ValueRangeError
+from nlsdesign.foundation.errors import ArrangementError, UnitError, UnknownNameError, ValueRangeError
+from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten
-from nlsdesign.quantity import quantity
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, RUBBER, TARGET, actuator
 from tests.physics.test_tolerance import actuator as arc_actuator
 

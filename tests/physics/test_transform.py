@@ -7,7 +7,8 @@ import pytest
 
 from nlsdesign.components import Driven, TransportDelay
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import ArrangementError, UnknownNameError
+from nlsdesign.foundation.errors import ArrangementError, UnknownNameError
+from nlsdesign.foundation.symbolic import depends
 from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.paper_form import paper_form
 from nlsdesign.model.transform import (
@@ -19,7 +20,6 @@ from nlsdesign.model.transform import (
     without_idle_states,
 )
 from nlsdesign.simulation import Trace, simulate
-from nlsdesign.symbolic import depends
 from tests import observed as ob
 
 TIMES = np.arange(0.0, 0.6, 1e-3)

@@ -21,7 +21,7 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 from tests.physics.table import Row

@@ -14,18 +14,18 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
+from nlsdesign.bench.discrepancy import ALL, diagnose, predict
+from nlsdesign.bench.discrepancy.effects.effect import Candidate
+from nlsdesign.bench.discrepancy.effects.unnamed_tables import EFFECT, unnamed_part
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
+from nlsdesign.bench.discrepancy.selection.comparison import Comparison
+from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
-from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy import ALL, diagnose, predict
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.effects.candidate import Candidate
-from nlsdesign.discrepancy.effects.unnamed_tables import EFFECT, unnamed_part
-from nlsdesign.discrepancy.screening.scale_check import typical_sizes
-from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.export import natively
-from nlsdesign.identification import RecordSet, load_records
-from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.simulation import simulate
 from tests.diagnosed import declared_rig

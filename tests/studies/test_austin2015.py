@@ -11,9 +11,9 @@ import pytest
 from nlsdesign.cli.studies import claims, run_study
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import deck_digest, declare
-from nlsdesign.deck import load_deck
+from nlsdesign.feedback.observer import read_certificate, verify
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
-from nlsdesign.observer import read_certificate, verify
 from tests.command_line import Run, run
 
 __all__ = ["run"]

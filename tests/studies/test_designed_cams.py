@@ -10,8 +10,8 @@ import pytest
 
 from nlsdesign.cli.studies import claims, not_as_claimed, run_study
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
 from nlsdesign.design import equilibrium_torque
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 
 

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from nlsdesign.cli import studies as runner
-from nlsdesign.errors import NlsError
+from nlsdesign.foundation.errors import NlsError
 
 MOST_LINES = 49
 

@@ -9,6 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.least_squares import Fit, fit
+from nlsdesign.bench.identification.parameters import declared_parameter
 from nlsdesign.cli.studies import claims, run_study
 from nlsdesign.components import (
     Assembly,
@@ -18,14 +23,9 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.identification import RecordSet, load_records
-from nlsdesign.identification.equation_error.evidence import Bench
-from nlsdesign.identification.estimation.least_squares import Fit, fit
-from nlsdesign.identification.estimation.parameters import declared_parameter
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
-from nlsdesign.quantity import Quantity
 
 SHARED = os.environ.get("NLSDESIGN_SHARED", "")
 STUDIES = Path(__file__).parents[2] / "studies"

@@ -10,16 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nlsdesign.bench.discrepancy import ALL, diagnose, predict, refit, write_refit, write_verdict
+from nlsdesign.bench.identification import load_records
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
-from nlsdesign.control import ClosedLoop, torque_controller, tracking
-from nlsdesign.deck import load_deck
 from nlsdesign.design import design_cam
-from nlsdesign.discrepancy import ALL, diagnose, predict, refit, write_refit, write_verdict
-from nlsdesign.identification import load_records
+from nlsdesign.feedback.control import ClosedLoop, torque_controller, tracking
+from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
+from nlsdesign.feedback.observer.scheduling.scheduled import check_stability
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import CascadeGain, FixedGrid, check_stability, design_observer
-from nlsdesign.report import verdict_sections, write_report
+from nlsdesign.presentation.report import verdict_sections, write_report
 from nlsdesign.simulation import Sine, simulate
 from tests.cam_cases import KEEP, TARGET
 from tests.command_line import Run, run

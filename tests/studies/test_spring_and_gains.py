@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.cli.studies import claims, not_as_claimed, run_study
-from nlsdesign.control import loop_margins
+from nlsdesign.feedback.control import loop_margins
 from nlsdesign.simulation import declared_prior
 from studies.alternative_rubber.merits import HELD
 from studies.spring_and_gains import Results, Spring

@@ -23,15 +23,7 @@ GLYPHS = {
 
 @dataclass(frozen=True)
 class Leaf:
-    """One element.
-
-    Parameters
-    ----------
-    label
-        Its name.
-    picture
-        One of ``GLYPHS``.
-    """
+    """One element."""
 
     label: str
     picture: str
@@ -39,13 +31,7 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Row:
-    """Circuits in series: forces are equal, extensions add.
-
-    Parameters
-    ----------
-    items
-        From left to right.
-    """
+    """Circuits in series: forces are equal, extensions add."""
 
     items: tuple[Circuit, ...]
 
@@ -67,15 +53,7 @@ Circuit: TypeAlias = Leaf | Row | Stack
 
 
 def circuit_of(element: Element, label: str) -> Circuit:
-    """Return the circuit of an element.
-
-    Parameters
-    ----------
-    element
-        Single or combined.
-    label
-        Its name.
-    """
+    """Return the circuit of an element."""
     if isinstance(element, Through):
         name, behind = element.behind
         return Row((Leaf("cam", "cam"), circuit_of(behind, name)))
@@ -91,15 +69,7 @@ def circuit_of(element: Element, label: str) -> Circuit:
 
 
 def circuit_lines(circuit: Circuit, left: str, right: str) -> list[str]:
-    """Return a circuit between two ends as lines of text.
-
-    Parameters
-    ----------
-    circuit
-        From :func:`circuit_of`.
-    left, right
-        Names of the ends.
-    """
+    """Return a circuit between two ends as lines of text."""
     lines = _lines(circuit)
     ends = f"({left})", f"─({right})"
     rest = [" " * len(end) for end in ends]

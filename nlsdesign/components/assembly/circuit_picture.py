@@ -36,13 +36,7 @@ class Size(NamedTuple):
 
 
 def size_of(circuit: Circuit) -> Size:
-    """Return the size of a circuit in cells.
-
-    Parameters
-    ----------
-    circuit
-        From :func:`.circuit.circuit_of`.
-    """
+    """Return the size of a circuit in cells."""
     if isinstance(circuit, Leaf):
         return Size(1, 1)
     sizes = [size_of(item) for item in circuit.items]
@@ -72,12 +66,7 @@ class NotebookCircuits:
 def assembly_svg(name: str, parts: Sequence[tuple[str, Part]]) -> str:
     """Return all bodies, ties, gears and sensors as one picture, one line each, with their circuits.
 
-    Parameters
-    ----------
-    name
-        Of the assembly; the label for screen readers.
-    parts
-        Pairs of name and part.
+    ``name``: of the assembly; the label for screen readers.
     """
     drawn, top, width = [], 8.0, 0.0
     for label, part in parts:

@@ -22,14 +22,7 @@ _NARROWEST = 40
 def draw(title: str, parts: Sequence[tuple[str, Part]], *, width: int | None = None) -> str:
     """Return named parts with their circuits, and as a tree with their laws and numbers.
 
-    Parameters
-    ----------
-    title
-        First line.
-    parts
-        Pairs of name and body, gear, tie or sensor.
-    width
-        Most letters of a line; without it lines are as long as they are.
+    ``width``: most letters of a line; without it lines are as long as they are.
     """
     lines = [title]
     for name, part in parts:

@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
-from ...deck import NUMBER_FIELDS, Deck, ParentDeck
-from ...errors import ArrangementError, DeckError, NlsError, brief, nearest, unknown_name
-from ...extensions import extension_modules
-from ...quantity import Quantity
+from ...foundation.deck import NUMBER_FIELDS, Deck, ParentDeck
+from ...foundation.errors import ArrangementError, DeckError, NlsError, brief, nearest, unknown_name
+from ...foundation.extensions import extension_modules
+from ...foundation.quantity import Quantity
 from ..core.domain import Domain
 from ..core.element import Combination, Element
 from ..core.part import Part
@@ -43,11 +43,6 @@ def component_classes() -> dict[str, type[Part]]:
     """Return the components that a deck can name, by name: all public parts that are not abstract.
 
     Those of packages that the present block is extended by are among them.
-
-    Raises
-    ------
-    ArrangementError
-        If two of them have one name.
     """
     own, brought = _parts_in(_modules()), _parts_in(extension_modules())
     for name, kind in brought.items():
@@ -68,13 +63,7 @@ def _parts_in(modules: Sequence[ModuleType]) -> dict[str, type[Part]]:
 
 
 class Builder:
-    """Builds parts from tables and collects all problems.
-
-    Parameters
-    ----------
-    deck
-        As read.
-    """
+    """Builds parts from tables and collects all problems."""
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
@@ -82,15 +71,7 @@ class Builder:
         self.classes = component_classes()
 
     def part(self, path: str, table: Mapping[str, Any]) -> Part | None:
-        """Return the part of a table with all parts inside, ``None`` if there is a problem in it.
-
-        Parameters
-        ----------
-        path
-            Full name of the table.
-        table
-            As read.
-        """
+        """Return the part of a table with all parts inside, ``None`` if there is a problem in it."""
         before = len(self.problems)
         kind = self._kind(path, table)
         if kind is not None and takes_material(kind) and any(key in table for key in FIELDS):
@@ -120,14 +101,7 @@ class Builder:
     ) -> dict[str, Any]:
         """Return the numbers, readings and domain of a part; what it lacks or does not have are problems.
 
-        Parameters
-        ----------
-        path, table
-            As for :meth:`part`.
-        kind
-            The component.
-        inner
-            A part inside, whose domain is that of the numbers; ``None`` where there is none.
+        ``inner``: a part inside, whose domain is that of the numbers; ``None`` where there is none.
         """
         names, keys = kind.parameter_infos(), self._keys(path, kind)
         given: dict[str, Quantity] = {}
@@ -219,14 +193,7 @@ class Builder:
     def tied(self, name: str, element: Part | None, table: Mapping[str, Any]) -> Tie | None:
         """Return an element of the top level with the bodies at its ends.
 
-        Parameters
-        ----------
-        name
-            Of the table.
-        element
-            The element; its ends are checked even where it could not be made.
-        table
-            As read.
+        ``element``: the element; its ends are checked even where it could not be made.
         """
         ends = table.get("between")
         if not isinstance(ends, list) or not all(isinstance(end, str) for end in ends):
@@ -247,13 +214,7 @@ class Builder:
             return None
 
     def class_of(self, name: str) -> type[Part] | None:
-        """Return the component of a table of the top level, if there is such a component.
-
-        Parameters
-        ----------
-        name
-            Of the table.
-        """
+        """Return the component of a table of the top level, if there is such a component."""
         table = self.deck.tables[name]
         return self.classes.get(_text(table.get("component"))) if isinstance(table, dict) else None
 
@@ -305,15 +266,7 @@ class Builder:
     def problem(
         self, full_name: str, rule: str, *, did_you_mean: str | None = None, next_step: str | None = None
     ) -> None:
-        """Add a problem, with its place in the deck.
-
-        Parameters
-        ----------
-        full_name
-            What it is about.
-        rule, did_you_mean, next_step
-            As for :class:`~nlsdesign.errors.NlsError`.
-        """
+        """Add a problem, with its place in the deck."""
         place = self.deck.place(full_name)
         self.problems.append(DeckError(place, rule, did_you_mean=did_you_mean, next_step=next_step))
 

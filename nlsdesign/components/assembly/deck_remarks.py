@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from ...quantity import Quantity
+from ...foundation.quantity import Quantity
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
@@ -22,14 +22,9 @@ _FITTED = ".fitted_strain"
 def deck_remarks(machine: Assembly) -> list[str]:
     """Return what is lawful in a deck and likely to be a slip, each with the next step.
 
-    Parameters
-    ----------
-    machine
-        As declared.
-
     Examples
     --------
-    >>> from nlsdesign.deck import load_deck
+    >>> from nlsdesign.foundation.deck import load_deck
     >>> from nlsdesign.components.assembly.deck_writer import declare
     >>> deck_remarks(declare(load_deck("austin2015_as_printed")))
     []

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...deck import Deck, read_deck, template_names
-from ...errors import DeckError, NlsError, unknown_name
-from ...locations import folder
-from ...quantity import Quantity
+from ...foundation.deck import Deck, read_deck, template_names
+from ...foundation.errors import DeckError, NlsError, unknown_name
+from ...foundation.locations import folder
+from ...foundation.quantity import Quantity
 from ..mechanics.bodies import GearedMotor
 from ..mechanics.gear import Gear
 from ..mechanics.motor import ElectricMotor
@@ -29,17 +29,7 @@ _ASKED, _READY = "# Asked: ", "# Ready for: "
 
 @dataclass(frozen=True)
 class AskedNumber:
-    """A number that a template asks for.
-
-    Parameters
-    ----------
-    name
-        Full name.
-    meaning
-        One line.
-    usual
-        The number of the template.
-    """
+    """A number that a template asks for."""
 
     name: str
     meaning: str
@@ -91,18 +81,8 @@ class DeckTemplate:
 
         That is the inertia of the motor, and one count of an encoder on its rotor.
 
-        Parameters
-        ----------
-        at
-            Of this template.
-        numbers
-            In place of those of the template, by full name.
-
-        Returns
-        -------
-        dict
-            Numbers by name, without those that are given; empty where the ratio is that of the template, or
-            where the motor stands in front of the gear, so that no gear changes what is seen there.
+        Result: numbers by name, without those that are given; empty where the ratio is that of the template,
+        or where the motor stands in front of the gear, so that no gear changes what is seen there.
         """
         if at.place == ROTOR or at.ratio not in numbers or numbers[at.ratio].number <= 0.0:
             return {}
@@ -128,23 +108,8 @@ class DeckTemplate:
     ) -> str:
         """Return the text of a deck of one's own; it was read once and declares a machine.
 
-        Parameters
-        ----------
-        name
-            Of the deck.
-        numbers
-            In place of those of the template, by full name; one without a spread keeps that of the template.
-        material
-            Rubber of the library, in place of that of the template.
-
-        Raises
-        ------
-        UnknownNameError
-            If the template has no such number.
-        DeckError
-            If a rubber is named and the template has none.
-        NlsError
-            If the deck does not declare a machine with these numbers.
+        ``numbers``: in place of those of the template, by full name; one without a spread keeps that of the
+        template.
         """
         deck, lines = self.deck, self.text.splitlines()
         for full, given in (numbers or {}).items():
@@ -175,18 +140,7 @@ class DeckTemplate:
 
 
 def load_template(name: str) -> DeckTemplate:
-    """Return a template.
-
-    Parameters
-    ----------
-    name
-        One of :func:`nlsdesign.deck.template_names`.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest name that exists.
-    """
+    """Return a template."""
     if name not in template_names():
         raise unknown_name("template", name, template_names())
     path = folder("models") / "templates" / f"{name}.toml"
@@ -215,17 +169,7 @@ class MotorInertia:
     counts: tuple[str, ...] = ()
 
     def converted(self, given: Quantity, *, at: str, ratio: Quantity) -> Quantity:
-        """Return an inertia as the component takes it; the source says how it was converted.
-
-        Parameters
-        ----------
-        given
-            Inertia.
-        at
-            ``"rotor"`` or ``"output"``: where it was given.
-        ratio
-            Of the gear.
-        """
+        """Return an inertia as the component takes it; the source says how it was converted."""
         if at == self.place:
             return replace(given, source=f"{given.source}, at the {at}")
         squared = ratio.number**2
@@ -242,13 +186,7 @@ class MotorInertia:
 
 
 def motor_inertia(machine: Assembly) -> MotorInertia | None:
-    """Return where a machine holds the inertia of its motor; ``None`` where there is no gear.
-
-    Parameters
-    ----------
-    machine
-        As declared.
-    """
+    """Return where a machine holds the inertia of its motor; ``None`` where there is no gear."""
     for name, part in machine.parts:
         if isinstance(part, GearedMotor):
             angle = f"{name}.angle"
@@ -265,13 +203,7 @@ def motor_inertia(machine: Assembly) -> MotorInertia | None:
 
 
 def plain_name(text: str) -> str:
-    """Return a name for a deck from the name of its file.
-
-    Parameters
-    ----------
-    text
-        Any.
-    """
+    """Return a name for a deck from the name of its file."""
     return re.sub(r"\W+", "_", text).strip("_") or "deck"
 
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...deck import Deck, ParentDeck
-from ...errors import DeckError, NlsError, nearest
-from ...quantity import Quantity
-from ...writing import write_text
+from ...foundation.deck import Deck, ParentDeck
+from ...foundation.errors import DeckError, NlsError, nearest
+from ...foundation.quantity import Quantity
+from ...foundation.text_files import write_text
 from ..core.element import Element
 from ..core.part import Part
 from ..core.tie import Tie
@@ -23,13 +23,7 @@ from .sensor_chains import source_problems
 
 
 def deck_problems(deck: Deck) -> list[NlsError]:
-    """Return all problems of a deck, each with file, line and column.
-
-    Parameters
-    ----------
-    deck
-        As read.
-    """
+    """Return all problems of a deck, each with file, line and column."""
     return _declared(deck)[1]
 
 
@@ -78,13 +72,7 @@ def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
 
 
 def deck_text(assembly: Assembly) -> str:
-    """Return an assembly as the text of a deck.
-
-    Parameters
-    ----------
-    assembly
-        Parts, made in Python or read from another deck.
-    """
+    """Return an assembly as the text of a deck."""
     lines = ["[deck]", f"name = {text_of(assembly.name)}", f"description = {text_of(assembly.description)}"]
     if assembly.parent:
         lines.append(f"parent = {_parent(assembly.parent)}")
@@ -97,13 +85,6 @@ def deck_digest(assembly: Assembly, changed: Mapping[str, Quantity] | None = Non
     Every number, unit, source, spread and the arrangement count; the table ``[deck]``, with name, description
     and parent, does not: the same machine under another name has the same digest. Comments and the order of
     the fields of a part do not count either. The order of parts does, for it is the order of the variables.
-
-    Parameters
-    ----------
-    assembly
-        Parts, made in Python or read from a deck.
-    changed
-        Numbers that stand in place of those of the parts, by full name.
     """
     lines = _parts_lines(assembly, changed or {})
     return hashlib.sha256(("\n".join(lines) + "\n").encode()).hexdigest()
@@ -145,24 +126,7 @@ def write_deck(assembly: Assembly, path: Path) -> None:
 
 
 def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
-    """Return the numbers and readings that stand directly in one table of a deck, by field name.
-
-    Parameters
-    ----------
-    deck
-        As read.
-    path
-        Full name of the table, for instance ``"spring.rubber"``.
-    kind
-        The component that the numbers are for.
-
-    Raises
-    ------
-    DeckError
-        If the table is missing or is another component.
-    NlsError
-        If a number is missing, unknown or not valid.
-    """
+    """Return the numbers and readings that stand directly in one table of a deck, by field name."""
     table: Any = deck.tables
     for step in path.split("."):
         table = table.get(step) if isinstance(table, dict) else None
@@ -179,20 +143,7 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
 
 
 def require_same_numbers(assembly: Assembly, deck: Deck) -> Assembly:
-    """Return the assembly if it has used every number of the deck.
-
-    Parameters
-    ----------
-    assembly
-        Made from the deck by a function.
-    deck
-        Where the numbers came from.
-
-    Raises
-    ------
-    DeckError
-        If the deck declares a number that the assembly does not have.
-    """
+    """Return the assembly if it has used every number of the deck."""
     for name in deck.numbers():
         if name not in assembly.quantities():
             raise DeckError(

@@ -6,8 +6,8 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from ...deck import Deck, Written
-from ...errors import DeckError, NlsError
+from ...foundation.deck import Deck, Written
+from ...foundation.errors import DeckError, NlsError
 from ..materials.library import material
 from ..materials.material_law import MaterialLaw, law_of
 from ..materials.relaxing_rubber import relaxing_law_of
@@ -24,22 +24,6 @@ def with_library_rubber(deck: Deck, path: str, table: Mapping[str, Any]) -> dict
 
     What stands in the table itself comes first: a number of its own, a law in a table of the same name (with
     a component it replaces the law of the library, without one it changes numbers of it), a further law.
-
-    Parameters
-    ----------
-    deck
-        For messages.
-    path
-        Full name of the table.
-    table
-        As read, with ``material``.
-
-    Raises
-    ------
-    DeckError
-        If a field is not a text, or there is nothing that the field could belong to.
-    NlsError
-        If there is no such rubber, with the nearest, or nothing that is known of it gives a law.
     """
     own = {key: raw for key, raw in table.items() if key not in FIELDS}
     for key in (MATERIAL, USING):
@@ -92,11 +76,5 @@ def _merged(known: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def takes_material(kind: type) -> bool:
-    """Tell whether a component can be made of a rubber of the library.
-
-    Parameters
-    ----------
-    kind
-        The component.
-    """
+    """Tell whether a component can be made of a rubber of the library."""
     return issubclass(kind, Specimen)

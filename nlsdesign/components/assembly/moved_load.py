@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import ArrangementError
+from ...foundation.errors import ArrangementError
 from ..core.tie import Tie
 from ..mechanics.bodies import Driven, Fixed
 from ..sensing.sensors import Encoder
@@ -15,17 +15,7 @@ def with_moved_load(actuator: Assembly, load: str | None = None) -> Assembly:
     Where an encoder reads another body, one with the same count reads the load. An assembly whose load is
     moved already comes back as it is.
 
-    Parameters
-    ----------
-    actuator
-        With a fixed body at an end of an element.
-    load
-        Name of that body; the only one if it is left out.
-
-    Raises
-    ------
-    ArrangementError
-        If there is no fixed body, or several, and none is named.
+    ``load``: name of that body; the only one if it is left out.
     """
     parts = dict(actuator.parts)
     if load is None and any(isinstance(part, Driven) for part in parts.values()):

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...deck import ParentDeck
-from ...errors import ArrangementError, NlsError, unknown_name, visible
-from ...quantity import Quantity
+from ...foundation.deck import ParentDeck
+from ...foundation.errors import ArrangementError, NlsError, unknown_name, visible
+from ...foundation.quantity import Quantity
 from ..core.element import Element, Parallel
 from ..core.part import LONGEST, Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from ..core.tie import Tie
@@ -66,13 +66,7 @@ class Assembly(NotebookCircuits):
             )
 
     def __getitem__(self, path: str) -> Part:
-        """Return the part at a path.
-
-        Parameters
-        ----------
-        path
-            For instance ``"spring.rubber"``.
-        """
+        """Return the part at a path."""
         for where, part in self.walk():
             if where == path:
                 return part
@@ -237,12 +231,7 @@ def arrangement_problems(
 ) -> Iterator[tuple[str, NlsError]]:
     """Yield the problems of an arrangement of parts, each with the name of the part.
 
-    Parameters
-    ----------
-    parts
-        Pairs of name and part.
-    unreadable
-        Names of parts that are declared but could not be read; ties to them are not judged.
+    ``unreadable``: names of parts that are declared but could not be read; ties to them are not judged.
     """
     bodies = {name: part for name, part in parts if isinstance(part, Body)}
     for name, part in parts:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import ArrangementError, unknown_name
+from ...foundation.errors import ArrangementError, unknown_name
 from ..core.tie import Tie
 from ..materials.library import Material
 from ..materials.loss_tangent import Relaxation
@@ -50,7 +50,7 @@ def with_rubber(
     --------
     >>> from nlsdesign.components import material
     >>> from nlsdesign.components.assembly.deck_writer import declare
-    >>> from nlsdesign.deck import load_deck
+    >>> from nlsdesign.foundation.deck import load_deck
     >>> published = declare(load_deck("austin2015_as_printed"))
     >>> softer = with_rubber(published, material("Dragon_Skin_30"))
     >>> [quantity.source[:24] for name, quantity in softer.quantities().items() if name.endswith("modulus")]

@@ -8,27 +8,15 @@ from decimal import Context
 from fractions import Fraction
 from itertools import chain
 
-from ...deck import Written
-from ...quantity import Quantity, parse_unit
+from ...foundation.deck import Written
+from ...foundation.quantity import Quantity, parse_unit
 from ..core.part import Part
 
 
 def part_lines(
     path: str, part: Part, *, structure: Sequence[str] = (), changed: Mapping[str, Quantity] | None = None
 ) -> list[str]:
-    """Return the lines of a part and of everything in it, the first one empty.
-
-    Parameters
-    ----------
-    path
-        Full name of the table.
-    part
-        As declared.
-    structure
-        Lines that say where the part sits, such as ``between = ["motor"]``.
-    changed
-        Numbers that stand in place of those of the parts, by full name.
-    """
+    """Return the lines of a part and of everything in it, the first one empty."""
     new = changed or {}
     lines = ["", f"[{path}]", f"component = {text_of(type(part).__name__)}", *structure]
     domain = part.stated_domain()
@@ -42,13 +30,7 @@ def part_lines(
 
 
 def number_of(given: Quantity) -> str:
-    """Return a number as an inline table that reads back as the same number.
-
-    Parameters
-    ----------
-    given
-        With unit, source and spread.
-    """
+    """Return a number as an inline table that reads back as the same number."""
     factor = parse_unit(given.unit).factor
     items = [_shortest(v, factor) for v in given.values]
     value = "[" + ", ".join(items) + "]" if isinstance(given.value, tuple) else items[0]
@@ -57,13 +39,7 @@ def number_of(given: Quantity) -> str:
 
 
 def text_of(text: str) -> str:
-    """Return a text as TOML writes it, which is as JSON does but for the delete character.
-
-    Parameters
-    ----------
-    text
-        Any.
-    """
+    """Return a text as TOML writes it, which is as JSON does but for the delete character."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...errors import UnknownNameError
+from ...foundation.errors import UnknownNameError
 
 COMPONENTS: dict[str, str] = {
     "CableGuide": "CapstanFriction with guide=WrapProduct(wrap=...); in a deck with wrap",
@@ -40,13 +40,7 @@ NUMBERS: dict[str, str] = {"sliding_force": "sliding_effort", "sliding_torque": 
 
 
 def renamed(name: str) -> UnknownNameError | None:
-    """Return the error that says the new name of a component; ``None`` if the name was never one.
-
-    Parameters
-    ----------
-    name
-        As written.
-    """
+    """Return the error that says the new name of a component; ``None`` if the name was never one."""
     if name not in COMPONENTS:
         return None
     return UnknownNameError(

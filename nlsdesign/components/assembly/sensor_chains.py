@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from ...errors import ArrangementError, NlsError, unknown_name
+from ...foundation.errors import ArrangementError, NlsError, unknown_name
 from ..core.element import Element
 from ..core.part import Part, walk
 from ..core.tie import Tie
@@ -15,17 +15,7 @@ from ..sensing.sensors import Sensor
 def sensors_behind(sensors: Mapping[str, Sensor], signal: str) -> tuple[str, tuple[str, ...]]:
     """Return what a signal shows, and the sensors between, the one that gives the reading first.
 
-    Parameters
-    ----------
-    sensors
-        By name.
-    signal
-        Full name; a signal that is not the reading of a sensor shows itself.
-
-    Raises
-    ------
-    ArrangementError
-        If the sensors read one another in a circle.
+    ``signal``: full name; a signal that is not the reading of a sensor shows itself.
     """
     readings = {f"{name}.reading": name for name in sensors}
     chain: list[str] = []
@@ -39,13 +29,7 @@ def sensors_behind(sensors: Mapping[str, Sensor], signal: str) -> tuple[str, tup
 
 
 def chain_problems(parts: Sequence[tuple[str, Part]]) -> Iterator[tuple[str, NlsError]]:
-    """Yield the chains of sensors that never reach a signal, with the name of the sensor.
-
-    Parameters
-    ----------
-    parts
-        Pairs of name and part.
-    """
+    """Yield the chains of sensors that never reach a signal, with the name of the sensor."""
     sensors = {name: part for name, part in parts if isinstance(part, Sensor)}
     order = list(sensors)
     for place, (name, sensor) in enumerate(sensors.items()):
@@ -72,12 +56,8 @@ def source_problems(
 ) -> Iterator[tuple[str, NlsError]]:
     """Yield the sensors that read what no part can have, with the name of the sensor.
 
-    Parameters
-    ----------
-    parts
-        Pairs of name and part.
-    unsure
-        Names of parts that are there but could not be read; nothing is said of sensors that read them.
+    ``unsure``: names of parts that are there but could not be read; nothing is said of sensors that read
+    them.
     """
     paths = {path: inner for name, part in parts for path, inner in walk(part, name)}
     for name, sensor in parts:

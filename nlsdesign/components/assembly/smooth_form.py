@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ...errors import unknown_name
+from ...foundation.errors import unknown_name
 from ..core.contacts import Regularised, Rounded, Sharp, WithCorners, WithFriction
 from ..core.element import Element
 from ..core.part import Part
@@ -57,11 +57,6 @@ def sharpened(assembly: Assembly) -> Assembly:
     """Return the assembly with every law that was declared rounded in its sharp form.
 
     Dry friction sticks, corners are corners; simulation locates where they change.
-
-    Parameters
-    ----------
-    assembly
-        Parts.
 
     Examples
     --------

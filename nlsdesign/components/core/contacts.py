@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression, positive_part, smooth_sign
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, positive_part, smooth_sign
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import Element, Scope
 from .part_numbers import Reading, parameter, read_as

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import Element, Scope
 from .part_numbers import one_of, parameter

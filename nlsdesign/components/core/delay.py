@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from .element import Scope
 
 
@@ -13,14 +13,7 @@ def delayed(scope: Scope, value: Expression, unit: str) -> Expression:
     lies below (ωτ)⁵/720: 4e-5 rad at ωτ = 0.5. The states are a, which rests at the value, and b = τ·ȧ; the
     delayed value is v − b. Source: Golub and Van Loan 2013 (Padé table of the exponential).
 
-    Parameters
-    ----------
-    scope
-        Of a part with a number ``delay`` in s; takes the states ``lag`` and ``lag_change``.
-    value
-        What is delayed.
-    unit
-        Its unit.
+    ``scope``: of a part with a number ``delay`` in s; takes the states ``lag`` and ``lag_change``.
     """
     tau = scope.parameter("delay")
     lag = scope.state("lag", unit, f"lagging value inside the delay of {scope.path}")

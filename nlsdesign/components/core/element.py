@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol, Self, TypeAlias
 
-from ...errors import ArrangementError
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError
+from ...foundation.symbolic import Expression
 from .domain import MATERIAL as MATERIAL
 from .domain import ROTATION as ROTATION
 from .domain import TRANSLATION as TRANSLATION
@@ -150,13 +150,7 @@ class Element(Part):
 
 
 def observed_effort(element: Element, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-    """Return the effort of an element and give names to its motion and effort.
-
-    Parameters
-    ----------
-    element, scope, motion, rate
-        As for :meth:`Element.effort`.
-    """
+    """Return the effort of an element and give names to its motion and effort."""
     effort = element.effort(scope, motion, rate)
     domain = element.domain
     if element.dissipates:

@@ -9,8 +9,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-from ...errors import ArrangementError, UnitError, unknown_name
-from ...quantity import Quantity, same_dimension, typeset_unit
+from ...foundation.errors import ArrangementError, UnitError, unknown_name
+from ...foundation.quantity import Quantity, same_dimension, typeset_unit
 from .domain import Domain
 from .part_numbers import ParameterInfo as ParameterInfo
 from .part_numbers import Reading, Template, domain_by_units, readings, templates
@@ -166,22 +166,7 @@ def _short(given: Quantity) -> str:
 
 
 def check_names(owner: str, names: Sequence[str], taken: Collection[str] = ()) -> None:
-    """Check that names of parts are plain words, used once.
-
-    Parameters
-    ----------
-    owner
-        What holds the parts, for messages.
-    names
-        As given.
-    taken
-        Names that mean something else there.
-
-    Raises
-    ------
-    ArrangementError
-        If a name cannot stand in a deck, or stands there twice.
-    """
+    """Check that names of parts are plain words, used once."""
     for number, name in enumerate(names):
         if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
             raise ArrangementError(
@@ -200,30 +185,14 @@ def check_names(owner: str, names: Sequence[str], taken: Collection[str] = ()) -
 
 
 def walk(part: Part, path: str = "") -> Iterator[tuple[str, Part]]:
-    """Yield every part with its path, parents first, in written order.
-
-    Parameters
-    ----------
-    part
-        Root.
-    path
-        Path of the root.
-    """
+    """Yield every part with its path, parents first, in written order."""
     yield path, part
     for name, child in part.children().items():
         yield from walk(child, f"{path}.{name}" if path else name)
 
 
 def quantities(part: Part, path: str = "") -> dict[str, Quantity]:
-    """Return all numbers of a part and everything in it by full name.
-
-    Parameters
-    ----------
-    part
-        Root.
-    path
-        Path of the root.
-    """
+    """Return all numbers of a part and everything in it by full name."""
     by_name: dict[str, Quantity] = {}
     for where, each in walk(part, path):
         by_name |= {f"{where}.{name}" if where else name: q for name, q in each.parameters().items()}
@@ -231,20 +200,7 @@ def quantities(part: Part, path: str = "") -> dict[str, Quantity]:
 
 
 def find(part: Part, path: str) -> Part:
-    """Return the part at a path.
-
-    Parameters
-    ----------
-    part
-        Root.
-    path
-        Names joined by dots.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest path that exists.
-    """
+    """Return the part at a path."""
     parts = dict(walk(part))
     if path not in parts:
         raise unknown_name("part", path, (name for name in parts if name))
@@ -254,14 +210,7 @@ def find(part: Part, path: str) -> Part:
 def replaced(part: Part, path: str, new: Part) -> Part:
     """Return a copy in which the part at a path is another one.
 
-    Parameters
-    ----------
-    part
-        Root.
-    path
-        Where; the empty path is the root itself.
-    new
-        The part to put there.
+    ``path``: where; the empty path is the root itself.
     """
     if not path:
         return new
@@ -272,20 +221,7 @@ def replaced(part: Part, path: str, new: Part) -> Part:
 
 
 def with_values(part: Part, values: Mapping[str, Quantity | float | tuple[float, ...]]) -> Part:
-    """Return a copy with other numbers.
-
-    Parameters
-    ----------
-    part
-        Root.
-    values
-        As for :func:`resolved`.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest name that exists.
-    """
+    """Return a copy with other numbers."""
     changes: dict[str, dict[str, Quantity]] = {}
     for name, value in resolved(quantities(part), values).items():
         owner, _, field_name = name.rpartition(".")
@@ -302,18 +238,8 @@ def resolved(
 ) -> dict[str, Quantity]:
     """Return new numbers as whole quantities by full name.
 
-    Parameters
-    ----------
-    known
-        The numbers as they are.
-    values
-        Quantities, or numbers in SI, by full name; ``name[3]`` is the third of a row. A number without a
-        source says so, and what the old source spoke of.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest name that exists.
+    ``values``: quantities, or numbers in SI, by full name; ``name[3]`` is the third of a row. A number
+    without a source says so, and what the old source spoke of.
     """
     changed: dict[str, Quantity] = {}
     for name, value in values.items():

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeAlias
 
-from ...errors import ArrangementError, UnitError, ValueRangeError
-from ...quantity import Quantity, parse_unit, same_dimension, with_unit
+from ...foundation.errors import ArrangementError, UnitError, ValueRangeError
+from ...foundation.quantity import Quantity, parse_unit, same_dimension, with_unit
 from .domain import Domain
 
 Given: TypeAlias = Quantity | float | tuple[float, ...] | list[float]
@@ -52,22 +52,7 @@ class ParameterInfo:
     whole: bool = False
 
     def checked(self, name: str, given: Given) -> Quantity:
-        """Return the number as a quantity of the right dimension and size.
-
-        Parameters
-        ----------
-        name
-            Name of the field, for messages.
-        given
-            A quantity, or bare number(s) in SI.
-
-        Raises
-        ------
-        UnitError
-            If the unit measures something else.
-        ValueRangeError
-            If a number lies outside the range, or a row stands where one number belongs.
-        """
+        """Return the number as a quantity of the right dimension and size."""
         result = given if isinstance(given, Quantity) else Quantity(given, self.unit)  # type: ignore[arg-type]
         if isinstance(result.value, tuple) and not self.row:
             raise ValueRangeError(
@@ -146,10 +131,7 @@ class Template:
     def within(self, domain: Domain | None) -> ParameterInfo:
         """Return what is said of the number in a domain.
 
-        Parameters
-        ----------
-        domain
-            Of the part; ``None`` where it has none and the unit is the same everywhere.
+        ``domain``: of the part; ``None`` where it has none and the unit is the same everywhere.
         """
         if domain is None:
             least, most = _of(self.minimum), _of(self.maximum)
@@ -178,20 +160,9 @@ def parameter(
 ) -> Any:
     """Declare a number of a part as a dataclass field.
 
-    Parameters
-    ----------
-    unit
-        SI unit; in a law of several domains a template, for instance ``"{effort}/{motion}"``.
-    description
-        Meaning in words, without an article.
-    minimum, maximum
-        Inclusive range, one for all domains or one for each.
-    default
-        Value in SI where there is a natural one; such a value is marked as assumed. Not for a template.
-    row
-        Whether it may be a row of numbers.
-    whole
-        Whether it counts something.
+    ``unit``: SI unit; in a law of several domains a template, for instance ``"{effort}/{motion}"``.
+    ``default``: value in SI where there is a natural one; such a value is marked as assumed. Not for a
+    template.
     """
     template = Template(unit, description, minimum, maximum, row, whole)
     if default is None:
@@ -201,13 +172,7 @@ def parameter(
 
 
 def templates(kind: type) -> dict[str, Template]:
-    """Return what a class says of each of its own numbers, by field name.
-
-    Parameters
-    ----------
-    kind
-        A dataclass.
-    """
+    """Return what a class says of each of its own numbers, by field name."""
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(kind) if "parameter" in f.metadata}
 
 
@@ -252,12 +217,7 @@ class NotDeclared(Reading):
 def read_as(*kinds: type[Reading], default: Reading | None = None) -> Any:
     """Declare the field of a part that holds one of several readings.
 
-    Parameters
-    ----------
-    *kinds
-        Classes that may stand there; none has a number of the same name as another.
-    default
-        Reading where none is given.
+    ``kinds``: classes that may stand there; none has a number of the same name as another.
     """
     if default is None:
         return dataclasses.field(metadata={"readings": kinds})
@@ -265,13 +225,7 @@ def read_as(*kinds: type[Reading], default: Reading | None = None) -> Any:
 
 
 def readings(kind: type) -> dict[str, tuple[type[Reading], ...]]:
-    """Return the classes of readings that each field of a class may hold, by field name.
-
-    Parameters
-    ----------
-    kind
-        A dataclass.
-    """
+    """Return the classes of readings that each field of a class may hold, by field name."""
     return {f.name: f.metadata["readings"] for f in dataclasses.fields(kind) if "readings" in f.metadata}
 
 
@@ -279,11 +233,6 @@ def one_of(*domains: Domain) -> Any:
     """Declare the field ``domain`` of a part that can be in several.
 
     Where none is given the units of the numbers tell it, and where no number has a unit it is the first.
-
-    Parameters
-    ----------
-    *domains
-        The usual one first.
     """
     return dataclasses.field(default=None, metadata={"domains": domains})
 
@@ -294,15 +243,6 @@ def domain_by_units(
     """Return the domain whose units most of the given quantities have; the first of several.
 
     A number that then does not fit is refused where it is checked.
-
-    Parameters
-    ----------
-    domains
-        To choose from.
-    named
-        What is said of each number.
-    given
-        Quantities, or bare numbers, which tell nothing.
     """
     units = {n: q.unit for n, q in given.items() if isinstance(q, Quantity)}
 

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from .element import UNBOUNDED, Range, Scope
 from .switches import StictionConstraint
 
 
 class Forwarding:
-    """A scope that hands everything that has no time in it to another one.
-
-    Parameters
-    ----------
-    scope
-        The other one.
-    """
+    """A scope that hands everything that has no time in it to another one."""
 
     def __init__(self, scope: Scope) -> None:
         self._scope, self.path = scope, scope.path
@@ -69,15 +63,7 @@ class Forwarding:
 
 
 class ReducedTime(Forwarding):
-    """Rates inside are per reduced time ξ, with dξ = dt/a_T.
-
-    Parameters
-    ----------
-    scope
-        In real time.
-    factor
-        a_T.
-    """
+    """Rates inside are per reduced time ξ, with dξ = dt/a_T."""
 
     def __init__(self, scope: Scope, factor: Expression) -> None:
         super().__init__(scope)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...symbolic import Expression, depends, solve_monotone, symbol
+from ...foundation.symbolic import Expression, depends, solve_monotone, symbol
 from .element import Combination, Element, Scope, observed_effort
 from .series_split import split
 

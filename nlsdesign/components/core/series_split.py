@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from ...symbolic import NEWTON_STEPS, Expression, depends
+from ...foundation.symbolic import NEWTON_STEPS, Expression, depends
 
 _SOFTEST = 1e-9
 """Smallest slope relative to the largest that is believed; where a member is flat, it takes what is asked."""
@@ -20,15 +20,6 @@ def split(efforts: Sequence[Expression], shares: Sequence[Expression], whole: Ex
     number of members and not with its power. A step that goes beyond the minimum of the energy along itself
     is cut back, to half at least. The last step starts from the best point found and is never cut, so the
     derivative is that of the implicit function.
-
-    Parameters
-    ----------
-    efforts
-        Each in its own share, which it rises with.
-    shares
-        Symbols.
-    whole
-        Sum of the shares.
     """
     unknowns = ca.vertcat(*shares)
     stacked = ca.vertcat(*efforts)

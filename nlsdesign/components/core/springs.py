@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, positive_part
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, positive_part
 from .contacts import WithCorners
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import UNBOUNDED, Element, Range, Scope
@@ -168,18 +168,7 @@ class StrainStiffening(WithCorners, FittedLaw):
 
 
 def check_knots(modulus: Quantity, knots: Quantity) -> None:
-    """Check that there is one knot per modulus, in ascending order.
-
-    Parameters
-    ----------
-    modulus, knots
-        Rows of numbers.
-
-    Raises
-    ------
-    ValueRangeError
-        If the rows differ in length or knots cross.
-    """
+    """Check that there is one knot per modulus, in ascending order."""
     if len(modulus.values) != len(knots.values):
         raise ValueRangeError(
             f"knots ({len(knots.values)}) and modulus ({len(modulus.values)})",

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import casadi as ca
 
-from ...symbolic import Expression, symbol
+from ...foundation.symbolic import Expression, symbol
 
 
 @dataclass(frozen=True)
@@ -117,19 +117,7 @@ class Switches(Protocol):
 def dry(
     scope: Switches, rate: Expression, slipping: Callable[[Expression], Expression], sticking: Expression
 ) -> Expression:
-    """Return the effort of dry friction with true sticking.
-
-    Parameters
-    ----------
-    scope
-        Of the element.
-    rate
-        Relative rate of the two sides.
-    slipping
-        Takes the size of the rate and returns that of the effort.
-    sticking
-        Largest effort at which the two sides stick.
-    """
+    """Return the effort of dry friction with true sticking."""
     mode, effort = symbol(f"{scope.path}.mode"), symbol(f"{scope.path}.holding")
     return scope.stiction(
         StictionConstraint(

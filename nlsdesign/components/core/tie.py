@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Self
 
-from ...errors import ArrangementError
-from ...quantity import Quantity
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
 from .element import Element
 from .part import Part
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import Range, Scope
 from ..core.part import parameter
 from .hyperelastic import Hyperelastic

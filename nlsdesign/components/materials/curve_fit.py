@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, significant
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, significant
 from ..core.contacts import Rounded
 from ..core.springs import FittedLaw, FittedRange, StrainStiffening
 from .hyperelastic import Ogden, Yeoh
-
-Floats = NDArray[np.float64]
 
 _EXPONENTS = (
     *(-8.0, -6.0, -5.0, -4.0, -3.0, -2.5, -2.0),
@@ -58,20 +56,6 @@ def fit_curve(strains: Sequence[float], stresses: Sequence[float], *, like: Quan
     chosen, so the least of all choices is found, without a start. A law whose stress falls within the range
     is not taken. The law is stated to hold up to the last strain. Sources: Yeoh 1993; Ogden 1972; Austin et
     al. 2015, eq. (1); Lawson and Hanson 1974 (least squares with constants that are not negative).
-
-    Parameters
-    ----------
-    strains
-        Nominal, ascending from above zero, shape (n,), n ≥ 2.
-    stresses
-        Nominal, in Pa, positive, shape (n,).
-    like
-        Gives the constants their source and their spread.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are fewer than two points, or they do not ascend from zero.
     """
     strain, stress = np.asarray(strains, dtype=float), np.asarray(stresses, dtype=float)
     if len(strain) < 2 or len(strain) != len(stress) or np.any(np.diff(strain, prepend=0.0) <= 0.0):
@@ -87,11 +71,11 @@ def fit_curve(strains: Sequence[float], stresses: Sequence[float], *, like: Quan
     return min(fits, key=lambda fit: round(fit.rms_error, 4))
 
 
-def _judged(law: FittedLaw, errors: Floats) -> CurveFit:
+def _judged(law: FittedLaw, errors: Array) -> CurveFit:
     return CurveFit(law, float(np.sqrt(np.mean(errors**2))), float(np.max(np.abs(errors))))
 
 
-def _yeoh(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[FittedLaw, Floats]]:
+def _yeoh(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[FittedLaw, Array]]:
     if len(strain) < _MOST:
         return
     columns = _yeoh_columns(strain)
@@ -103,13 +87,13 @@ def _yeoh(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[Fitt
         yield Yeoh(c1=c1, c2=c2, c3=c3, data=_range(strain, like)), columns @ constants
 
 
-def _yeoh_columns(strain: Floats) -> Floats:
+def _yeoh_columns(strain: Array) -> Array:
     stretch = 1.0 + strain
     first, slope = stretch**2 + 2.0 / stretch - 3.0, 2.0 * stretch - 2.0 / stretch**2
     return np.stack([slope, 2.0 * first * slope, 3.0 * first**2 * slope], axis=1)
 
 
-def _ogden(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[FittedLaw, Floats]]:
+def _ogden(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[FittedLaw, Array]]:
     stretch, exponents = 1.0 + strain[:, None], np.array(_EXPONENTS)
     columns = np.sign(exponents) * (stretch ** (exponents - 1.0) - stretch ** (-exponents / 2.0 - 1.0))
     chosen, sizes = _fewest(columns, stress, first=())
@@ -122,7 +106,7 @@ def _ogden(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[Fit
     yield law, columns[:, chosen] @ sizes
 
 
-def _engaging(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[FittedLaw, Floats]]:
+def _engaging(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[FittedLaw, Array]]:
     width = significant([_ROUNDING * float(np.min(np.diff(strain)))], 2)[0]
     knots = np.array([0.0, *strain[:-1]])
     rounded = _positive(strain[:, None] - knots, width) - _positive(-knots, width)
@@ -137,22 +121,15 @@ def _engaging(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[
     yield law, columns[:, chosen] @ sizes
 
 
-def _positive(value: Floats, width: float) -> Floats:
-    softened: Floats = width * np.logaddexp(0.0, value / width)
+def _positive(value: Array, width: float) -> Array:
+    softened: Array = width * np.logaddexp(0.0, value / width)
     return softened
 
 
-def _fewest(columns: Floats, stress: Floats, *, first: tuple[int, ...]) -> tuple[list[int], Floats]:
+def _fewest(columns: Array, stress: Array, *, first: tuple[int, ...]) -> tuple[list[int], Array]:
     """Return the columns that follow a curve best with sizes that are not negative, and the sizes.
 
-    Parameters
-    ----------
-    columns
-        Shape (n, m).
-    stress
-        Shape (n,).
-    first
-        Columns that are always there.
+    ``columns``: shape (n, m).
     """
     count = max(1, min(_MOST, len(stress) // 2))
     relative, ones = columns / stress[:, None], np.ones(len(stress))
@@ -164,7 +141,7 @@ def _fewest(columns: Floats, stress: Floats, *, first: tuple[int, ...]) -> tuple
     return [i for i, _ in kept], np.array([size for _, size in kept])
 
 
-def _short(constants: Floats) -> Floats:
+def _short(constants: Array) -> Array:
     """Return constants rounded each by itself: a small one can act at a large power."""
     return np.array([significant([constant], _DIGITS)[0] for constant in constants])
 
@@ -177,5 +154,5 @@ def _constant(
     )
 
 
-def _range(strain: Floats, like: Quantity) -> FittedRange:
+def _range(strain: Array, like: Quantity) -> FittedRange:
     return FittedRange(Quantity(float(strain[-1]), "1", like.source))

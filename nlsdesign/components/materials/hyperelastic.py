@@ -15,9 +15,9 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, symbol
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, symbol
 from ..core.element import MATERIAL, Domain, Range, Scope
 from ..core.part import parameter
 from ..core.springs import FittedLaw

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...deck import NUMBER_FIELDS, Deck, read_deck
-from ...errors import DeckError, nearest, unknown_name
-from ...extensions import extension_files
-from ...locations import folder
-from ...quantity import Quantity, same_dimension, with_unit
-from ...reading import text_of
+from ...foundation.deck import NUMBER_FIELDS, Deck, read_deck
+from ...foundation.errors import DeckError, nearest, unknown_name
+from ...foundation.extensions import extension_files
+from ...foundation.locations import folder
+from ...foundation.quantity import Quantity, same_dimension, with_unit
+from ...foundation.text_files import text_of
 
 EVIDENCE = ("measured curve", "data sheet", "range")
 """Grades of evidence, best first."""
@@ -49,13 +49,7 @@ class Property:
     conditions: Mapping[str, Quantity]
 
     def at(self, condition: str) -> str:
-        """Return a condition as text; a dash where the source does not state it.
-
-        Parameters
-        ----------
-        condition
-            For instance ``"frequency"``.
-        """
+        """Return a condition as text; a dash where the source does not state it."""
         return self._text(self.conditions[condition]) if condition in self.conditions else "–"
 
     @property
@@ -95,18 +89,7 @@ class Material:
     properties: tuple[Property, ...]
 
     def __getitem__(self, name: str) -> Property:
-        """Return one property.
-
-        Parameters
-        ----------
-        name
-            For instance ``"loss_tangent"``.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest that exists.
-        """
+        """Return one property."""
         for each in self.properties:
             if each.name == name:
                 return each

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ...errors import ArrangementError, ValueRangeError, unknown_name
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, ValueRangeError, unknown_name
 from .library import Material, Property, materials
 from .quasilinear import relaxation_factor
-
-Floats = NDArray[np.float64]
 
 LOSS_TANGENT = "loss_tangent"
 """How the names of properties begin that are a loss tangent."""
@@ -46,7 +45,7 @@ class Relaxation:
     frequencies: tuple[float, ...]
     loss_tangents: tuple[float, ...]
 
-    def factor(self, frequency: Floats | float) -> NDArray[np.complex128]:
+    def factor(self, frequency: Array | float) -> NDArray[np.complex128]:
         """Return the complex modulus over that at equilibrium.
 
         Parameters
@@ -194,7 +193,7 @@ def _loss_tangents(given: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(value) for value in given)
 
 
-def _fitted(frequencies: Floats, wanted: Floats, times: Floats) -> Relaxation:
+def _fitted(frequencies: Array, wanted: Array, times: Array) -> Relaxation:
     turn = 2.0 * np.pi * frequencies[:, None] * times
     lost, stored = turn / (1.0 + turn**2), turn**2 / (1.0 + turn**2)
     # tan δ = Σ gᵢ·lᵢ/(1 + Σ gᵢ·sᵢ) = t  ⇔  Σ gᵢ·(lᵢ − t·sᵢ) = t
@@ -221,7 +220,7 @@ class KnownLoss(NamedTuple):
     lower: float
     upper: float
 
-    def drawn(self, count: int, seed: int = 1) -> Floats:
+    def drawn(self, count: int, seed: int = 1) -> Array:
         """Return draws of the loss tangent, evenly distributed between its ends, shape (count,).
 
         A range says nothing of what lies between its ends, so each value counts alike.
@@ -299,17 +298,7 @@ def relaxation_of(loss: KnownLoss, loss_tangent: float | None = None) -> Relaxat
     solid with its peak there; a range, or a number without a frequency, gives a flat loss tangent from 0.1 to
     10 Hz.
 
-    Parameters
-    ----------
-    loss
-        As returned by :func:`loss_of`.
-    loss_tangent
-        Of a range, which value; the middle if it is left out. A curve is scaled to this mean.
-
-    Raises
-    ------
-    ValueRangeError
-        If the loss tangent lies outside of its range.
+    ``loss_tangent``: of a range, which value; the middle if it is left out. A curve is scaled to this mean.
     """
     values = loss.known.quantity.values
     frequency = loss.known.conditions.get("frequency")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...errors import ArrangementError, unknown_name
-from ...quantity import Quantity
+from ...foundation.errors import ArrangementError, unknown_name
+from ...foundation.quantity import Quantity
 from ..core.dampers import ViscousMaterial
 from ..core.element import Element, Range
 from ..core.part_numbers import NotDeclared, Reading
@@ -84,11 +84,6 @@ class MaterialLaw:
 def missing_law(material: Material) -> str:
     """Return why a rubber gives no elastic law; empty where it gives one.
 
-    Parameters
-    ----------
-    material
-        Of the library.
-
     Examples
     --------
     >>> from nlsdesign.components import material
@@ -150,13 +145,7 @@ def law_of(material: Material, *, using: str | None = None) -> MaterialLaw:
 
 
 def material_laws(path: Path | None = None) -> dict[str, MaterialLaw]:
-    """Return the laws of all rubbers of a library that have one, by name.
-
-    Parameters
-    ----------
-    path
-        As for :func:`materials`.
-    """
+    """Return the laws of all rubbers of a library that have one, by name."""
     everything = materials(path).items()
     return {name: law_of(m) for name, m in everything if any(_gives_law(m, p) for p in m.properties)}
 

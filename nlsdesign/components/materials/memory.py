@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from ..core.element import Scope
 
 
@@ -14,17 +14,6 @@ def rising(
     """Return the greatest value so far, a state that is driven by the rate, and its own rate.
 
     The state follows the value up, behind it by ``width``·ln(1 + value/width), whatever the speed.
-
-    Parameters
-    ----------
-    scope
-        Of the law.
-    state
-        Name, unit and meaning.
-    value, rate
-        What is remembered, and its derivative.
-    width
-        Over which the switch of the state is rounded.
     """
     greatest = scope.state(*state)
     growth = (1 + ca.tanh((value - greatest) / (2 * width))) / 2 * ca.fmax(rate, 0)
@@ -33,15 +22,7 @@ def rising(
 
 
 def following(scope: Scope, state: tuple[str, str, str], value: Expression, time: Expression) -> Expression:
-    """Return the largest value so far, at least the present one: ṁ = ⟨x − m⟩/τ.
-
-    Parameters
-    ----------
-    scope, state, value
-        As for :func:`rising`.
-    time
-        τ, which must be short against the motion.
-    """
+    """Return the largest value so far, at least the present one: ṁ = ⟨x − m⟩/τ."""
     memory = scope.state(*state)
     scope.derive(memory, ca.fmax(value - memory, 0) / time)
     return ca.fmax(memory, value)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
 from ..core.dampers import ViscousMaterial
 from ..core.element import Element, Parallel, parallel
 from ..core.series import Series, series

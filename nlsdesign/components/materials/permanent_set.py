@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION
 from ..core.element import Combination, Scope
 from ..core.part_numbers import Reading, parameter, read_as

@@ -8,9 +8,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import Combination, Scope
 from ..core.part_numbers import parameter
 
@@ -54,7 +55,7 @@ class QuasilinearRelaxation(Combination):
                 "there must be one relaxation time per share",
             )
 
-    def factor(self, frequency: NDArray[np.float64] | float) -> NDArray[np.complex128]:
+    def factor(self, frequency: Array | float) -> NDArray[np.complex128]:
         """Return the complex modulus over the tangent modulus at equilibrium, shape of the frequency.
 
         Parameters
@@ -91,18 +92,8 @@ class QuasilinearRelaxation(Combination):
         return total
 
 
-def relaxation_factor(
-    shares: NDArray[np.float64], times: NDArray[np.float64], frequency: NDArray[np.float64] | float
-) -> NDArray[np.complex128]:
-    """Return 1 + Σ gᵢ·iωτᵢ/(1 + iωτᵢ), the shape of the frequency.
-
-    Parameters
-    ----------
-    shares, times
-        gᵢ and τᵢ in s, shape (n,).
-    frequency
-        In Hz.
-    """
+def relaxation_factor(shares: Array, times: Array, frequency: Array | float) -> NDArray[np.complex128]:
+    """Return 1 + Σ gᵢ·iωτᵢ/(1 + iωτᵢ), the shape of the frequency."""
     turn = 2j * np.pi * np.asarray(frequency)[..., None] * times
     factor: NDArray[np.complex128] = 1.0 + np.sum(shares * turn / (1.0 + turn), axis=-1)
     return factor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ...quantity import Quantity
+from ...foundation.quantity import Quantity
 from ..core.element import Element
 from ..core.part_numbers import Reading
 from .library import Material

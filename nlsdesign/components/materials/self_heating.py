@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ArrangementError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from ..core.element import UNBOUNDED, Combination, Element, Scope, observed_effort
 from ..core.part import walk
@@ -194,13 +194,7 @@ class LossHeat(Heat):
 
 
 def is_equilibrium(member: Element) -> bool:
-    """Tell whether a law has no memory and no loss: everything in it is elastic.
-
-    Parameters
-    ----------
-    member
-        One of several laws in parallel.
-    """
+    """Tell whether a law has no memory and no loss: everything in it is elastic."""
     leaves = [part for _, part in walk(member) if not part.children()]
     return all(isinstance(leaf, Elastic) for leaf in leaves)
 

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...errors import ArrangementError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.domain import MATERIAL, TRANSLATION, Domain
 from ..core.element import Combination, Element, Scope
 from ..core.part_numbers import NotDeclared, Reading, parameter, read_as, templates

@@ -10,9 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import MATERIAL, Domain, Element, Scope
 from ..core.part import parameter
 
@@ -76,7 +77,7 @@ class Springpot(Element):
         exact = self.modulus.number * (1j * band / self.reference.number) ** self.order.number
         return float(np.max(np.abs(self.complex_modulus(band) / exact - 1.0)))
 
-    def complex_modulus(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def complex_modulus(self, frequency: Array) -> NDArray[np.complex128]:
         """Return the complex modulus of the branches in Pa.
 
         Parameters

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ArrangementError
-from ...quantity import Quantity
-from ...symbolic import Expression, positive_part
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, positive_part
 from ..core.domain import MATERIAL, Domain
 from ..core.element import Combination, Scope
 from ..core.part_numbers import Reading, parameter, read_as

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.domain import MATERIAL, Domain
 from ..core.element import Combination, Scope
 from ..core.part import walk

@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.contacts import Rounded, Sharp, WithCorners
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Combination, Scope

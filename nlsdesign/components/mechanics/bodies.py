@@ -9,9 +9,9 @@ from typing import ClassVar, NamedTuple, Self
 
 import casadi as ca
 
-from ...errors import ArrangementError
-from ...quantity import Quantity, typeset_unit
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity, typeset_unit
+from ...foundation.symbolic import Expression
 from ..core.element import ROTATION, TRANSLATION, Domain, Scope
 from ..core.part import RESERVED, Part, check_names
 from ..core.part_numbers import one_of, parameter

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity, same_dimension
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity, same_dimension
+from ...foundation.symbolic import Expression
 from ..core.domain import Domain
 from ..core.element import Scope
 from ..core.part_numbers import Reading, one_of, parameter, read_as
@@ -39,15 +39,7 @@ class WithoutRate(Reading):
     """No damping by the controller."""
 
     def opposed(self, scope: Scope, rate: Expression) -> Expression:
-        """Return zero.
-
-        Parameters
-        ----------
-        scope
-            Of the controller.
-        rate
-            Of the body.
-        """
+        """Return zero."""
         return ca.SX(0)
 
 
@@ -78,17 +70,7 @@ class WithoutIntegral(Reading):
     """No memory of the error."""
 
     def added(self, scope: Scope, error: tuple[Expression, Expression], unit: str) -> Expression:
-        """Return zero.
-
-        Parameters
-        ----------
-        scope
-            Of the controller.
-        error
-            That of the controlled variable, and the command without the memory.
-        unit
-            Of the command.
-        """
+        """Return zero."""
         return ca.SX(0)
 
 

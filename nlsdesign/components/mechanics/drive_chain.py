@@ -8,8 +8,8 @@ from typing import ClassVar, NamedTuple
 
 import casadi as ca
 
-from ...quantity import Quantity, same_dimension
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity, same_dimension
+from ...foundation.symbolic import Expression
 from ..core.delay import delayed
 from ..core.domain import Domain
 from ..core.element import Scope

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...quantity import Quantity, same_dimension
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity, same_dimension
+from ...foundation.symbolic import Expression
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
 from ..core.part_numbers import one_of, parameter
@@ -20,13 +20,7 @@ COMMANDS = (CURRENT, VOLTAGE, ROTATION, TRANSLATION)
 
 
 def command_domain(unit: str) -> Domain | None:
-    """Return the kind of a command, ``None`` for one of another unit.
-
-    Parameters
-    ----------
-    unit
-        Of the command.
-    """
+    """Return the kind of a command, ``None`` for one of another unit."""
     return next((each for each in COMMANDS if same_dimension(each.effort_unit, unit)), None)
 
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.contacts import WithFriction
 from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
@@ -17,15 +17,7 @@ from ..core.part_numbers import one_of, parameter
 
 
 def stribeck(rate: Expression, speed: Expression) -> Expression:
-    """Return e^(−(v/v_St)²), the share of the friction beyond sliding that is left at a speed.
-
-    Parameters
-    ----------
-    rate
-        v.
-    speed
-        v_St, at which 37 % is left.
-    """
+    """Return e^(−(v/v_St)²), the share of the friction beyond sliding that is left at a speed."""
     return ca.exp(-((rate / speed) ** 2))
 
 

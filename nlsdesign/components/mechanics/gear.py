@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ArrangementError, NlsError, ValueRangeError, unknown_name
-from ...quantity import Quantity
-from ...symbolic import Expression, smooth_sign
+from ...foundation.errors import ArrangementError, NlsError, ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, smooth_sign
 from ..core.element import ROTATION, Scope
 from ..core.part import Part, parameter
 from .bodies import Body, Free
@@ -111,13 +111,7 @@ class LossyGear(Gear):
 def gear_problems(
     parts: Sequence[tuple[str, Part]], unsure: Sequence[str] = ()
 ) -> Iterator[tuple[str, NlsError]]:
-    """Yield what is wrong with the gears between bodies, with the name of the gear.
-
-    Parameters
-    ----------
-    parts, unsure
-        As for ``arrangement_problems``.
-    """
+    """Yield what is wrong with the gears between bodies, with the name of the gear."""
     bodies = {name: part for name, part in parts if isinstance(part, Body)}
     train = {name: name for name in bodies}
     for name, gear in parts:

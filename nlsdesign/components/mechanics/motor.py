@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import ROTATION, Domain, Scope
 from ..core.part import parameter
 from .bodies import Free, Motion

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.domain import ROTATION, Domain
 from ..core.element import Scope
 from ..core.part_numbers import parameter

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, symbol
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, symbol
 from ..core.contacts import WithCorners
 from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, with_unit
-from ...symbolic import Expression, uniform_spline
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, with_unit
+from ...foundation.symbolic import Expression, uniform_spline
 from ..core.contacts import WithFriction
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Element, Range, Scope
@@ -23,17 +23,7 @@ LEAST = 4
 def held_table(
     row: Sequence[Expression], lowest: Expression, highest: Expression, at: Expression
 ) -> Expression:
-    """Return a uniform cubic B-spline on [lowest, highest], which keeps its end values outside of it.
-
-    Parameters
-    ----------
-    row
-        n control values, of the n − 3 spans.
-    lowest, highest
-        Range.
-    at
-        Argument.
-    """
+    """Return a uniform cubic B-spline on [lowest, highest], which keeps its end values outside of it."""
     inside = ca.fmin(ca.fmax(at, lowest), highest)
     return uniform_spline(row, 0.0, (highest - lowest) / (len(row) - 3), inside - lowest)
 

@@ -11,12 +11,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.element import Scope
 from ..core.part import parameter
-from .sensors import Array, Numbers, Sensor
+from .sensors import Numbers, Sensor
 
 _SLIP = 1e-6
 """Part of a sample by which times that were computed may miss it."""

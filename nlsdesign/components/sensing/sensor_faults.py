@@ -9,13 +9,14 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.arrays import Array
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.delay import delayed
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
 from ..core.part_numbers import one_of, parameter
-from .sensors import Array, Numbers, Sensor
+from .sensors import Numbers, Sensor
 
 
 @dataclass(frozen=True, kw_only=True)

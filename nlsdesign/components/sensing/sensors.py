@@ -17,17 +17,15 @@ from typing import ClassVar, Protocol, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, same_dimension
-from ...symbolic import Expression
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, same_dimension
+from ...foundation.symbolic import Expression
 from ..core.domain import Domain
 from ..core.element import Scope
 from ..core.part import Part, parameter
 from ..core.part_numbers import NotDeclared, Reading, read_as
-
-Array = NDArray[np.float64]
 
 
 class Numbers(Protocol):

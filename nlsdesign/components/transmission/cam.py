@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, uniform_spline, uniform_spline_integral
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import Part, parameter
 from ..core.part_numbers import NotDeclared, Reading, read_as
@@ -85,15 +85,7 @@ class Pulley(Cam):
 
 
 def side_of(angle: Expression, width: Expression) -> tuple[Expression, Expression]:
-    """Return the angle on the side of a two-sided cam, q = √(θ² + w²) − w, and its derivative; both C∞.
-
-    Parameters
-    ----------
-    angle
-        θ.
-    width
-        w, over which one side takes over from the other.
-    """
+    """Return the angle on the side of a two-sided cam, q = √(θ² + w²) − w, and its derivative; both C∞."""
     root = ca.sqrt(angle * angle + width * width)
     # Without cancellation near zero.
     return angle * angle / (root + width), angle / root
@@ -157,9 +149,7 @@ class TwoSidedCam(Cam):
         return uniform_spline(scope.row("lever_arm"), 0.0, self._spacing(scope), on_contour) * slope
 
 
-def control_values(
-    angles: NDArray[np.float64], lever_arms: NDArray[np.float64], count: int = 40
-) -> tuple[float, ...]:
+def control_values(angles: Array, lever_arms: Array, count: int = 40) -> tuple[float, ...]:
     """Return the control values of a uniform cubic B-spline through a tabulated lever arm.
 
     Parameters

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
-from ...errors import ArrangementError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Element, Scope, observed_effort
 from ..core.part import RESERVED, Part, check_names

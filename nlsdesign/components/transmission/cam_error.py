@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, uniform_spline, uniform_spline_integral
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import parameter
 from .cam import TwoSidedCam, side_of

@@ -8,9 +8,9 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import BSpline
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression, symbol, uniform_spline, uniform_spline_integral
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, symbol, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import parameter
 from .cam import Cam, side_of

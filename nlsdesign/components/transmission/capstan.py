@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression, smooth_sign
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, smooth_sign
 from ..core.domain import TRANSLATION, Domain
 from ..core.element import Combination, Scope
 from ..core.part_numbers import Reading, parameter, read_as

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ArrangementError
-from ...quantity import Quantity
-from ...symbolic import Expression, solve_monotone, symbol
+from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression, solve_monotone, symbol
 from ..core.domain import TRANSLATION, Domain
 from ..core.element import Combination, Scope
 from ..core.part_numbers import parameter

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import MeasurementError, UnitError, nearest
-from ...quantity import parse_unit, same_dimension, typeset_unit
-from ...reading import text_of
-from ...written_numbers import name_and_unit
-
-Floats = NDArray[np.float64]
+from ...foundation.arrays import Array
+from ...foundation.errors import MeasurementError, UnitError, nearest
+from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
+from ...foundation.text_files import text_of
+from ...foundation.written_numbers import name_and_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,20 +34,12 @@ class ReadColumns:
     """
 
     file: str
-    values: Mapping[str, Floats]
+    values: Mapping[str, Array]
     units: Mapping[str, str]
     lines: tuple[int, ...]
 
     def cell(self, row: int, name: str) -> str:
-        """Return where a number stands: file, line and column.
-
-        Parameters
-        ----------
-        row
-            From zero.
-        name
-            Of the column.
-        """
+        """Return where a number stands: file, line and column."""
         return f"{self.file}, line {self.lines[row]}, column '{name}'"
 
 
@@ -58,23 +48,8 @@ def read_columns(
 ) -> ReadColumns:
     """Read the columns of a CSV file; empty lines and lines that begin with ``#`` are passed over.
 
-    Parameters
-    ----------
-    path
-        Of the file.
-    columns
-        The names that it may have, each with a unit for every dimension that it may have. A column with the
-        unit ``1`` needs none in its head.
-    least_rows
-        Smallest number of rows.
-
-    Raises
-    ------
-    MeasurementError
-        If the file cannot be read, a column is unknown or stands there twice, a cell is no finite number, a
-        row is too short or too long, or there are too few rows.
-    UnitError
-        If a head has no unit, or one of another dimension.
+    ``columns``: the names that it may have, each with a unit for every dimension that it may have. A column
+    with the unit ``1`` needs none in its head.
     """
     file = Path(path)
     text = text_of(file, MeasurementError, next_step="name a CSV file in UTF-8")

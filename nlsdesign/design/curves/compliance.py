@@ -6,12 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from ...foundation.arrays import Array
 from .task import TaskCycle
-
-Floats = NDArray[np.float64]
 
 _MARGIN = 1.001
 """The range goes a thousandth beyond the largest sampled torque, which a finer sampling may pass a little."""
@@ -36,7 +34,7 @@ class ComplianceSpline:
     pieces: int
 
     @property
-    def knots(self) -> Floats:
+    def knots(self) -> Array:
         """Knots in N·m, the outer ones three times."""
         inner = np.linspace(self.low, self.high, self.pieces + 1)
         return np.concatenate([[self.low] * 2, inner, [self.high] * 2])
@@ -46,14 +44,8 @@ class ComplianceSpline:
         """Number of coefficients."""
         return self.pieces + 2
 
-    def matrices(self, torque: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return what maps coefficients to deflection and its first two derivatives, shape (n, size) each.
-
-        Parameters
-        ----------
-        torque
-            In N·m, shape (n,), in the range.
-        """
+    def matrices(self, torque: Array) -> tuple[Array, Array, Array]:
+        """Return what maps coefficients to deflection and its first two derivatives, shape (n, size) each."""
         spline = BSpline(self.knots, np.eye(self.size), 2)
         integral = spline.antiderivative()
         at = np.clip(torque, self.low, self.high)
@@ -69,7 +61,7 @@ class SpringSymmetry(ABC):
         """Return the spline over the torques of a task."""
 
     @abstractmethod
-    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Floats, Floats]:
+    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Array, Array]:
         """Return matrix M, shape (size, m), and offset o: coefficients s = o + M·y with y ≥ floor."""
 
 
@@ -82,7 +74,7 @@ class OddSpring(SpringSymmetry):
         most = _MARGIN * float(np.max(np.abs(cycle.torque)))
         return ComplianceSpline(-most, most, pieces + pieces % 2)
 
-    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Floats, Floats]:
+    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Array, Array]:
         """Return what couples each coefficient with that of the opposite torque."""
         half = (spline.size + 1) // 2
         matrix = np.zeros((spline.size, half))
@@ -99,7 +91,7 @@ class OneSidedSpring(SpringSymmetry):
         """Return the spline over the torques of the task, with a knot at zero."""
         return _with_knot_at_zero(cycle, pieces)
 
-    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Floats, Floats]:
+    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Array, Array]:
         """Return what leaves the coefficients free that act on positive torque alone."""
         free = spline.knots[: spline.size] >= -1e-9 * (spline.high - spline.low)
         if spline.low == 0.0:
@@ -115,7 +107,7 @@ class TwoBranchSpring(SpringSymmetry):
         """Return the spline over the torques of the task."""
         return _with_knot_at_zero(cycle, pieces)
 
-    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Floats, Floats]:
+    def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Array, Array]:
         """Return what leaves all coefficients free."""
         return np.eye(spline.size), np.zeros(spline.size)
 

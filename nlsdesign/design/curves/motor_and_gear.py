@@ -6,18 +6,16 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ArrangementError, InfeasibleError
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, InfeasibleError
+from ...foundation.quantity import Quantity
 from ...model import FlatModel
 from ...model.roles import driven_body, series_spring
 from ...model.structure import MotorNames, MovingBody
-from ...quantity import Quantity
 from .numbers import in_si, plain
 from .target import Target
 from .task import Task, TaskCycle
-
-Floats = NDArray[np.float64]
 
 _SOFTEST = 1e-3
 """Share of the mean stiffness below which a spring cannot serve a task: the deflection would jump there."""
@@ -165,22 +163,22 @@ class MotorCycle:
 
     cycle: TaskCycle
     drive: MotorAndGear
-    deflection: Floats
-    speed: Floats
-    torque: Floats
+    deflection: Array
+    speed: Array
+    torque: Array
 
     @property
-    def current(self) -> Floats:
+    def current(self) -> Array:
         """In the winding, in A."""
         return self.torque / plain(self.drive.torque_constant)
 
     @property
-    def voltage(self) -> Floats:
+    def voltage(self) -> Array:
         """At the winding, in V."""
         return plain(self.drive.resistance) * self.current + plain(self.drive.torque_constant) * self.speed
 
     @property
-    def power(self) -> Floats:
+    def power(self) -> Array:
         """At the motor shaft, in W."""
         return self.torque * self.speed
 
@@ -253,43 +251,23 @@ def motor_cycle(
     return driven_cycle(cycle, drive, deflection, motion_through(cycle, slope, bend))
 
 
-def motion_through(cycle: TaskCycle, slope: Floats, bend: Floats) -> tuple[Floats, Floats]:
-    """Return speed and acceleration of the gear's output before a spring, in rad/s and rad/s².
-
-    Parameters
-    ----------
-    cycle
-        The task.
-    slope, bend
-        First and second derivative of the deflection by the torque at its torques, shape (n,).
-    """
+def motion_through(cycle: TaskCycle, slope: Array, bend: Array) -> tuple[Array, Array]:
+    """Return speed and acceleration of the gear's output before a spring, in rad/s and rad/s²."""
     acceleration = cycle.acceleration + slope * cycle.torque_acceleration + bend * cycle.torque_rate**2
     return cycle.speed + slope * cycle.torque_rate, acceleration
 
 
 def driven_cycle(
-    cycle: TaskCycle, drive: MotorAndGear, deflection: Floats, motion: tuple[Floats, Floats]
+    cycle: TaskCycle, drive: MotorAndGear, deflection: Array, motion: tuple[Array, Array]
 ) -> MotorCycle:
-    """Return what the motor does where the output of the gear moves in a known way.
-
-    Parameters
-    ----------
-    cycle
-        The task.
-    drive
-        Motor and gear.
-    deflection
-        In rad.
-    motion
-        Speed and acceleration of the output in rad/s and rad/s².
-    """
+    """Return what the motor does where the output of the gear moves in a known way."""
     speed, acceleration = motion
     ratio, inertia = plain(drive.gear_ratio), drive.reflected_inertia
     torque = (cycle.torque + inertia * acceleration) / ratio + plain(drive.damping) * ratio * speed
     return MotorCycle(cycle, drive, deflection, ratio * speed, torque)
 
 
-def _deflections(spring: Target, size: Floats) -> tuple[Floats, Floats, Floats]:
+def _deflections(spring: Target, size: Array) -> tuple[Array, Array, Array]:
     """Return deflection, its slope and its bend over torque, at torques of one sign."""
     most = float(spring.torque(spring.last_angle))
     if float(np.max(size)) > most * (1.0 + 1e-9):
@@ -305,7 +283,7 @@ def _deflections(spring: Target, size: Floats) -> tuple[Floats, Floats, Floats]:
     grid = np.linspace(0.0, spring.last_angle, 2001)
     known = spring.torque(grid)
     cell = np.clip(np.searchsorted(known, size) - 1, 0, len(grid) - 2)
-    at: Floats = np.interp(size, known, grid)
+    at: Array = np.interp(size, known, grid)
     for _ in range(8):  # Newton within the cell of the grid; a cell that it would leave is closed at its edge
         value, rise = (np.array(each).ravel() for each in law(at)[:2])
         at = np.clip(at - (value - size) / np.maximum(rise, 1e-300), grid[cell], grid[cell + 1])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ...errors import UnitError, ValueRangeError
-from ...quantity import Quantity, degrees, same_dimension, with_unit
+from ...foundation.errors import UnitError, ValueRangeError
+from ...foundation.quantity import Quantity, degrees, same_dimension, with_unit
 
 _SLIPS = {
     "m": (("mm", 1e-3), ("cm", 1e-2)),
@@ -18,27 +18,9 @@ def in_si(
 ) -> float:
     """Return a number in SI.
 
-    Parameters
-    ----------
-    name
-        What it is, for messages.
-    given
-        A quantity, or a bare number in SI.
-    unit
-        SI unit.
-    minimum, maximum
-        Inclusive range outside which a slip of units is more likely than a wish.
-
-    Raises
-    ------
-    UnitError
-        If the unit measures something else.
-    ValueRangeError
-        If the number lies outside the range, or is not a number.
-
     Examples
     --------
-    >>> from nlsdesign.quantity import quantity
+    >>> from nlsdesign.foundation.quantity import quantity
     >>> in_si("radius", quantity(3.0, "mm"), "m")
     0.003
     """
@@ -71,11 +53,5 @@ def _slip(value: float, unit: str, minimum: float, maximum: float) -> str | None
 
 
 def plain(given: Quantity | float) -> float:
-    """Return the number in SI of a field that :func:`in_si` has checked.
-
-    Parameters
-    ----------
-    given
-        A quantity or a number.
-    """
+    """Return the number in SI of a field that :func:`in_si` has checked."""
     return given.number if isinstance(given, Quantity) else given

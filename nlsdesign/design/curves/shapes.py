@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity, with_unit
-from ...symbolic import Expression
+from ...foundation.arrays import Mask
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity, with_unit
+from ...foundation.symbolic import Expression
 from .numbers import in_si, plain
 from .target import Target, piecewise, straight, table_of_curve
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,7 +241,7 @@ class TorqueBand:
         """Return the largest torque in N·m at an angle in rad, 0 ≤ angle."""
         return piecewise(straight(self.angles, self.upper), angle)
 
-    def contains(self, angle: ArrayLike, torque: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, angle: ArrayLike, torque: ArrayLike) -> Mask:
         """Tell for each point whether it lies in the band, the edges included.
 
         Parameters
@@ -252,5 +251,5 @@ class TorqueBand:
         """
         at, given = np.asarray(angle, dtype=float), np.asarray(torque, dtype=float)
         low, high = (np.interp(at, self.angles, edge) for edge in (self.lower, self.upper))
-        inside: NDArray[np.bool_] = (low <= given) & (given <= high)
+        inside: Mask = (low <= given) & (given <= high)
         return inside

@@ -10,15 +10,14 @@ from typing import overload
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from .numbers import in_si, plain
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +55,7 @@ class Target(ABC):
         """
         return 0.0 * angle + 1.0
 
-    def weight(self, angle: ArrayLike) -> Floats:
+    def weight(self, angle: ArrayLike) -> Array:
         """Return the weight of the error, of the same shape.
 
         Parameters
@@ -69,8 +68,8 @@ class Target(ABC):
     @overload
     def torque(self, angle: Expression) -> Expression: ...
     @overload
-    def torque(self, angle: ArrayLike) -> Floats: ...
-    def torque(self, angle: Expression | ArrayLike) -> Expression | Floats:
+    def torque(self, angle: ArrayLike) -> Array: ...
+    def torque(self, angle: Expression | ArrayLike) -> Expression | Array:
         """Return the torque.
 
         Parameters
@@ -88,8 +87,8 @@ class Target(ABC):
     @overload
     def energy(self, angle: Expression) -> Expression: ...
     @overload
-    def energy(self, angle: ArrayLike) -> Floats: ...
-    def energy(self, angle: Expression | ArrayLike) -> Expression | Floats:
+    def energy(self, angle: ArrayLike) -> Array: ...
+    def energy(self, angle: Expression | ArrayLike) -> Expression | Array:
         """Return the energy ∫₀ torque that the spring stores.
 
         Parameters
@@ -121,7 +120,7 @@ class Target(ABC):
         """Largest torque in N·m."""
         return float(np.max(self.torque(np.linspace(0.0, self.last_angle, 201))))
 
-    def band(self, angle: ArrayLike) -> tuple[Floats, Floats]:
+    def band(self, angle: ArrayLike) -> tuple[Array, Array]:
         """Return the lower and upper edge of the tolerance band.
 
         Parameters
@@ -156,7 +155,7 @@ class ExponentialTorque(Target):
 
     Examples
     --------
-    >>> from nlsdesign.quantity import degrees
+    >>> from nlsdesign.foundation.quantity import degrees
     >>> curve = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0)
     >>> round(float(curve.torque(degrees(53.0))), 9), round(curve.initial_stiffness, 3)
     (5.0, 3.285)
@@ -308,23 +307,8 @@ class TabulatedTorque(Target):
         return piecewise(straight(self.angles, self.weights), angle) if self.weights else 0.0 * angle + 1.0
 
 
-def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tuple[float, ...]) -> Floats:
-    """Return the points of a curve over the angle, shape (2, n), after a check of their order.
-
-    Parameters
-    ----------
-    table, what
-        Name of the table and of its values, for messages.
-    angles
-        Ascending from zero, in rad.
-    values
-        One finite number for each angle.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are too few points, or the angles do not ascend from zero.
-    """
+def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tuple[float, ...]) -> Array:
+    """Return the points of a curve over the angle, shape (2, n), after a check of their order."""
     points = np.array([angles, values]) if len(angles) == len(values) else np.zeros(0)
     if points.size < 6 or not np.all(np.isfinite(points)):
         raise ValueRangeError(
@@ -342,26 +326,12 @@ def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tup
 
 
 def straight(at: tuple[float, ...], values: tuple[float, ...]) -> PPoly:
-    """Return the straight lines between points.
-
-    Parameters
-    ----------
-    at, values
-        Shape (n,) each, ``at`` ascending.
-    """
+    """Return the straight lines between points."""
     return PPoly(np.array([np.diff(values) / np.diff(at), values[:-1]]), np.array(at))
 
 
 def piecewise(polynomial: PPoly, at: Expression) -> Expression:
-    """Return a piecewise polynomial as an expression; beyond its ends the outer pieces go on.
-
-    Parameters
-    ----------
-    polynomial
-        With its breaks.
-    at
-        Argument, a scalar.
-    """
+    """Return a piecewise polynomial as an expression; beyond its ends the outer pieces go on."""
     inner = [float(item) for item in polynomial.x[1:-1]]
     local = at - ca.pw_const(at, inner, [float(item) for item in polynomial.x[:-1]])
     result = ca.SX(0)
@@ -370,11 +340,11 @@ def piecewise(polynomial: PPoly, at: Expression) -> Expression:
     return result
 
 
-def _over(law: Callable[[Expression], Expression], angle: Expression | ArrayLike) -> Expression | Floats:
+def _over(law: Callable[[Expression], Expression], angle: Expression | ArrayLike) -> Expression | Array:
     if isinstance(angle, ca.SX):
         return law(angle)
     given = np.asarray(angle, dtype=float)
     symbol = ca.SX.sym("angle")
     function = ca.Function("law", [symbol], [law(symbol)])
-    result: Floats = np.array(function(given.reshape(1, -1)), dtype=float).reshape(given.shape)
+    result: Array = np.array(function(given.reshape(1, -1)), dtype=float).reshape(given.shape)
     return result

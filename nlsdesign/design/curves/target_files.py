@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import MeasurementError, ValueRangeError
+from ...foundation.errors import MeasurementError, ValueRangeError
 from .columns import ReadColumns, read_columns
 from .shapes import TabulatedStiffness, TorqueBand
 from .target import TabulatedTorque, Target

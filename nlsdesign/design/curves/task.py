@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...errors import MeasurementError, ValueRangeError, unknown_name
-from ...locations import folder
-from ...quantity import Quantity, same_dimension
+from ...foundation.arrays import Array
+from ...foundation.errors import MeasurementError, ValueRangeError, unknown_name
+from ...foundation.locations import folder
+from ...foundation.quantity import Quantity, same_dimension
 from .columns import ReadColumns, read_columns
 from .numbers import in_si
-
-Floats = NDArray[np.float64]
 
 _WORST_MISFIT = 0.05
 """Largest misfit of a record that passes as periodic, rms over its range; noise and rounding are below."""
@@ -37,23 +36,17 @@ class TaskCycle:
         In s.
     """
 
-    time: Floats
-    angle: Floats
-    speed: Floats
-    acceleration: Floats
-    torque: Floats
-    torque_rate: Floats
-    torque_acceleration: Floats
+    time: Array
+    angle: Array
+    speed: Array
+    acceleration: Array
+    torque: Array
+    torque_rate: Array
+    torque_acceleration: Array
     period: float
 
-    def over_period(self, values: Floats) -> float:
-        """Return the integral over the period; exact to rounding for smooth periodic values.
-
-        Parameters
-        ----------
-        values
-            Shape (n,).
-        """
+    def over_period(self, values: Array) -> float:
+        """Return the integral over the period; exact to rounding for smooth periodic values."""
         return float(np.mean(values)) * self.period
 
 
@@ -138,7 +131,7 @@ class Task:
                 )
 
     @property
-    def _columns(self) -> tuple[Floats, Floats, Floats]:
+    def _columns(self) -> tuple[Array, Array, Array]:
         return np.asarray(self.time), np.asarray(self.angle), np.asarray(self.torque)
 
     @property
@@ -146,7 +139,7 @@ class Task:
         assert self.period is not None
         return self.period
 
-    def _basis(self, time: Floats, derivative: int = 0) -> Floats:
+    def _basis(self, time: Array, derivative: int = 0) -> Array:
         """Return the columns 1, cos, sin, … of the series or of a derivative of it, shape (n, 1 + 2·H)."""
         order = np.arange(1, self.harmonics + 1)
         turns = 2.0 * np.pi * order / self._period
@@ -155,11 +148,11 @@ class Task:
         first = np.full((len(time), 1), 1.0 if derivative == 0 else 0.0)
         return np.hstack([first, scale * np.cos(phase), scale * np.sin(phase)])
 
-    def _coefficients(self, values: Floats) -> Floats:
+    def _coefficients(self, values: Array) -> Array:
         time = self._columns[0]
         return np.asarray(np.linalg.lstsq(self._basis(time - time[0]), values, rcond=None)[0], dtype=float)
 
-    def _misfit(self, values: Floats) -> float:
+    def _misfit(self, values: Array) -> float:
         time = self._columns[0]
         left = values - self._basis(time - time[0]) @ self._coefficients(values)
         return float(np.sqrt(np.mean(left**2)) / max(np.ptp(values), 1e-300))

@@ -7,18 +7,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import InfeasibleError, NlsError, ValueRangeError
-from ...quantity import Quantity, with_unit
+from ...foundation.arrays import Array
+from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError
+from ...foundation.quantity import Quantity, with_unit
 from .compliance import OddSpring, SpringSymmetry, TwoBranchSpring
 from .motor_and_gear import MotorAndGear, MotorCycle, motor_cycle
 from .numbers import in_si, plain
 from .target import TabulatedTorque
 from .task import Task
 from .task_program import TaskOptimum, TaskProgram, least_energy, least_peak_power
-
-Floats = NDArray[np.float64]
 
 _RIGID = 0.01
 """Deflection in rad under the largest torque below which a spring counts as rigid."""
@@ -302,7 +300,7 @@ def _best_or_none(goal: TaskGoal, program: TaskProgram) -> TaskOptimum | None:
         return None
 
 
-def _branches(program: TaskProgram, unknowns: Floats) -> tuple[TabulatedTorque, TabulatedTorque]:
+def _branches(program: TaskProgram, unknowns: Array) -> tuple[TabulatedTorque, TabulatedTorque]:
     """Return the curve for positive and for negative torque, each as a table from zero."""
     tables = []
     for most in (program.spline.high, program.spline.low):

@@ -13,16 +13,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
-from ...errors import InfeasibleError
+from ...foundation.arrays import Array
+from ...foundation.errors import InfeasibleError
 from .compliance import ComplianceSpline
 from .motor_and_gear import MotorAndGear, MotorCycle, driven_cycle, motion_through
 from .numbers import plain
 from .task import TaskCycle
-
-Floats = NDArray[np.float64]
 
 _THIN = 4
 """Limits stand at every fourth time: between them smooth motions change by less than a thousandth."""
@@ -44,8 +42,8 @@ class LimitRows:
 
     name: str
     unit: str
-    matrix: Floats
-    offset: Floats
+    matrix: Array
+    offset: Array
     largest: float
 
 
@@ -70,8 +68,8 @@ class TaskProgram:
     cycle: TaskCycle
     drive: MotorAndGear
     spline: ComplianceSpline
-    freedom: Floats
-    offset: Floats
+    freedom: Array
+    offset: Array
     floor: float
     largest_deflection: float
     largest_speed: float
@@ -80,30 +78,18 @@ class TaskProgram:
         """Return the program of a linear spring: one unknown, its compliance."""
         return replace(self, freedom=self.freedom @ np.ones((self.freedom.shape[1], 1)))
 
-    def coefficients(self, unknowns: Floats) -> Floats:
-        """Return the coefficients of the spline.
-
-        Parameters
-        ----------
-        unknowns
-            y, shape (m,).
-        """
+    def coefficients(self, unknowns: Array) -> Array:
+        """Return the coefficients of the spline."""
         return self.offset + self.freedom @ unknowns
 
-    def motor(self, unknowns: Floats) -> MotorCycle:
-        """Return what the motor does with this spring.
-
-        Parameters
-        ----------
-        unknowns
-            y, shape (m,).
-        """
+    def motor(self, unknowns: Array) -> MotorCycle:
+        """Return what the motor does with this spring."""
         deflection, slope, bend = (
             each @ self.coefficients(unknowns) for each in self.spline.matrices(self.cycle.torque)
         )
         return driven_cycle(self.cycle, self.drive, deflection, motion_through(self.cycle, slope, bend))
 
-    def affine(self) -> dict[str, tuple[Floats, Floats]]:
+    def affine(self) -> dict[str, tuple[Array, Array]]:
         """Return matrix and offset of deflection, motor speed and motor torque, as affine in y."""
         cycle, drive = self.cycle, self.drive
         deflection, slope, bend = self.spline.matrices(cycle.torque)
@@ -140,7 +126,7 @@ class TaskProgram:
         )
         return tuple(each for each in stated if np.isfinite(each.largest))
 
-    def quadratic(self) -> tuple[Floats, Floats, float]:
+    def quadratic(self) -> tuple[Array, Array, float]:
         """Return H, g and c of the energy per period ½·yᵀH·y + gᵀy + c in J."""
         rows, drive, cycle = self.affine(), self.drive, self.cycle
         step = cycle.period / len(cycle.time)
@@ -166,23 +152,12 @@ class TaskOptimum:
         What no spring can go below, from the dual; ``None`` where the problem is not convex.
     """
 
-    unknowns: Floats
+    unknowns: Array
     bound: float | None
 
 
 def least_energy(program: TaskProgram) -> TaskOptimum:
-    """Return the spring with the least motor energy per period, and the bound that proves it.
-
-    Parameters
-    ----------
-    program
-        Convex quadratic in its unknowns.
-
-    Raises
-    ------
-    InfeasibleError
-        If the limits contradict each other, named with the amounts; or if the spring has no influence.
-    """
+    """Return the spring with the least motor energy per period, and the bound that proves it."""
     hessian, gradient, constant = program.quadratic()
     if not np.any(hessian):
         raise InfeasibleError(
@@ -219,8 +194,8 @@ def least_energy(program: TaskProgram) -> TaskOptimum:
 
 
 def _solved(
-    quadratic: tuple[Floats, Floats], rows: tuple[Floats, Floats], floor: Floats
-) -> tuple[Floats, Floats] | None:
+    quadratic: tuple[Array, Array], rows: tuple[Array, Array], floor: Array
+) -> tuple[Array, Array] | None:
     """Return the optimum of ½·yᵀHy + gᵀy with y ≥ floor and rows between −1 and 1, and the rows' prices."""
     (hessian, gradient), (matrix, offset) = quadratic, rows
     y = ca.MX.sym("y", len(gradient))
@@ -243,7 +218,7 @@ _QUADRATIC: dict[str, Any] = {
 }  # fmt: skip
 
 
-def _lowest(hessian: Floats, slope: Floats, floor: float) -> float:
+def _lowest(hessian: Array, slope: Array, floor: float) -> float:
     """Return what ½·yᵀHy + slopeᵀy cannot go below for y ≥ floor: the dual function of the limits.
 
     At any point a the tangent lies below; where its slope r is not negative, it is least at the floor.
@@ -260,13 +235,7 @@ def _lowest(hessian: Floats, slope: Floats, floor: float) -> float:
 
 
 def conflict(program: TaskProgram) -> InfeasibleError:
-    """Return the error for limits that no spring keeps, with the amount by which each alone is missed.
-
-    Parameters
-    ----------
-    program
-        Its limits contradict each other.
-    """
+    """Return the error for limits that no spring keeps, with the amount by which each alone is missed."""
     rows, floor = program.limits(), program.floor
     missed = []
     for each in rows:
@@ -296,16 +265,6 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     Without the inertia of the motor it is convex (linear). From that spring, from the one of least energy and
     from the linear one of least peak power a sequence of linear programs goes down, each within a region in
     which the tangents of the power proved to hold; the best end is taken.
-
-    Parameters
-    ----------
-    program
-        Its unknowns.
-
-    Raises
-    ------
-    InfeasibleError
-        If the limits contradict each other.
     """
     energetic = least_energy(program).unknowns
     starts = [energetic, _without_inertia(program, energetic)]
@@ -327,11 +286,11 @@ _STEPS = 60
 """Largest number of linear programs from one start."""
 
 
-def _kept(limits: tuple[LimitRows, ...], unknowns: Floats) -> bool:
+def _kept(limits: tuple[LimitRows, ...], unknowns: Array) -> bool:
     return all(np.max(np.abs(e.offset + e.matrix @ unknowns)) <= e.largest * (1.0 + 1e-6) for e in limits)
 
 
-def _descended(program: TaskProgram, start: Floats) -> Floats:
+def _descended(program: TaskProgram, start: Array) -> Array:
     """Return where linear programs lead from a start: nowhere is the peak power larger than before."""
     rows, limits = program.affine(), program.limits()
     (a, b), (c, d) = ((m[::2], o[::2]) for m, o in (rows["torque"], rows["speed"]))
@@ -352,8 +311,8 @@ def _descended(program: TaskProgram, start: Floats) -> Floats:
 
 
 def _least_largest(
-    matrix: Floats, offset: Floats, limits: tuple[LimitRows, ...], inside: tuple[Floats, Floats]
-) -> Floats:
+    matrix: Array, offset: Array, limits: tuple[LimitRows, ...], inside: tuple[Array, Array]
+) -> Array:
     """Return y with the least maximum of abs(matrix·y + offset) in limits and bounds; else their middle."""
     blocks = [(matrix, offset, -1.0, 0.0), *((e.matrix, e.offset, 0.0, e.largest) for e in limits)]
     sides = [(sign, block) for sign in (1.0, -1.0) for block in blocks]
@@ -366,7 +325,7 @@ def _least_largest(
     return np.asarray(solution.x[:-1]) if solution.status == 0 else 0.5 * (inside[0] + inside[1])
 
 
-def _without_inertia(program: TaskProgram, otherwise: Floats) -> Floats:
+def _without_inertia(program: TaskProgram, otherwise: Array) -> Array:
     """Return the spring of least peak power of a motor without inertia: a linear program."""
     light = replace(program, drive=replace(program.drive, inertia=0.0, output_inertia=0.0, damping=0.0))
     rows = light.affine()

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ...foundation.arrays import Array
 
 _SAME = 1e-10
 
@@ -31,32 +30,32 @@ class ArcPath:
         Whether the path returns to its first point.
     """
 
-    points: Floats
-    bulges: Floats
+    points: Array
+    bulges: Array
     closed: bool = False
 
     @cached_property
-    def ends(self) -> tuple[Floats, Floats, Floats]:
+    def ends(self) -> tuple[Array, Array, Array]:
         """First points, last points and bulges of the arcs, shapes (m, 2), (m, 2) and (m,)."""
         count = len(self.points) if self.closed else len(self.points) - 1
         return self.points[:count], np.roll(self.points, -1, axis=0)[:count], self.bulges[:count]
 
     @cached_property
-    def radii(self) -> Floats:
+    def radii(self) -> Array:
         """Signed radii of the arcs in m, shape (m,): positive to the left, infinite for a line."""
         start, end, bulges = self.ends
         chords = np.hypot(*(end - start).T)
         with np.errstate(divide="ignore"):
-            radii: Floats = chords * (1.0 + bulges**2) / (4.0 * bulges)
+            radii: Array = chords * (1.0 + bulges**2) / (4.0 * bulges)
         return radii
 
     @cached_property
-    def centres(self) -> Floats:
+    def centres(self) -> Array:
         """Centres of the arcs, shape (m, 2); not a number for a line."""
         start, end, bulges = self.ends
         left = (end - start)[:, ::-1] * [-1.0, 1.0]
         with np.errstate(divide="ignore", invalid="ignore"):
-            result: Floats = (start + end) / 2.0 + left * ((1.0 - bulges**2) / (4.0 * bulges))[:, None]
+            result: Array = (start + end) / 2.0 + left * ((1.0 - bulges**2) / (4.0 * bulges))[:, None]
         return result
 
     @property
@@ -67,18 +66,10 @@ class ArcPath:
         # sweep·R / chord = 4a/(2·sin 2a) with tan a = bulge.
         return float(np.sum(chords * np.where(quarters > 0.0, 1.0 / np.sinc(2.0 * quarters / np.pi), 1.0)))
 
-    def polygon(self, chord_error: float = 1e-6) -> Floats:
+    def polygon(self, chord_error: float = 1e-6) -> Array:
         """Return points on the path, among them its own, that chords of a given error join.
 
-        Parameters
-        ----------
-        chord_error
-            Largest distance between a chord and its arc in m.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (k, 2); of a closed path the last point is the first.
+        Result: shape (k, 2); of a closed path the last point is the first.
         """
         start, end, bulges = self.ends
         rows = [self.points[:1]]
@@ -107,13 +98,7 @@ class ArcPath:
         return np.vstack(rows)
 
     def turned(self, angle: float) -> ArcPath:
-        """Return the path turned anticlockwise about the centre.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return the path turned anticlockwise about the centre."""
         cosine, sine = math.cos(angle), math.sin(angle)
         return ArcPath(
             self.points @ np.array([[cosine, sine], [-sine, cosine]]), self.bulges, closed=self.closed
@@ -127,29 +112,13 @@ class ArcPath:
         )
 
 
-def line(*points: tuple[float, float] | Floats) -> ArcPath:
-    """Return straight lines through points.
-
-    Parameters
-    ----------
-    *points
-        In m.
-    """
+def line(*points: tuple[float, float] | Array) -> ArcPath:
+    """Return straight lines through points."""
     return ArcPath(np.array(points, dtype=float), np.zeros(len(points)))
 
 
-def clockwise_arc(centre: Floats, radius: float, *, first: float, last: float) -> ArcPath:
-    """Return an arc between two directions of its outward normal (sin φ, cos φ).
-
-    Parameters
-    ----------
-    centre
-        Shape (2,), in m.
-    radius
-        In m.
-    first, last
-        φ in rad, ascending.
-    """
+def clockwise_arc(centre: Array, radius: float, *, first: float, last: float) -> ArcPath:
+    """Return an arc between two directions of its outward normal (sin φ, cos φ)."""
     count = max(1, math.ceil((last - first) / 2.0))
     steps = np.linspace(first, last, count + 1)
     points = centre + radius * np.column_stack([np.sin(steps), np.cos(steps)])
@@ -160,14 +129,9 @@ def clockwise_arc(centre: Floats, radius: float, *, first: float, last: float) -
 def joined(*paths: ArcPath, closed: bool = False) -> ArcPath:
     """Return open paths one after the other, with a straight line over any gap.
 
-    Parameters
-    ----------
-    *paths
-        In their order; pieces without length are dropped.
-    closed
-        Whether the last point is led back to the first.
+    ``paths``: in their order; pieces without length are dropped.
     """
-    points: list[Floats] = []
+    points: list[Array] = []
     bulges: list[float] = []
     for path in paths:
         for point, bulge in zip(path.points, path.bulges, strict=True):
@@ -182,30 +146,15 @@ def joined(*paths: ArcPath, closed: bool = False) -> ArcPath:
     return ArcPath(np.array(points), np.array(bulges), closed=closed)
 
 
-def arc_along(start: Floats, end: Floats, *, tangent: Floats) -> float:
-    """Return the bulge of the arc that leaves a point along a tangent and ends in another.
-
-    Parameters
-    ----------
-    start, end
-        Shape (2,), in m.
-    tangent
-        Shape (2,), of any length.
-    """
+def arc_along(start: Array, end: Array, *, tangent: Array) -> float:
+    """Return the bulge of the arc that leaves a point along a tangent and ends in another."""
     chord = end - start
     across = float(tangent[0] * chord[1] - tangent[1] * chord[0])
     return math.tan(math.atan2(across, float(tangent @ chord)) / 2.0)
 
 
-def biarc(start: Floats, end: Floats, *, first: Floats, last: Floats) -> ArcPath:
+def biarc(start: Array, end: Array, *, first: Array, last: Array) -> ArcPath:
     """Return the two arcs that join two points with given tangents, without a corner between them.
-
-    Parameters
-    ----------
-    start, end
-        Shape (2,), in m.
-    first, last
-        Unit tangents there, shape (2,).
 
     Notes
     -----
@@ -224,33 +173,23 @@ def biarc(start: Floats, end: Floats, *, first: Floats, last: Floats) -> ArcPath
     return ArcPath(np.array([start, middle, end]), np.array(bulges))
 
 
-def distance_to(points: Floats, polygon: Floats) -> Floats:
+def distance_to(points: Array, polygon: Array) -> Array:
     """Return the distance of points to a line of chords, shape (n,), in m.
 
-    Parameters
-    ----------
-    points
-        Shape (n, 2), in m.
-    polygon
-        Shape (k, 2), in m.
+    ``points``: shape (n, 2), in m. ``polygon``: shape (k, 2), in m.
     """
     start, step = polygon[:-1], np.diff(polygon, axis=0)
     away = points[:, None, :] - start
     size = np.maximum(np.sum(step**2, axis=1), 1e-300)
     share = np.clip(np.sum(away * step, axis=2) / size, 0.0, 1.0)
-    result: Floats = np.min(np.hypot(*np.moveaxis(away - share[..., None] * step, 2, 0)), axis=1)
+    result: Array = np.min(np.hypot(*np.moveaxis(away - share[..., None] * step, 2, 0)), axis=1)
     return result
 
 
-def inside_of(point: Floats, polygon: Floats) -> bool:
+def inside_of(point: Array, polygon: Array) -> bool:
     """Tell whether a point lies inside a closed polygon.
 
-    Parameters
-    ----------
-    point
-        Shape (2,), in m.
-    polygon
-        Shape (k, 2), the last point is the first.
+    ``polygon``: shape (k, 2), the last point is the first.
     """
     (x0, y0), (x1, y1) = polygon[:-1].T, polygon[1:].T
     crosses = (y0 > point[1]) != (y1 > point[1])
@@ -259,13 +198,10 @@ def inside_of(point: Floats, polygon: Floats) -> bool:
     return bool(np.count_nonzero(crosses & (point[0] < at)) % 2)
 
 
-def crossing(polygon: Floats) -> Floats | None:
+def crossing(polygon: Array) -> Array | None:
     """Return a point in which a closed polygon crosses itself, or ``None``.
 
-    Parameters
-    ----------
-    polygon
-        Shape (k, 2), the last point is the first.
+    ``polygon``: shape (k, 2), the last point is the first.
     """
     start, end = polygon[:-1], polygon[1:]
     count = len(start)
@@ -278,14 +214,14 @@ def crossing(polygon: Floats) -> Floats | None:
         hit = np.flatnonzero((first * second < 0.0) & (third * fourth < 0.0))
         if len(hit):
             share = third[hit[0]] / (third[hit[0]] - fourth[hit[0]])
-            place: Floats = a + share * (b - a)
+            place: Array = a + share * (b - a)
             return place
     return None
 
 
-def _side(a: Floats, b: Floats, c: Floats) -> Floats:
+def _side(a: Array, b: Array, c: Array) -> Array:
     """Return which side of the line from a to b the point c lies on, for one or many lines or points."""
-    result: Floats = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
+    result: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
         c[..., 0] - a[..., 0]
     )
     return result

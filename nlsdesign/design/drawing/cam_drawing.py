@@ -12,11 +12,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ValueRangeError, unknown_name
-from ...quantity import Quantity
-from ...writing import write_text
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError, unknown_name
+from ...foundation.quantity import MM, Quantity
+from ...foundation.text_files import write_text
 from ..statics.contour import Contour, turn
 from .arc_path import ArcPath
 from .cam_part import CamPart
@@ -25,12 +25,9 @@ from .machined_cam import MachinedCam
 from .step_solid import part_step
 from .svg_drawing import page, part_svg, path_data
 
-Floats = NDArray[np.float64]
-
 FORMATS = ("csv", "svg", "dxf")
 """Files that are written unless others are asked for."""
 
-_MM = 1e3
 _COLUMNS = "angle_deg,direction_deg,x_mm,y_mm,lever_arm_mm,radius_of_curvature_mm,radius_mm"
 
 
@@ -104,7 +101,7 @@ def write_drawings(
         texts = _contour_texts(contour, note, cable_radius)
     elif cable_radius:
         raise ValueRangeError(
-            f"cable_radius {cable_radius * _MM:g} mm", "is declared by the machined cam already",
+            f"cable_radius {cable_radius * MM:g} mm", "is declared by the machined cam already",
             next_step="leave cable_radius out",
         )  # fmt: skip
     else:
@@ -141,15 +138,7 @@ def _part_texts(
 
 
 def edge_csv(part: CamPart, *, note: str = "") -> str:
-    """Return the lines and arcs of the edges, then the holes, one a row, in mm.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    note
-        One line.
-    """
+    """Return the lines and arcs of the edges, then the holes, one a row, in mm."""
     rows = []
     for index, outline in enumerate(part.outlines, start=1):
         for start, end, radius, centre in zip(*outline.ends[:2], outline.radii, outline.centres, strict=True):
@@ -161,40 +150,34 @@ def edge_csv(part: CamPart, *, note: str = "") -> str:
     head = [
         "# cam, machined edge; lengths in mm, axis at (0, 0), cable at angle zero along x",
         "# a row without a radius is a straight line; a positive radius turns to the left",
-        f"# cable radius {part.number('cable_radius') * _MM:.6g} mm is taken off",
+        f"# cable radius {part.number('cable_radius') * MM:.6g} mm is taken off",
         f"# {note}",
         "outline,start_x_mm,start_y_mm,end_x_mm,end_y_mm,radius_mm,centre_x_mm,centre_y_mm",
     ]
     cells = [
-        ",".join([what, *("" if item is None else f"{item * _MM + 0.0:.6f}" for item in row)])
+        ",".join([what, *("" if item is None else f"{item * MM + 0.0:.6f}" for item in row)])
         for what, row in rows
     ]
     return "\n".join([*head, *cells]) + "\n"
 
 
 def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
-    """Return the table of the lower right lip; the other three are its mirror images.
-
-    Parameters
-    ----------
-    contour, note, cable_radius
-        As for :func:`write_drawings`.
-    """
-    points = contour.surface(cable_radius) * _MM
+    """Return the table of the lower right lip; the other three are its mirror images."""
+    points = contour.surface(cable_radius) * MM
     table = np.column_stack(
         [
             np.degrees(contour.angles),
             np.degrees(contour.directions),
             points,
-            contour.lever_arms * _MM,
-            (contour.radii_of_curvature - cable_radius) * _MM,
+            contour.lever_arms * MM,
+            (contour.radii_of_curvature - cable_radius) * MM,
             np.hypot(*points.T),
         ]
     )
     head = [
         "# cam contour, lower right lip in the frame of the cam; lengths in mm, angles in deg",
-        f"# cable radius {cable_radius * _MM:.6g} mm is taken off, "
-        f"anchor distance {contour.anchor_distance * _MM:.6g} mm",
+        f"# cable radius {cable_radius * MM:.6g} mm is taken off, "
+        f"anchor distance {contour.anchor_distance * MM:.6g} mm",
         f"# {note}",
         _COLUMNS,
     ]
@@ -202,14 +185,8 @@ def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
 
 
 def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
-    """Return a picture at scale 1:1 with both halves, the centre and the cable at rest and at the last angle.
-
-    Parameters
-    ----------
-    contour, note, cable_radius
-        As for :func:`write_drawings`.
-    """
-    reach = 1.15 * float(contour.radii.max()) * _MM + 4.0
+    """Return a picture at scale 1:1: both halves, the centre, the cable at rest and at the last angle."""
+    reach = 1.15 * float(contour.radii.max()) * MM + 4.0
     last = float(contour.angles[-1])
     halves = [_polygon(half) for half in contour.outlines(cable_radius=cable_radius)]
     # In the frame of the cam the cable turns the other way.
@@ -231,17 +208,11 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
 
 
 def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
-    """Return both halves as closed polylines on the layer ``CONTOUR``, in millimetres.
-
-    Parameters
-    ----------
-    contour, note, cable_radius
-        As for :func:`write_drawings`.
-    """
-    taken = f"cable radius {cable_radius * _MM:.6g} mm taken off" if cable_radius else "cable's centre line"
+    """Return both halves as closed polylines on the layer ``CONTOUR``, in millimetres."""
+    taken = f"cable radius {cable_radius * MM:.6g} mm taken off" if cable_radius else "cable's centre line"
     lines = [f"Cam contour, {taken}; millimetres, 1:1", "no edge to be cut: without channel and run-out"]
     return contour_dxf(contour.outlines(cable_radius=cable_radius), lines=[*lines, note] if note else lines)
 
 
-def _polygon(points: Floats) -> ArcPath:
+def _polygon(points: Array) -> ArcPath:
     return ArcPath(points[:-1], np.zeros(len(points) - 1), closed=True)

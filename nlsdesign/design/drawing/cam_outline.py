@@ -6,34 +6,16 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import MM, Quantity
 from .arc_path import ArcPath, biarc, clockwise_arc, joined, line
 from .lip_edge import LipEdge
 
-Floats = NDArray[np.float64]
-
-_MM = 1e3
-
 
 def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[ArcPath, ArcPath]:
-    """Return the lower and the upper half, each closed and clockwise.
-
-    Parameters
-    ----------
-    lip
-        Lower right lip.
-    numbers
-        ``cable_radius``, ``channel_width``, ``tool_radius``, ``corner_radius``, ``body_radius`` and, where
-        the cable has a ferrule on the axis, ``ferrule_seat``.
-
-    Raises
-    ------
-    ValueRangeError
-        If the channel has no room, or the lip turns back under itself.
-    """
+    """Return the lower and the upper half, each closed and clockwise."""
     end = _end_circle(lip, numbers)
     if lip.last_direction >= math.pi:
         raise ValueRangeError(
@@ -49,8 +31,8 @@ def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[A
     taken = float(seat[0].points[-1][0]) if seat else 0.0
     if relief.points[0][0] < taken:
         raise ValueRangeError(
-            f"channel, {_MM * float(mouth[0]):.4g} mm from the axis to its mouth",
-            f"needs {_MM * (float(mouth[0] - relief.points[0][0]) + taken):.4g} mm for its relief"
+            f"channel, {MM * float(mouth[0]):.4g} mm from the axis to its mouth",
+            f"needs {MM * (float(mouth[0] - relief.points[0][0]) + taken):.4g} mm for its relief"
             + (" and the ferrule" if seat else ""),
             next_step="take a smaller channel_clearance or ferrule, or a contour that begins farther out",
         )
@@ -61,21 +43,7 @@ def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[A
 
 
 def one_sided_outline(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:
-    """Return the outline of a one-sided cam, closed and clockwise.
-
-    Parameters
-    ----------
-    lip
-        Edge under the cable.
-    numbers
-        ``cable_radius``, ``lead_in``, ``corner_radius``, ``body_radius``, ``minimum_wall`` and, where the
-        cable has a ferrule, ``ferrule_seat``.
-
-    Raises
-    ------
-    ArrangementError
-        If lip, lead-in and body cannot be joined by a convex back.
-    """
+    """Return the outline of a one-sided cam, closed and clockwise."""
     phi, corner = lip.first_direction, numbers["corner_radius"].number
     along = np.array([math.cos(phi), -math.sin(phi)])
     start = lip.path.points[0] - numbers["lead_in"].number * along
@@ -99,13 +67,13 @@ def one_sided_outline(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:
     return joined(lip.path, back, lead, closed=True)
 
 
-def _end_circle(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[Floats, float]:
+def _end_circle(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[Array, float]:
     radius = numbers["corner_radius"].number
     normal = np.array([math.sin(lip.last_direction), math.cos(lip.last_direction)])
     return lip.path.points[-1] - radius * normal, radius
 
 
-def _back(circles: list[tuple[Floats, float]], first: float, last: float) -> ArcPath:
+def _back(circles: list[tuple[Array, float]], first: float, last: float) -> ArcPath:
     """Return the convex cover, clockwise, from one direction of the normal to another.
 
     The middle circle is left out where the line between the others covers it.
@@ -119,14 +87,14 @@ def _back(circles: list[tuple[Floats, float]], first: float, last: float) -> Arc
         pieces = [(one, first, into), (body, into, out), (other, out, last)]
     else:
         raise ArrangementError(
-            f"body of radius {_MM * body[1]:.4g} mm",
+            f"body of radius {MM * body[1]:.4g} mm",
             "has no convex back together with the ends of the edge",
             next_step="take a smaller over_travel or body_radius, or a shorter lead_in",
         )
     return joined(*(clockwise_arc(centre, size, first=a, last=b) for (centre, size), a, b in pieces))
 
 
-def _joining(one: tuple[Floats, float], other: tuple[Floats, float], after: float) -> float | None:
+def _joining(one: tuple[Array, float], other: tuple[Array, float], after: float) -> float | None:
     """Return the direction of the normal of the common outer tangent from one circle to another."""
     step, growth = other[0] - one[0], one[1] - other[1]
     size = math.hypot(*step)
@@ -136,7 +104,7 @@ def _joining(one: tuple[Floats, float], other: tuple[Floats, float], after: floa
     return after + (direction - after) % (2.0 * math.pi)
 
 
-def _relief(mouth: Floats, direction: float, wall: float, tool_radius: float) -> ArcPath:
+def _relief(mouth: Array, direction: float, wall: float, tool_radius: float) -> ArcPath:
     """Return the edge from the wall of the channel up to its mouth: two arcs the tool can cut."""
     depth = float(mouth[1]) - wall
     if depth < 1e-9:
@@ -151,8 +119,8 @@ def _seat(radius: float, depth: float) -> ArcPath:
     """Return the pocket of a ferrule about the origin, below a wall at −depth, from left to right."""
     if radius <= depth:
         raise ValueRangeError(
-            f"ferrule seat of {_MM * 2 * radius:.4g} mm",
-            f"is no wider than the channel, {_MM * 2 * depth:.4g} mm",
+            f"ferrule seat of {MM * 2 * radius:.4g} mm",
+            f"is no wider than the channel, {MM * 2 * depth:.4g} mm",
             next_step="give the diameter of the ferrule",
         )
     half = math.sqrt(radius**2 - depth**2)

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...quantity import Quantity
+from ...foundation.arrays import Array
+from ...foundation.quantity import Quantity
 from .arc_path import ArcPath
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +30,7 @@ class Hole:
     """
 
     name: str
-    centre: Floats
+    centre: Array
     diameter: float
     base_only: bool = False
 
@@ -62,7 +60,7 @@ class CamPart:
     holes: tuple[Hole, ...]
     base_radius: float
     cables: tuple[ArcPath, ...]
-    centre_line: Floats
+    centre_line: Array
     numbers: Mapping[str, Quantity]
 
     @cached_property

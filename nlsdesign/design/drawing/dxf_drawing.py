@@ -13,17 +13,16 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
+from ...foundation.quantity import MM
 from .arc_path import ArcPath
 from .cam_part import CamPart
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
-Floats = NDArray[np.float64]
 
-_MM = 1e3
 # name -> (colour of AutoCAD's index, line type)
 _LAYERS = {
     "EDGE": (7, "CONTINUOUS"),
@@ -39,15 +38,7 @@ _TEXT_HEIGHT = 1.8
 
 
 def part_dxf(part: CamPart, *, note: str = "") -> str:
-    """Return a cam as it is made; the numbers of the file are millimetres, and it says so.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    note
-        One line, for instance a fingerprint.
-    """
+    """Return a cam as it is made; the numbers of the file are millimetres, and it says so."""
     document = _document()
     space = document.modelspace()
     for outline in part.outlines:
@@ -64,15 +55,10 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
     return _text(document)
 
 
-def contour_dxf(outlines: tuple[Floats, ...], *, lines: list[str]) -> str:
+def contour_dxf(outlines: tuple[Array, ...], *, lines: list[str]) -> str:
     """Return closed polygons on the layer ``CONTOUR``.
 
-    Parameters
-    ----------
-    outlines
-        Each of shape (n, 2) in m; the last point is the first.
-    lines
-        What to write below.
+    ``outlines``: each of shape (n, 2) in m; the last point is the first.
     """
     document = _document()
     for outline in outlines:
@@ -84,14 +70,14 @@ def contour_dxf(outlines: tuple[Floats, ...], *, lines: list[str]) -> str:
 
 
 def _part_lines(part: CamPart, note: str) -> list[str]:
-    size = {name: f"{_MM * part.number(name):.4g} mm" for name in ("cable_radius", "thickness")}
+    size = {name: f"{MM * part.number(name):.4g} mm" for name in ("cable_radius", "thickness")}
     lines = [
         "Cam, machined edge; millimetres, 1:1",
         f"for a cable of radius {size['cable_radius']}, plate {size['thickness']}",
         f"arcs within {1e6 * part.number('edge_deviation'):.2g} um of the exact edge",
     ]
     if "groove_depth" in part.numbers:
-        lines.append(f"edges milled {_MM * part.number('groove_depth'):.4g} mm deep, base disc below")
+        lines.append(f"edges milled {MM * part.number('groove_depth'):.4g} mm deep, base disc below")
     return [*lines, note] if note else lines
 
 
@@ -131,7 +117,7 @@ def _text(document: Drawing) -> str:
 
 def _rounded(value: float) -> float:
     """Return millimetres to a millionth, so that all processors write the same digits."""
-    return round(_MM * float(value), 6) + 0.0
+    return round(MM * float(value), 6) + 0.0
 
 
 def _add_path(document: Drawing, path: ArcPath, layer: str) -> None:
@@ -143,15 +129,15 @@ def _add_path(document: Drawing, path: ArcPath, layer: str) -> None:
 
 
 def _add_axes(document: Drawing, reach: float) -> None:
-    end = math.ceil(1.15 * _MM * reach)
+    end = math.ceil(1.15 * MM * reach)
     for x, y in ((end, 0.0), (0.0, end)):
         document.modelspace().add_line((-x, -y), (x, y), dxfattribs={"layer": "CENTRE"})
     document.modelspace().add_point((0.0, 0.0), dxfattribs={"layer": "CENTRE"})
 
 
 def _add_text(document: Drawing, lines: list[str], *, below: float) -> None:
-    top = -math.ceil(1.2 * _MM * below) - 2.0 * _TEXT_HEIGHT
+    top = -math.ceil(1.2 * MM * below) - 2.0 * _TEXT_HEIGHT
     for index, line in enumerate(lines):
         document.modelspace().add_text(line, height=_TEXT_HEIGHT, dxfattribs={"layer": "TEXT"}).set_placement(
-            (-math.ceil(_MM * below), top - 1.7 * _TEXT_HEIGHT * index)
+            (-math.ceil(MM * below), top - 1.7 * _TEXT_HEIGHT * index)
         )

@@ -6,19 +6,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
-from ...errors import ValueRangeError
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import MM
 from ..statics.contour import Contour
 from .arc_path import ArcPath, biarc, clockwise_arc, joined
-
-Floats = NDArray[np.float64]
 
 ACCURACY = 0.5e-6
 """Largest distance between the arcs and the contour in m."""
 
-_MM = 1e3
 _REFINE = 4
 _CHECKED = 33
 
@@ -50,20 +48,6 @@ def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> Li
     """Return the edge on which a cable has its centre line on the contour.
 
     Beyond the last angle the edge goes on as an arc with the last radius of curvature.
-
-    Parameters
-    ----------
-    contour
-        Of the cable's centre line.
-    cable_radius
-        In m.
-    over_travel
-        Angle of the cam beyond the last one in rad over which the cable still lies on the run-out.
-
-    Raises
-    ------
-    ValueRangeError
-        If the contour is concave or sharper than the cable, or the run-out reaches the anchor.
     """
     _check_curvature(contour, cable_radius)
     phi = contour.directions
@@ -87,11 +71,11 @@ def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> Li
     )
 
 
-def _normal(direction: float) -> Floats:
+def _normal(direction: float) -> Array:
     return np.array([math.sin(direction), math.cos(direction)])
 
 
-def _tangent(direction: float) -> Floats:
+def _tangent(direction: float) -> Array:
     return np.array([math.cos(direction), -math.sin(direction)])
 
 
@@ -102,25 +86,25 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
     if radii[index] <= 0.0:
         raise ValueRangeError(
             f"contour {place}",
-            f"is concave there (radius of curvature {_MM * radii[index]:.4g} mm); a taut cable lifts off",
+            f"is concave there (radius of curvature {MM * radii[index]:.4g} mm); a taut cable lifts off",
             next_step="design with MinimumRadiusOfCurvature above the cable's radius",
         )
     if radii[index] < cable_radius + ACCURACY:
         raise ValueRangeError(
-            f"cable radius {_MM * cable_radius:g} mm",
+            f"cable radius {MM * cable_radius:g} mm",
             f"the cable is thicker than the sharpest radius under its centre line, "
-            f"{_MM * radii[index]:.4g} mm {place}",
+            f"{MM * radii[index]:.4g} mm {place}",
             next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
         )
 
 
-def _point(support: BPoly, direction: float, cable_radius: float) -> Floats:
+def _point(support: BPoly, direction: float, cable_radius: float) -> Array:
     p, slope = float(support(direction)), float(support(direction, 1))
-    result: Floats = (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
+    result: Array = (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
     return result
 
 
-def _arcs(support: BPoly, phi: Floats, cable_radius: float) -> tuple[ArcPath, float]:
+def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, float]:
     """Return as few biarcs as the accuracy allows, and their deviation."""
     share = np.arange(_REFINE) / _REFINE
     grid = np.append((phi[:-1, None] + share * np.diff(phi)[:, None]).ravel(), phi[-1])

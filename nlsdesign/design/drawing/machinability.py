@@ -6,34 +6,19 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import MM
 from .arc_path import crossing, distance_to, inside_of
 from .cam_part import CamPart, Hole
 
-Floats = NDArray[np.float64]
-
-_MM = 1e3
 _CHORD = 2e-6
 _SLACK = 3e-6
 
 
 def check_machinable(part: CamPart) -> None:
-    """Refuse a part that cannot be made as drawn.
-
-    Parameters
-    ----------
-    part
-        The cam.
-
-    Raises
-    ------
-    ArrangementError
-        If an edge crosses itself, or a bore would cut the channel.
-    ValueRangeError
-        If a radius, a wall, a hole or the plate does not fit.
-    """
+    """Refuse a part that cannot be made as drawn."""
     _check_plate(part)
     _check_edges(part)
     _check_tool(part)
@@ -50,14 +35,14 @@ def _check_plate(part: CamPart) -> None:
     groove, cable = part.number("groove_depth"), 2.0 * part.number("cable_radius")
     if groove < cable:
         raise ValueRangeError(
-            f"groove_depth {_MM * groove:.4g} mm", f"is less than the cable is thick, {_MM * cable:.4g} mm",
+            f"groove_depth {MM * groove:.4g} mm", f"is less than the cable is thick, {MM * cable:.4g} mm",
             next_step="mill deeper, for instance two diameters of the cable",
         )  # fmt: skip
     base, wall = part.number("thickness") - groove, part.number("minimum_wall")
     if base < wall - _SLACK:
         raise ValueRangeError(
-            f"groove_depth {_MM * groove:.4g} mm",
-            f"leaves a base of {_MM * base:.4g} mm, less than minimum_wall {_MM * wall:.4g} mm",
+            f"groove_depth {MM * groove:.4g} mm",
+            f"leaves a base of {MM * base:.4g} mm, less than minimum_wall {MM * wall:.4g} mm",
             next_step="take a thicker plate",
         )
 
@@ -66,7 +51,7 @@ def _check_edges(part: CamPart) -> None:
     for outline in part.outlines:
         place = crossing(outline.polygon(10 * _CHORD))
         if place is not None:
-            x, y = _MM * place
+            x, y = MM * place
             raise ArrangementError(
                 "edge of the cam", f"crosses itself at x = {x:.4g} mm, y = {y:.4g} mm",
                 next_step="take a smaller over_travel, lead_in, corner_radius or body_radius",
@@ -79,7 +64,7 @@ def _check_edges(part: CamPart) -> None:
         _check_backs(part, lower)
 
 
-def _check_backs(part: CamPart, lower: Floats) -> None:
+def _check_backs(part: CamPart, lower: Array) -> None:
     """The material between channel and back, on the y axis where the channel is closest to it."""
     heights = [
         y0 + (y1 - y0) * x0 / (x0 - x1)
@@ -89,8 +74,8 @@ def _check_backs(part: CamPart, lower: Floats) -> None:
     depth, wall = max(heights) - min(heights), part.number("minimum_wall")
     if depth < wall:
         raise ValueRangeError(
-            f"half of the cam, {_MM * depth:.4g} mm between channel and back",
-            f"is thinner than minimum_wall {_MM * wall:.4g} mm",
+            f"half of the cam, {MM * depth:.4g} mm between channel and back",
+            f"is thinner than minimum_wall {MM * wall:.4g} mm",
             next_step="take a larger body_radius",
         )
 
@@ -99,8 +84,8 @@ def _check_tool(part: CamPart) -> None:
     sharpest, tolerance = part.number("sharpest_edge"), part.number("edge_tolerance")
     if sharpest < tolerance:
         raise ValueRangeError(
-            f"edge under the cable, with a radius of {_MM * sharpest:.3g} mm at its sharpest",
-            f"is a corner within its tolerance of {_MM * tolerance:.3g} mm",
+            f"edge under the cable, with a radius of {MM * sharpest:.3g} mm at its sharpest",
+            f"is a corner within its tolerance of {MM * tolerance:.3g} mm",
             next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
         )
     tool = part.number("tool_radius")
@@ -109,16 +94,16 @@ def _check_tool(part: CamPart) -> None:
     smallest = float(np.min(inner, where=(inner > 0.0) & np.isfinite(inner), initial=math.inf))
     if smallest < tool * (1.0 - 1e-6):
         raise ValueRangeError(
-            f"tool_radius {_MM * tool:.4g} mm",
-            f"is larger than an inner corner of the edge, {_MM * smallest:.4g} mm",
+            f"tool_radius {MM * tool:.4g} mm",
+            f"is larger than an inner corner of the edge, {MM * smallest:.4g} mm",
             next_step="take a smaller tool or a larger ferrule seat",
         )
     if "groove_depth" in part.numbers and "mouth_width" in part.numbers:
         mouth = part.number("mouth_width")
         if 2.0 * tool > mouth * (1.0 + 1e-6):
             raise ValueRangeError(
-                f"tool_radius {_MM * tool:.4g} mm",
-                f"does not pass the mouth of the channel, {_MM * mouth:.4g} mm wide",
+                f"tool_radius {MM * tool:.4g} mm",
+                f"does not pass the mouth of the channel, {MM * mouth:.4g} mm wide",
                 next_step="take a smaller tool, or leave groove_depth out and cut the halves through",
             )
 
@@ -126,21 +111,21 @@ def _check_tool(part: CamPart) -> None:
 def _check_anchor(part: CamPart) -> None:
     if "anchor_distance" in part.numbers and part.reach >= part.number("anchor_distance"):
         raise ValueRangeError(
-            f"edge of the cam, up to {_MM * part.reach:.4g} mm from the axis",
-            f"reaches the anchor at {_MM * part.number('anchor_distance'):.4g} mm",
+            f"edge of the cam, up to {MM * part.reach:.4g} mm from the axis",
+            f"reaches the anchor at {MM * part.number('anchor_distance'):.4g} mm",
             next_step="take a smaller over_travel or corner_radius, or move the anchor out",
         )
 
 
-def _check_hole(hole: Hole, part: CamPart, polygons: list[Floats]) -> None:
+def _check_hole(hole: Hole, part: CamPart, polygons: list[Array]) -> None:
     wall = part.number("minimum_wall")
-    away = _MM * math.hypot(*hole.centre)
-    what = f"{hole.name} of {_MM * hole.diameter:.4g} mm at {away:.4g} mm from the axis"
+    away = MM * math.hypot(*hole.centre)
+    what = f"{hole.name} of {MM * hole.diameter:.4g} mm at {away:.4g} mm from the axis"
     if part.base_radius:
         left = part.base_radius - math.hypot(*hole.centre) - hole.diameter / 2.0
         if left < wall - _SLACK:
             raise ValueRangeError(
-                what, f"leaves {_MM * left:.4g} mm to the rim, minimum_wall is {_MM * wall:.4g} mm",
+                what, f"leaves {MM * left:.4g} mm to the rim, minimum_wall is {MM * wall:.4g} mm",
                 next_step="take a smaller circle or hole",
             )  # fmt: skip
     if hole.base_only:
@@ -158,7 +143,7 @@ def _check_hole(hole: Hole, part: CamPart, polygons: list[Floats]) -> None:
     if left < wall - _SLACK:
         raise ValueRangeError(
             what,
-            f"leaves {_MM * left:.4g} mm to the edge, minimum_wall is {_MM * wall:.4g} mm",
+            f"leaves {MM * left:.4g} mm to the edge, minimum_wall is {MM * wall:.4g} mm",
             next_step="take smaller holes, another circle, or a larger body_radius",
         )
 
@@ -171,6 +156,6 @@ def _check_between_holes(part: CamPart) -> None:
             if left < wall - _SLACK:
                 raise ValueRangeError(
                     f"{one.name} and {other.name}",
-                    f"leave {_MM * left:.4g} mm between them, minimum_wall is {_MM * wall:.4g} mm",
+                    f"leave {MM * left:.4g} mm between them, minimum_wall is {MM * wall:.4g} mm",
                     next_step="take fewer or smaller holes, or a larger circle",
                 )

@@ -7,10 +7,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity, quantity
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity, quantity
 from ..curves.numbers import in_si, plain
 from ..statics.contour import Contour
 from .arc_path import ArcPath
@@ -18,8 +18,6 @@ from .cam_outline import one_sided_outline, two_sided_outlines
 from .cam_part import CamPart, Hole
 from .lip_edge import LipEdge, lip_edge
 from .machinability import check_machinable
-
-Floats = NDArray[np.float64]
 
 _CLEARANCE = quantity(0.1, "mm", source="assumed: a braided cable of this size passes a gap so much wider")
 _OVER_TRAVEL = quantity(10.0, "deg", source="assumed: room for a stop behind the last angle")
@@ -78,7 +76,7 @@ class BoltCircle:
 
     Examples
     --------
-    >>> from nlsdesign.quantity import quantity
+    >>> from nlsdesign.foundation.quantity import quantity
     >>> BoltCircle(count=4, circle=quantity(16.0, "mm"), hole=quantity(2.2, "mm")).centres.shape
     (4, 2)
     """
@@ -92,13 +90,13 @@ class BoltCircle:
         _check(self)
 
     @property
-    def centres(self) -> Floats:
+    def centres(self) -> Array:
         """Centres of the holes in m, shape (count, 2); the first nearest to the y axis."""
         step = 2.0 * math.pi / self.count
         # Half a step off the y axis where a hole would else lie on the x axis.
         first = math.pi / 2 + (step / 2 if self.count % 4 == 0 else 0.0)
         angles = first + step * np.arange(self.count)
-        result: Floats = plain(self.circle) / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
+        result: Array = plain(self.circle) / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
         return result
 
 
@@ -325,7 +323,7 @@ class MachinedTwoSidedCam(MachinedCam):
 
     Examples
     --------
-    >>> from nlsdesign.quantity import quantity
+    >>> from nlsdesign.foundation.quantity import quantity
     >>> MachinedTwoSidedCam(cable_radius=quantity(0.25, "mm")).given()["thickness"].shown
     4.0
     """
@@ -431,27 +429,19 @@ class MachinedOneSidedCam(MachinedCam):
         return [outline], holes, [ArcPath(points, np.zeros(len(points))) for points in cables]
 
 
-def _cable(contour: Contour, angle: float, beyond: float) -> Floats:
+def _cable(contour: Contour, angle: float, beyond: float) -> Array:
     """Return the cable from the first point of the contour to beyond the contact, in the frame of the cam."""
     on = contour.angles <= angle
     last = int(np.flatnonzero(on)[-1])
     away = min(float(contour.free_lengths[last]), beyond + (0.0 if last else float(contour.radii.max())))
     direction = float(contour.directions[last])
     leaving = contour.points[last] + away * np.array([math.cos(direction), -math.sin(direction)])
-    result: Floats = np.vstack([contour.points[: last + 1], leaving])
+    result: Array = np.vstack([contour.points[: last + 1], leaving])
     return result
 
 
 def as_quantity(given: Quantity | float, unit: str = "m") -> Quantity:
-    """Return a quantity.
-
-    Parameters
-    ----------
-    given
-        A quantity, or a number in SI.
-    unit
-        SI unit of a bare number.
-    """
+    """Return a quantity."""
     return given if isinstance(given, Quantity) else Quantity(given, unit)
 
 

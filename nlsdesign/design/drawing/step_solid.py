@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ExportError, missing_library
+from ...foundation.errors import ExportError, missing_library
+from ...foundation.quantity import MM
 from .arc_path import ArcPath
 from .cam_part import CamPart
 
-_MM = 1e3
 _PRODUCT = re.compile(r"PRODUCT\('[^']*','[^']*'")
 _USE = re.compile(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+'")
 _STAMP = re.compile(r"(FILE_NAME\(\s*')[^']*('\s*,\s*')[^']*(')")
@@ -25,19 +25,7 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
 
     The base plate lies from z = 0 up, the lips on it; holes through the base alone end below them.
 
-    Parameters
-    ----------
-    part
-        The cam.
-    name
-        Name of the product in the file; what is neither letter nor digit becomes ``_``.
-
-    Raises
-    ------
-    MissingLibraryError
-        If Open CASCADE is not installed.
-    ExportError
-        If Open CASCADE makes no solid, or cannot write it.
+    ``name``: name of the product in the file; what is neither letter nor digit becomes ``_``.
     """
     name = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
     try:
@@ -77,16 +65,16 @@ def _solid(part: CamPart) -> Any:
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
     from OCP.BRepCheck import BRepCheck_Analyzer
 
-    top = _MM * part.number("thickness")
-    floor = top - _MM * part.number("groove_depth") if part.base_radius else 0.0
-    shape = _cylinder(0.0, 0.0, _MM * part.base_radius, floor) if part.base_radius else None
+    top = MM * part.number("thickness")
+    floor = top - MM * part.number("groove_depth") if part.base_radius else 0.0
+    shape = _cylinder(0.0, 0.0, MM * part.base_radius, floor) if part.base_radius else None
     for outline in part.outlines:
         lip = _prism(outline, floor, top)
         shape = lip if shape is None else BRepAlgoAPI_Fuse(shape, lip).Shape()
     for hole in part.holes:
-        x, y = _MM * hole.centre
+        x, y = MM * hole.centre
         height = floor if hole.base_only else top
-        shape = BRepAlgoAPI_Cut(shape, _cylinder(x, y, _MM * hole.diameter / 2.0, height)).Shape()
+        shape = BRepAlgoAPI_Cut(shape, _cylinder(x, y, MM * hole.diameter / 2.0, height)).Shape()
     if shape is None or not BRepCheck_Analyzer(shape).IsValid():
         raise ExportError("STEP", "Open CASCADE made no valid solid", next_step="take DXF or SVG instead")
     return shape
@@ -106,7 +94,7 @@ def _prism(outline: ArcPath, floor: float, top: float) -> Any:
     from OCP.gp import gp_Pnt, gp_Vec
 
     def point(place: Any) -> Any:
-        return gp_Pnt(_MM * float(place[0]), _MM * float(place[1]), floor)
+        return gp_Pnt(MM * float(place[0]), MM * float(place[1]), floor)
 
     wire = BRepBuilderAPI_MakeWire()
     for start, end, bulge in zip(*outline.ends, strict=True):

@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.quantity import MM
 from .arc_path import ArcPath
 from .cam_part import CamPart
 
-Floats = NDArray[np.float64]
-
-_MM = 1e3
 _TEXT = 2.2
 
 
 def part_svg(part: CamPart, *, note: str = "") -> str:
-    """Return a cam as it is made, at scale 1:1, its cable at angle zero and at both ends of the contour.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    note
-        One line, for instance a fingerprint.
-    """
-    reach = 1.12 * _MM * max(part.outermost, *(float(np.abs(cable.points).max()) for cable in part.cables))
+    """Return a cam as it is made, at scale 1:1, its cable at angle zero and at both ends of the contour."""
+    reach = 1.12 * MM * max(part.outermost, *(float(np.abs(cable.points).max()) for cable in part.cables))
     body = []
     if part.base_radius:
         body.append(
@@ -47,8 +36,8 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
     ]
     body.append('<path d="M -1.5 0 H 1.5 M 0 -1.5 V 1.5" stroke="#202020" stroke-width="0.08"/>')
     text = (
-        f"Machined edge for a cable of radius {_MM * part.number('cable_radius'):.4g} mm, "
-        f"plate {_MM * part.number('thickness'):.4g} mm; mm, 1:1"
+        f"Machined edge for a cable of radius {MM * part.number('cable_radius'):.4g} mm, "
+        f"plate {MM * part.number('thickness'):.4g} mm; mm, 1:1"
     )
     return page(reach, body, lines=[text, note])
 
@@ -56,14 +45,8 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
 def page(reach: float, body: list[str], *, lines: list[str]) -> str:
     """Return a square page about the axis with some lines of text below.
 
-    Parameters
-    ----------
-    reach
-        Half the width of the drawing in mm.
-    body
-        Elements in mm with y upwards.
-    lines
-        Text below the drawing; the first is the title too.
+    ``reach``: half the width of the drawing in mm. ``body``: elements in mm with y upwards. ``lines``: text
+    below the drawing; the first is the title too.
     """
     lines = [_escaped(line) for line in lines if line]
     longest = max(len(line) for line in lines)
@@ -95,16 +78,10 @@ def page(reach: float, body: list[str], *, lines: list[str]) -> str:
 
 
 def path_data(path: ArcPath) -> str:
-    """Return the path in mm as the data of an SVG path, y upwards.
-
-    Parameters
-    ----------
-    path
-        In m.
-    """
-    points, (_, ends, bulges) = path.points * _MM, path.ends
+    """Return the path in mm as the data of an SVG path, y upwards."""
+    points, (_, ends, bulges) = path.points * MM, path.ends
     steps = [f"M {points[0][0]:.5f} {points[0][1]:.5f}"]
-    for (x, y), bulge, radius in zip(ends * _MM, bulges, np.abs(path.radii) * _MM, strict=True):
+    for (x, y), bulge, radius in zip(ends * MM, bulges, np.abs(path.radii) * MM, strict=True):
         if bulge == 0.0:
             steps.append(f"L {x:.5f} {y:.5f}")
         else:
@@ -115,7 +92,7 @@ def path_data(path: ArcPath) -> str:
 
 
 def _circle(x: float, y: float, radius: float, look: str) -> str:
-    return f'<circle cx="{_MM * x:.5f}" cy="{_MM * y:.5f}" r="{_MM * radius:.5f}" {look}/>'
+    return f'<circle cx="{MM * x:.5f}" cy="{MM * y:.5f}" r="{MM * radius:.5f}" {look}/>'
 
 
 def _escaped(text: str) -> str:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...deck import Deck, read_deck
-from ...errors import DeckError, NlsError, UnitError, brief, unknown_name
-from ...quantity import Quantity, quantity
-from ...reading import text_of
-from ...written_numbers import split_number
+from ...foundation.deck import Deck, read_deck
+from ...foundation.errors import DeckError, NlsError, UnitError, brief, unknown_name
+from ...foundation.quantity import Quantity, quantity
+from ...foundation.text_files import text_of
+from ...foundation.written_numbers import split_number
 from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target
 from ..curves.target_files import read_band, read_target
@@ -31,7 +31,8 @@ from .task_target import TaskTarget
 Asked = TypeVar("Asked")
 
 _TABLES = ("spring", "free", "target", "limits", "goals", "stock", "search", "tolerance", "drawing")
-_DRAWS = 1000
+DRAWS = 1000
+_NO_FILE = Deck("", "", Path("design"), {}, {})
 _SEARCH = ("starts", "seed", "largest_error")
 
 
@@ -58,7 +59,7 @@ class DesignJob:
     drawing
         The table of that name, as read.
     deck
-        The whole file with the places of its names.
+        The whole file with the places of its names, where there is one.
     """
 
     path: Path
@@ -68,8 +69,8 @@ class DesignJob:
     goals: tuple[Goal, ...]
     spring: str | None
     settings: DesignSettings
-    drawing: Mapping[str, Any]
-    deck: Deck
+    drawing: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    deck: Deck = _NO_FILE
 
 
 def read_job(path: Path | str) -> DesignJob:
@@ -142,22 +143,7 @@ def job_of(text: str, file: Path) -> DesignJob:
 
 
 def job_in(deck: Deck) -> DesignJob:
-    """Return what is asked of a design by tables that were read; see :func:`job_of`.
-
-    Parameters
-    ----------
-    deck
-        Tables of a design file, with their places.
-
-    Raises
-    ------
-    DeckError
-        If a table is of the wrong kind; file, line and column are named.
-    UnknownNameError
-        If there is no such table, limit, goal, target or field, with the nearest that exists.
-    NlsError
-        If a number is refused by what it is for, with its place.
-    """
+    """Return what is asked of a design by tables that were read; see :func:`job_of`."""
     file = deck.path
     for key in deck.tables:
         if key not in _TABLES:
@@ -169,12 +155,13 @@ def job_in(deck: Deck) -> DesignJob:
                       'or file = "..."',
         )  # fmt: skip
     free = _names(deck, "free")
-    stock = tuple(_stock(deck))
+    target, band = _target(deck)
+    stock = tuple(_stock(deck, "stock", _table(deck, "stock")))
     return DesignJob(
         path=file,
-        target=_target(deck),
+        target=target,
         free=None if free is None and not stock else (*(free or ()), *stock),
-        keep=(*_objects(deck, "limits", Limit), *_band(deck)),  # type: ignore[type-abstract]
+        keep=(*_objects(deck, "limits", Limit), *band),  # type: ignore[type-abstract]
         goals=tuple(_objects(deck, "goals", Goal)) or GOALS,  # type: ignore[type-abstract]
         spring=None if "spring" not in deck.tables else str(deck.tables["spring"]),
         settings=_settings(deck),
@@ -184,13 +171,7 @@ def job_in(deck: Deck) -> DesignJob:
 
 
 def kinds(base: type) -> dict[str, type]:
-    """Return the classes that can be named in a design file, by name.
-
-    Parameters
-    ----------
-    base
-        Of targets, limits or goals.
-    """
+    """Return the classes that can be named in a design file, by name."""
     result: dict[str, type] = {}
     kind: type
     for kind in base.__subclasses__():
@@ -200,7 +181,8 @@ def kinds(base: type) -> dict[str, type]:
     return dict(sorted(result.items()))
 
 
-def _target(deck: Deck) -> Target | TaskTarget:
+def _target(deck: Deck) -> tuple[Target | TaskTarget, tuple[Limit, ...]]:
+    """Return the target, and the band that stands beside it in its file."""
     table = _table(deck, "target")
     if len(table) != 1:
         rule = f"has {len(table)} entries, a design has one target" if table else "none is given"
@@ -211,26 +193,39 @@ def _target(deck: Deck) -> Target | TaskTarget:
         )  # fmt: skip
     ((name, given),) = table.items()
     if name == "file":
-        return read_target(_target_file(deck))
+        return target_of_file(deck.path.parent / str(given))
     if name == "TaskTarget":
-        task: TaskTarget = built(deck, TaskTarget, given, deck.place("target.TaskTarget"))
-        return task
+        return built(deck, TaskTarget, given, deck.place("target.TaskTarget")), ()
     (target,) = _objects(deck, "target", Target)  # type: ignore[type-abstract]
-    return target
+    return target, ()
 
 
-def _target_file(deck: Deck) -> Path:
-    return deck.path.parent / str(_table(deck, "target")["file"])
+def read_entries(text: str, base: type[Asked], origin: str) -> list[Asked]:
+    """Return the objects of one entry ``NAME = {field = "number unit"}``, as it stands in a design file."""
+    deck = read_deck(text, Path(origin))
+    return list(_of_kinds(deck, "", base, deck.tables))
 
 
-def _band(deck: Deck) -> Iterator[Limit]:
-    """Yield the band that stands beside the torque in the file of the target."""
-    if "file" not in _table(deck, "target"):
-        return
-    with _target_file(deck).open(encoding="utf-8-sig") as lines:
+def read_target_entry(text: str, origin: str) -> tuple[Target | TaskTarget, tuple[Limit, ...]]:
+    """Return the target of one entry, and the band that stands beside it; see :func:`read_entries`."""
+    deck = read_deck(text, Path(origin))
+    places = {f"target.{name}": place for name, place in deck.places.items()}
+    return _target(dataclasses.replace(deck, tables={"target": deck.tables}, places=places))
+
+
+def read_stock(text: str, origin: str) -> list[StockChoice]:
+    """Return the stock of one entry ``NAME = [...]``; raises as :func:`read_entries` does."""
+    deck = read_deck(text, Path(origin))
+    return list(_stock(deck, "", deck.tables))
+
+
+def target_of_file(path: Path) -> tuple[Target, tuple[Limit, ...]]:
+    """Return the curve of a file, and the band that stands beside it as a limit."""
+    target = read_target(path)
+    with path.open(encoding="utf-8-sig") as lines:
         head = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-    if "lower" in head and "upper" in head:
-        yield TorqueWithin(read_band(_target_file(deck)))
+    has_band = "lower" in head and "upper" in head
+    return target, (TorqueWithin(read_band(path)),) if has_band else ()
 
 
 def _objects(deck: Deck, key: str, base: type[Asked]) -> Iterator[Asked]:
@@ -241,7 +236,7 @@ def _objects(deck: Deck, key: str, base: type[Asked]) -> Iterator[Asked]:
 def _of_kinds(deck: Deck, key: str, base: type[Asked], table: Mapping[str, Any]) -> Iterator[Asked]:
     known = kinds(base)
     for name, given in table.items():
-        place = deck.place(f"{key}.{name}")
+        place = deck.place(f"{key}.{name}" if key else name)
         if name not in known:
             raise unknown_name(place, name, known)
         for fields in given if isinstance(given, list) else [given]:
@@ -249,28 +244,7 @@ def _of_kinds(deck: Deck, key: str, base: type[Asked], table: Mapping[str, Any])
 
 
 def built(deck: Deck, kind: type, given: object, place: str) -> Any:
-    """Return the object of a table.
-
-    Parameters
-    ----------
-    deck
-        The file.
-    kind
-        A dataclass.
-    given
-        Its fields by name.
-    place
-        For messages.
-
-    Raises
-    ------
-    DeckError
-        If it is no table, or a field is missing.
-    UnknownNameError
-        If there is no such field.
-    NlsError
-        If a field is refused.
-    """
+    """Return the object of a table."""
     if not isinstance(given, Mapping):
         raise DeckError(
             place, f"{brief(given)} is not a table", next_step='write it as {field = "number unit", ...}'
@@ -348,9 +322,9 @@ def _number(text: str, place: str) -> Quantity:
     return _placed(lambda: quantity(number, unit or "1", source="asked for in the design file"), place)
 
 
-def _stock(deck: Deck) -> Iterator[StockChoice]:
-    for name, given in _table(deck, "stock").items():
-        place = deck.place(f"stock.{name}")
+def _stock(deck: Deck, key: str, table: Mapping[str, Any]) -> Iterator[StockChoice]:
+    for name, given in table.items():
+        place = deck.place(f"{key}.{name}" if key else name)
         if not isinstance(given, list):
             raise DeckError(place, "is not a list", next_step='write for instance ["2 mm", "3 mm"]')
         if name == "rubber":
@@ -381,7 +355,7 @@ def _draws(deck: Deck) -> int:
     for name in table:
         if name != "draws":
             raise unknown_name(deck.place(f"tolerance.{name}"), name, ["draws"])
-    given = table.get("draws", _DRAWS)
+    given = table.get("draws", DRAWS)
     if not isinstance(given, int) or isinstance(given, bool):
         raise DeckError(deck.place("tolerance.draws"), f"{brief(given)} is not a whole number")
     return given

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ...errors import DeckError
+from ...components.assembly.named_parts import Assembly
+from ...foundation.errors import DeckError
+from ...foundation.quantity import Quantity
 from ...model import flatten
 from ...model.roles import series_cam
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
@@ -11,7 +13,7 @@ from ..statics.declared_cam import declared_cam
 from .job_file import DesignJob, built
 
 
-def machined_cam(design: CamDesign, job: DesignJob) -> MachinedCam:
+def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam:
     """Return the sizes of the part for a finished design: those of the design file, the cable as declared.
 
     Parameters
@@ -19,7 +21,8 @@ def machined_cam(design: CamDesign, job: DesignJob) -> MachinedCam:
     design
         Finished.
     job
-        Its table ``[drawing]`` names the sizes as :class:`MachinedTwoSidedCam` does.
+        Its table ``[drawing]`` names the sizes as :class:`MachinedTwoSidedCam` does; without it all sizes
+        are those that are usual.
 
     Raises
     ------
@@ -28,26 +31,29 @@ def machined_cam(design: CamDesign, job: DesignJob) -> MachinedCam:
     NlsError
         If a size is refused.
     """
-    model = flatten(design.actuator)
-    names = series_cam(model, design.drive)
-    kind = (
-        MachinedTwoSidedCam
-        if declared_cam(design.actuator[names.name]).through_centre
-        else MachinedOneSidedCam
-    )
-    sizes: dict[str, object] = dict(job.drawing)
+    name, kind, radius = declared_edge(design.actuator, design.drive)
+    sizes: dict[str, object] = {} if job is None else dict(job.drawing)
     if "cable_radius" not in sizes:
-        if names.cable is None:
+        if radius is None:
             raise DeckError(
-                f"{names.name}", "declares no cable, so the machined edge is not known",
+                name, "declares no cable, so the machined edge is not known",
                 next_step='declare cable_diameter, or write [drawing] cable_radius = "0.5 mm"',
             )  # fmt: skip
-        diameter = design.actuator.quantities()[names.cable.diameter]
-        half = diameter.with_value(diameter.number / 2.0, f"half of {names.cable.diameter}")
-        sizes["cable_radius"] = half
-    return _made(job, kind, sizes)
-
-
-def _made(job: DesignJob, kind: type[MachinedCam], sizes: dict[str, object]) -> MachinedCam:
+        sizes["cable_radius"] = radius
+    if job is None:
+        return kind(**sizes)  # type: ignore[arg-type]
     result: MachinedCam = built(job.deck, kind, sizes, job.deck.place("drawing"))
     return result
+
+
+def declared_edge(
+    actuator: Assembly, spring: str | None = None
+) -> tuple[str, type[MachinedCam], Quantity | None]:
+    """Return the path of the cam, the kind of part it is, and half of its cable, where that is declared."""
+    names = series_cam(flatten(actuator), spring)
+    two_sided = declared_cam(actuator[names.name]).through_centre
+    radius = None
+    if names.cable is not None:
+        diameter = actuator.quantities()[names.cable.diameter]
+        radius = diameter.with_value(diameter.number / 2.0, f"half of {names.cable.diameter}")
+    return names.name, MachinedTwoSidedCam if two_sided else MachinedOneSidedCam, radius

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
 from ...model import FlatModel
-from ...quantity import Quantity
 from ..curves.compliance import OddSpring, SpringSymmetry
 from ..curves.motor_and_gear import motor_and_gear
 from ..curves.numbers import in_si

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...model import FlatModel
 from ..curves.target import Target
 from ..statics.equilibrium import torque_function
 from .result import TorqueCheck
-
-Floats = NDArray[np.float64]
 
 _ANGLES = 801
 
@@ -18,19 +15,7 @@ _ANGLES = 801
 def torque_check(model: FlatModel, *, target: Target, spring: str | None = None) -> TorqueCheck:
     """Return the equilibrium torque of a model against a target.
 
-    Parameters
-    ----------
-    model
-        Flat model of the actuator.
-    target
-        Torque curve.
-    spring
-        Path of the spring; decided from the structure if it is left out.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not say which spring is meant.
+    ``spring``: path of the spring; decided from the structure if it is left out.
     """
     angles = np.linspace(0.0, target.last_angle, _ANGLES)
     torque = torque_function(model, spring)(angles.reshape(1, -1), model.start(model.parameters))

@@ -4,42 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...errors import ConvergenceError, InfeasibleError
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError, InfeasibleError
 from .design_search import Search
 from .limits import Bound
 from .loosening import FEASIBLE, Freed, Give, Loosened
 from .program import PROVED_INFEASIBLE
 
-Floats = NDArray[np.float64]
-
 _INVOLVED = 1e-3
 """Price, in give of the whole per give of this limit, from which a limit counts as part of the conflict."""
 
 
-def feasible_point(search: Search, free: Sequence[str]) -> Floats:
+def feasible_point(search: Search, free: Sequence[str]) -> Array:
     """Return unknowns that keep all limits, or say why there are none.
 
     Every limit gets a slack, and the sum of the slacks, each relative to the size of its limit, is made as
     small as possible. Where it does not vanish, each limit that has a price is relaxed alone, and each number
     that is held is freed alone.
-
-    Parameters
-    ----------
-    search
-        Whose starts all failed.
-    free
-        What may change in it.
-
-    Raises
-    ------
-    InfeasibleError
-        With the names of the limits in conflict, how much each would have to give, in its own unit, and which
-        number to free.
-    ConvergenceError
-        If the solver finds no answer.
     """
     loose = Loosened(search, free, largest_error=None, best=None)
     every = range(len(loose.bounds))
@@ -75,13 +56,7 @@ def feasible_point(search: Search, free: Sequence[str]) -> Floats:
 
 
 def names_of(bounds: Iterable[Bound]) -> list[str]:
-    """Return the names of the limits of some bounds, each once.
-
-    Parameters
-    ----------
-    bounds
-        In any order.
-    """
+    """Return the names of the limits of some bounds, each once."""
     return list(dict.fromkeys(bound.limit for bound in bounds))
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from ...model import FlatModel
 from ...model.roles import series_cam
+from ...model.spring_structure import SpecimenNames
 from .limits import (
     Limit,
     MaximumCableTension,
@@ -22,6 +25,9 @@ STRESS_FACTOR = 3.0
 falls by about a half over many cycles."""
 STRAIN_FACTOR = 3.0
 """Assumed, for the same reason as the factor of stress."""
+BREAKS = 5.0
+"""Nominal strain at which soft rubbers break, for rubber of which nothing is stated: the tensile curve of
+PMC-770 ends there (Schepelmann 2014)."""
 
 
 def safe_limits(model: FlatModel, spring: str | None = None) -> tuple[Limit, ...]:
@@ -62,14 +68,39 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
 
 
 def with_defaults(keep: Sequence[Limit], defaults: Sequence[Limit]) -> tuple[Limit, ...]:
-    """Return the limits asked for, and those defaults of whose kind none was asked for.
-
-    Parameters
-    ----------
-    keep
-        Asked for.
-    defaults
-        Otherwise.
-    """
+    """Return the limits asked for, and those defaults of whose kind none was asked for."""
     kinds = {type(limit) for limit in keep}
     return (*keep, *(limit for limit in defaults if type(limit) not in kinds))
+
+
+class StrainEnd(NamedTuple):
+    """Strain up to which a piece of rubber may be believed, and what says so."""
+
+    strain: float
+    reason: str
+
+
+def strain_ends(model: FlatModel) -> dict[str, StrainEnd]:
+    """Return how far each piece of rubber behind the cam may be stretched, by its path."""
+    return {piece.name: _end_of(model, piece) for piece in series_cam(model).specimens}
+
+
+def _end_of(model: FlatModel, piece: SpecimenNames) -> StrainEnd:
+    """Return the least of what the laws beside each other in a piece state, and its elongation at break."""
+    ends = [
+        StrainEnd(v.maximum, f"its law is stated to hold up to {100.0 * v.maximum:.4g} %")
+        for v in model.signals
+        if v.bounded
+        and math.isfinite(v.maximum)
+        and v.name.startswith(f"{piece.name}.")
+        and v.name.endswith(".strain")
+        # Laws further inside share the strain of the piece with others in series.
+        and v.name.count(".") == piece.name.count(".") + 2
+    ]
+    if piece.elongation_at_break is not None:
+        breaks = model.values[piece.elongation_at_break]
+        ends.append(StrainEnd(breaks, f"it is declared to break at {100.0 * breaks:.4g} %"))
+    unknown = StrainEnd(
+        BREAKS, f"nothing is stated of its rubber, and soft rubbers break at {100 * BREAKS:g} %"
+    )
+    return min(ends, default=unknown)

@@ -10,28 +10,17 @@ from typing import Literal, NamedTuple
 
 import casadi as ca
 
-from ...errors import ArrangementError
+from ...foundation.errors import ArrangementError
+from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ...model.structure import CamNames
-from ...symbolic import Expression
 from ..curves.target import Target
 from ..statics.equilibrium import ElasticLaw
 from ..statics.relaxing_law import RelaxingLaw, relaxing_law
 
 
 def anchor_of(cam: CamNames) -> str:
-    """Return the name of the distance of the anchor from the centre.
-
-    Parameters
-    ----------
-    cam
-        Names around a cam.
-
-    Raises
-    ------
-    ArrangementError
-        If the cam has no anchor.
-    """
+    """Return the name of the distance of the anchor from the centre."""
     if cam.anchor_distance is None:
         raise ArrangementError(
             f"cam '{cam.name}'", "has no anchor", next_step="declare the spring with a TwoSidedCam"
@@ -125,15 +114,7 @@ class DesignPoint:
     def turned_beyond(self, angle: float) -> DesignPoint:
         """Return the design at one angle beyond the end of its contour, with the last lever arm held.
 
-        Parameters
-        ----------
-        angle
-            Beyond the last angle of the target, in rad.
-
-        Returns
-        -------
-        DesignPoint
-            With columns of shape (1,); directions, slopes and torque errors are those of the last node.
+        Result: with columns of shape (1,); directions, slopes and torque errors are those of the last node.
         """
         arm = self.lever_arms[-1]
         extension = self.extensions[-1] + arm * angle
@@ -180,18 +161,7 @@ class DesignPoint:
         return self.elements * sum(pieces, start=ca.SX(0))
 
     def of_rubber(self, field: Literal["area", "rest_length"]) -> dict[str, Expression]:
-        """Return a parameter of each piece of rubber behind the cam by full name.
-
-        Parameters
-        ----------
-        field
-            Which one.
-
-        Raises
-        ------
-        ArrangementError
-            If there is no piece of rubber behind the cam.
-        """
+        """Return a parameter of each piece of rubber behind the cam by full name."""
         if not self.strains:
             raise ArrangementError(
                 f"part '{self.cam.drive}'",

@@ -8,11 +8,11 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.symbolic import Expression
 from ...model import FlatModel
-from ...symbolic import Expression
 from ..curves.target import Target
 from ..statics.equilibrium import elastic_law
 from ..statics.rounding import has_corners
@@ -22,8 +22,6 @@ from .problem import DesignProblem, design_problem, movable_numbers
 from .program import Program, Rows, Solution
 from .settings import DesignSettings
 from .starts import starts
-
-Floats = NDArray[np.float64]
 
 _ROUNDING = 0.003
 """Width over which the knots of a rubber's law are rounded at first, relative to its stretch."""
@@ -66,12 +64,7 @@ class Question:
     def search(self, free: Sequence[str], rounding: float | None = None) -> Search:
         """Return the search in which these numbers may change.
 
-        Parameters
-        ----------
-        free
-            Full names.
-        rounding
-            Width of rounded knots relative to the stretch; by itself if it is left out.
+        ``rounding``: width of rounded knots relative to the stretch; by itself if it is left out.
         """
         if rounding is None:
             rounding = _ROUNDING if self._has_knots else 0.0
@@ -85,29 +78,13 @@ class Question:
         return has_corners(elastic_law(self.model, self.drive).function)
 
     def finer(self, rounding: float) -> float | None:
-        """Return a narrower rounding to go on with, or None where knots are not rounded.
-
-        Parameters
-        ----------
-        rounding
-            So far.
-        """
+        """Return a narrower rounding to go on with, or None where knots are not rounded."""
         return _FINER * rounding if rounding > 0.0 else None
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A design problem as a program.
-
-    Parameters
-    ----------
-    question
-        What is asked for.
-    problem
-        Variables and geometry.
-    rounding
-        Width over which knots were rounded.
-    """
+    """A design problem as a program."""
 
     question: Question
     problem: DesignProblem
@@ -143,13 +120,7 @@ class Search:
         return self.program.solve_all(points, settings.progress)
 
     def require_influence(self) -> None:
-        """Refuse numbers that change neither a goal nor a limit.
-
-        Raises
-        ------
-        ValueRangeError
-            With the names of those numbers.
-        """
+        """Refuse numbers that change neither a goal nor a limit."""
         problem = self.problem
         if not problem.scalars:
             return
@@ -175,29 +146,11 @@ class Search:
 
 
 def row_of(bound: Bound, slack: Expression | float = 0.0) -> Rows:
-    """Return a bound as rows of a program, softened by a slack.
-
-    Parameters
-    ----------
-    bound
-        What must hold.
-    slack
-        Relative give, a symbol or zero.
-    """
+    """Return a bound as rows of a program, softened by a slack."""
     distance = (bound.expression - bound.value) / bound.scale
     return Rows(distance - slack, -ca.inf, 0.0) if bound.upper else Rows(distance + slack, 0.0, ca.inf)
 
 
-def carried_over(source: Search, point: Floats, into: Search) -> Floats:
-    """Return a point of one search as a start of another with other numbers free.
-
-    Parameters
-    ----------
-    source
-        Where the point was found.
-    point
-        Shape (variables,), scaled.
-    into
-        With the same contour.
-    """
+def carried_over(source: Search, point: Array, into: Search) -> Array:
+    """Return a point of one search as a start of another with other numbers free."""
     return into.problem.completed(source.problem.chosen(point))

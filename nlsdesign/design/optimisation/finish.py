@@ -9,13 +9,13 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import NlsError
+from ...foundation.arrays import Array
+from ...foundation.errors import NlsError
+from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.derived_deck import derived
-from ...quantity import Quantity, significant
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam
 from ..statics.equilibrium import cam_function
@@ -31,8 +31,6 @@ from .program import Solution
 from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
 from .size_ranges import size_ranges
-
-Floats = NDArray[np.float64]
 
 _ACTIVE = 1e-3
 _STIFFER = 0.1
@@ -83,13 +81,7 @@ class SolvedSearch:
         return self.rms(self.best)
 
     def rms(self, outcome: Solution) -> float:
-        """Return the torque error in N·m at a solution.
-
-        Parameters
-        ----------
-        outcome
-            Of this search, or of the same with knots rounded otherwise.
-        """
+        """Return the torque error in N·m at a solution."""
         problem = self.search.problem
         square = problem.evaluate(problem.design.mean_square_error, outcome.point)[0]
         return float(np.sqrt(max(square, 0.0)))
@@ -152,13 +144,7 @@ class SolvedSearch:
 
 
 def narrowed(solved: SolvedSearch) -> SolvedSearch:
-    """Return the design on a law whose knots are rounded less, where the rounding shows in the torque.
-
-    Parameters
-    ----------
-    solved
-        On the law with which the search began.
-    """
+    """Return the design on a law whose knots are rounded less, where the rounding shows in the torque."""
     for _ in range(_NARROWED):
         target, rounding = solved.search.problem.design.target, solved.search.rounding
         finer = solved.search.question.finer(rounding)
@@ -177,13 +163,7 @@ def narrowed(solved: SolvedSearch) -> SolvedSearch:
 
 
 def finished(solved: SolvedSearch) -> CamDesign:
-    """Return the finished design.
-
-    Parameters
-    ----------
-    solved
-        With its best solution.
-    """
+    """Return the finished design."""
     search, problem, best = solved.search, solved.search.problem, solved.best
     contour, fit = solved.contour_fit
     settings, design = search.question.settings, problem.design
@@ -342,7 +322,7 @@ def _remarks(search: Search) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _curves(problem: DesignProblem, point: Floats) -> DesignCurves:
+def _curves(problem: DesignProblem, point: Array) -> DesignCurves:
     design = problem.design
     columns = [
         design.angles, design.lever_arms, design.radii_of_curvature, design.radii, design.torques,
@@ -404,18 +384,8 @@ def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Conto
     return contour, fit
 
 
-def limit_state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
-    """Return how a design stands to a limit.
-
-    Parameters
-    ----------
-    problem
-        Its problem.
-    bound
-        One side of the limit.
-    point
-        Shape (variables,), scaled.
-    """
+def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitState:
+    """Return how a design stands to a limit."""
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale

@@ -7,17 +7,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...data_frames import Axis, data_frame
-from ...errors import ValueRangeError
-from ...quantity import parse_unit, typeset_unit
-from ...writing import write_table
+from ...foundation.arrays import Array
+from ...foundation.data_frames import Axis, data_frame
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import parse_unit, typeset_unit
+from ...foundation.text_files import write_table
 from ..curves.target import Target
 from .finish import SolvedSearch, finished
 from .result import CamDesign
-
-Floats = NDArray[np.float64]
 
 _SHOWN_IN = {"m": "mm", "m^2": "mm^2"}
 
@@ -81,15 +79,15 @@ class ParetoFront:
     sources: tuple[SolvedSearch, ...] = field(repr=False)
 
     @property
-    def values(self) -> Floats:
+    def values(self) -> Array:
         """The goals in SI, shape (points, goals)."""
         return np.array([point.values for point in self.points])
 
     @property
-    def shown(self) -> Floats:
+    def shown(self) -> Array:
         """The goals in the units in which they are shown, shape (points, goals)."""
         factors = np.array([parse_unit(unit).factor for unit in self.units])
-        result: Floats = self.values / factors
+        result: Array = self.values / factors
         return result
 
     def design(self, number: int) -> CamDesign:

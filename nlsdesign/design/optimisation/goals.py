@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ...symbolic import Expression
+from ...foundation.symbolic import Expression
 from .design_point import DesignPoint
 
 _LENGTH = 0.01
@@ -115,15 +115,5 @@ class LeastRubber(Goal):
 
 
 def rms_of_mean_square(what: str, mean_square: Expression, design: DesignPoint) -> GoalMeasure:
-    """Return a mean square torque as its root, smooth where it vanishes.
-
-    Parameters
-    ----------
-    what
-        In words.
-    mean_square
-        In (N·m)².
-    design
-        The design in symbols.
-    """
+    """Return a mean square torque as its root, smooth where it vanishes."""
     return GoalMeasure(what, ca.sqrt(mean_square + (_FLOOR * design.target.largest) ** 2), "mN*m")

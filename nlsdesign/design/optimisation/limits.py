@@ -5,37 +5,20 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
-from ...errors import ValueRangeError, unknown_name
-from ...quantity import Quantity, parse_unit, typeset_unit, with_unit
-from ...symbolic import Expression
+from ...foundation.errors import ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity, parse_unit, typeset_unit, with_unit
+from ...foundation.symbolic import Expression
 from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint, anchor_of
 
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """One side of a limit on one quantity: expression ≤ value (upper) or ≥ value.
-
-    Parameters
-    ----------
-    limit
-        Name of the limit.
-    of
-        What is bounded, in words.
-    expression
-        Column of any length, in SI.
-    value
-        Bound in SI.
-    upper
-        Which side.
-    unit
-        Unit in which it is shown.
-    scale
-        Typical size in SI.
-    """
+    """One side of a limit on one quantity: expression ≤ value (upper) or ≥ value."""
 
     limit: str
     of: str
@@ -46,13 +29,7 @@ class Bound:
     scale: float
 
     def shown(self, value: float) -> str:
-        """Return a number in the unit of the limit as text.
-
-        Parameters
-        ----------
-        value
-            In SI.
-        """
+        """Return a number in the unit of the limit as text."""
         return with_unit(f"{value / parse_unit(self.unit).factor:.4g}", self.unit)
 
     def __str__(self) -> str:
@@ -60,8 +37,40 @@ class Bound:
 
 
 @dataclass(frozen=True)
+class OneNumber:
+    """What a limit with one number says of itself, to messages and to whoever sets it.
+
+    Parameters
+    ----------
+    field
+        In which the number stands.
+    words
+        What is limited.
+    unit, shown_unit
+        SI unit, and that in which people read it; "%" for a ratio.
+    upper
+        Whether the number is the largest that is allowed, or the least.
+    of_shape
+        Whether the contour alone decides it.
+    """
+
+    field: str
+    words: str
+    unit: str
+    shown_unit: str
+    upper: bool
+    of_shape: bool = False
+
+
+@dataclass(frozen=True)
 class Limit(ABC):
-    """Base of the limits."""
+    """Base of the limits.
+
+    A limit whose class has ``described`` can be set on the live page; one of another package is found by
+    being there.
+    """
+
+    described: ClassVar[OneNumber | None] = None
 
     @abstractmethod
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
@@ -73,7 +82,29 @@ class Limit(ABC):
             The design in symbols.
         """
 
-    def _bound(
+    def number(self, name: str, unit: str, minimum: float, maximum: float) -> None:
+        """Hold a field as a number in SI, checked; for ``__post_init__``.
+
+        Parameters
+        ----------
+        name
+            Of the field.
+        unit
+            That it must be convertible to, in SI.
+        minimum, maximum
+            Between which it must lie.
+
+        Raises
+        ------
+        NlsError
+            If it is in another unit, or out of range.
+        """
+        what = f"{type(self).__name__}: {name}"
+        object.__setattr__(
+            self, name, in_si(what, getattr(self, name), unit, minimum=minimum, maximum=maximum)
+        )
+
+    def bound(
         self,
         of: str,
         expression: Expression,
@@ -83,16 +114,26 @@ class Limit(ABC):
         unit: str,
         scale: float | None = None,
     ) -> Bound:
+        """Return one side of this limit.
+
+        Parameters
+        ----------
+        of
+            What is bounded, in words.
+        expression
+            Column of any length, in SI.
+        value
+            Bound in SI.
+        upper
+            Whether it is the largest that is allowed, or the least.
+        unit
+            In which it is shown.
+        scale
+            Typical size in SI; that of the bound if it is left out.
+        """
         # A scale that follows from the target is symbolic where the target can be moved.
         size = abs(value) or 1.0 if scale is None else scale
         return Bound(type(self).__name__, of, ca.SX(expression), value, upper, unit, size)
-
-
-def _store(limit: Limit, name: str, unit: str, minimum: float, maximum: float) -> None:
-    value = in_si(
-        f"{type(limit).__name__}: {name}", getattr(limit, name), unit, minimum=minimum, maximum=maximum
-    )
-    object.__setattr__(limit, name, value)
 
 
 @dataclass(frozen=True)
@@ -105,14 +146,18 @@ class MinimumRadiusOfCurvature(Limit):
         Least radius of curvature, in m.
     """
 
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "radius", "radius of curvature", unit="m", shown_unit="mm", upper=False, of_shape=True
+    )
+
     radius: Quantity | float
 
     def __post_init__(self) -> None:
-        _store(self, "radius", "m", 0.0, 0.5)
+        self.number("radius", "m", 0.0, 0.5)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the contour."""
-        yield self._bound(
+        yield self.bound(
             "radius of curvature", design.radii_of_curvature, plain(self.radius), upper=False, unit="mm"
         )
 
@@ -127,14 +172,18 @@ class MaximumCamRadius(Limit):
         Largest distance from the centre, in m.
     """
 
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "radius", "cam radius", unit="m", shown_unit="mm", upper=True, of_shape=True
+    )
+
     radius: Quantity | float
 
     def __post_init__(self) -> None:
-        _store(self, "radius", "m", 1e-5, 0.5)
+        self.number("radius", "m", 1e-5, 0.5)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the contour."""
-        yield self._bound("cam radius", design.radii, plain(self.radius), upper=True, unit="mm")
+        yield self.bound("cam radius", design.radii, plain(self.radius), upper=True, unit="mm")
 
 
 @dataclass(frozen=True)
@@ -147,16 +196,20 @@ class MaximumStrain(Limit):
         Largest nominal strain, a pure number.
     """
 
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "strain", "strain of the rubber", unit="1", shown_unit="%", upper=True
+    )
+
     strain: Quantity | float
 
     def __post_init__(self) -> None:
-        _store(self, "strain", "1", 1e-4, 10.0)
+        self.number("strain", "1", 1e-4, 10.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound for each piece of rubber."""
         design.of_rubber("rest_length")
         for path, strain in design.strains.items():
-            yield self._bound(f"strain of {path}", strain, plain(self.strain), upper=True, unit="1")
+            yield self.bound(f"strain of {path}", strain, plain(self.strain), upper=True, unit="1")
 
 
 @dataclass(frozen=True)
@@ -171,19 +224,23 @@ class MaximumStress(Limit):
         What the strength is divided by, a pure number of at least 1.
     """
 
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "stress", "nominal stress of the rubber", unit="Pa", shown_unit="MPa", upper=True
+    )
+
     stress: Quantity | float
     safety_factor: float = 1.0
 
     def __post_init__(self) -> None:
-        _store(self, "stress", "Pa", 1e3, 1e11)
-        _store(self, "safety_factor", "1", 1.0, 100.0)
+        self.number("stress", "Pa", 1e3, 1e11)
+        self.number("safety_factor", "1", 1.0, 100.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound for each piece of rubber."""
         design.of_rubber("area")
         allowed = plain(self.stress) / self.safety_factor
         for path, stress in design.stresses.items():
-            yield self._bound(f"stress of {path}", stress, allowed, upper=True, unit="MPa")
+            yield self.bound(f"stress of {path}", stress, allowed, upper=True, unit="MPa")
 
 
 @dataclass(frozen=True)
@@ -196,14 +253,18 @@ class MaximumCableTension(Limit):
         Largest force of one cable, in N.
     """
 
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "tension", "tension of a cable", unit="N", shown_unit="N", upper=True
+    )
+
     tension: Quantity | float
 
     def __post_init__(self) -> None:
-        _store(self, "tension", "N", 1e-3, 1e7)
+        self.number("tension", "N", 1e-3, 1e7)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the angle."""
-        yield self._bound("cable tension", design.forces, plain(self.tension), upper=True, unit="N")
+        yield self.bound("cable tension", design.forces, plain(self.tension), upper=True, unit="N")
 
 
 @dataclass(frozen=True)
@@ -216,15 +277,19 @@ class PositiveStiffness(Limit):
         Least tangent stiffness, in N·m/rad.
     """
 
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "minimum", "slope of the torque", unit="N*m/rad", shown_unit="N*m/rad", upper=False
+    )
+
     minimum: Quantity | float = 0.0
 
     def __post_init__(self) -> None:
-        _store(self, "minimum", "N*m/rad", 0.0, 1e7)
+        self.number("minimum", "N*m/rad", 0.0, 1e7)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the angle."""
         scale = design.target.largest / design.target.last_angle
-        yield self._bound(
+        yield self.bound(
             "tangent stiffness", design.tangent_stiffness, plain(self.minimum), upper=False,
             unit="N*m/rad", scale=scale,
         )  # fmt: skip
@@ -243,14 +308,14 @@ class MaximumTorqueError(Limit):
     rms: Quantity | float
 
     def __post_init__(self) -> None:
-        _store(self, "rms", "N*m", 1e-5, 1e6)
+        self.number("rms", "N*m", 1e-5, 1e6)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound."""
         # The tiny addend keeps the root smooth where the error vanishes.
         floor = (1e-3 * plain(self.rms)) ** 2
         rms = ca.sqrt(design.mean_square_error + floor)
-        yield self._bound("rms torque error", rms, plain(self.rms), upper=True, unit="mN*m")
+        yield self.bound("rms torque error", rms, plain(self.rms), upper=True, unit="mN*m")
 
 
 @dataclass(frozen=True)
@@ -267,8 +332,8 @@ class ParameterRange(Limit):
     maximum: Quantity | float
 
     def _checked(self, unit: str, lowest: float, highest: float) -> None:
-        _store(self, "minimum", unit, lowest, highest)
-        _store(self, "maximum", unit, lowest, highest)
+        self.number("minimum", unit, lowest, highest)
+        self.number("maximum", unit, lowest, highest)
         if plain(self.minimum) > plain(self.maximum):
             bounds = f"{plain(self.minimum):g}, {plain(self.maximum):g}"
             raise ValueRangeError(
@@ -279,8 +344,8 @@ class ParameterRange(Limit):
 
     def _both(self, of: str, expression: Expression, unit: str) -> Iterator[Bound]:
         scale = plain(self.maximum) or 1e-3
-        yield self._bound(of, expression, plain(self.minimum), upper=False, unit=unit, scale=scale)
-        yield self._bound(of, expression, plain(self.maximum), upper=True, unit=unit, scale=scale)
+        yield self.bound(of, expression, plain(self.minimum), upper=False, unit=unit, scale=scale)
+        yield self.bound(of, expression, plain(self.maximum), upper=True, unit=unit, scale=scale)
 
 
 @dataclass(frozen=True)
@@ -326,8 +391,8 @@ class NumberRange(Limit):
         low, high, value = plain(self.minimum), plain(self.maximum), design.parameters[self.name]
         unit = design.shown_units.get(self.name, "1")
         scale = max(abs(low), abs(high)) or 1.0
-        yield self._bound(self.name, value, low, upper=False, unit=unit, scale=scale)
-        yield self._bound(self.name, value, high, upper=True, unit=unit, scale=scale)
+        yield self.bound(self.name, value, low, upper=False, unit=unit, scale=scale)
+        yield self.bound(self.name, value, high, upper=True, unit=unit, scale=scale)
 
 
 @dataclass(frozen=True)

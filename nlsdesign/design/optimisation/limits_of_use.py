@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import UnitError, ValueRangeError
-from ...quantity import Quantity, same_dimension
+from ...foundation.errors import UnitError, ValueRangeError
+from ...foundation.quantity import Quantity, same_dimension
 from ..curves.numbers import in_si, plain
 from ..curves.shapes import TorqueBand
 from .design_point import DesignPoint
@@ -53,7 +53,7 @@ class OverTravel(Limit):
         beyond = design.turned_beyond(plain(self.angle))
         for limit in self.limits:
             for bound in limit.bounds(beyond):
-                yield self._bound(
+                yield self.bound(
                     f"{bound.of} at over-travel",
                     bound.expression,
                     bound.value,
@@ -98,8 +98,8 @@ class TorqueWithin(Limit):
         low = ca.vertcat(*[self.band.lower_law(angle) for angle in angles])
         high = ca.vertcat(*[self.band.upper_law(angle) for angle in angles])
         torques, scale = design.torques[1:], design.target.largest
-        yield self._bound("torque above band", torques - low, 0.0, upper=False, unit="mN*m", scale=scale)
-        yield self._bound("torque below band", torques - high, 0.0, upper=True, unit="mN*m", scale=scale)
+        yield self.bound("torque above band", torques - low, 0.0, upper=False, unit="mN*m", scale=scale)
+        yield self.bound("torque below band", torques - high, 0.0, upper=True, unit="mN*m", scale=scale)
 
 
 @dataclass(frozen=True)
@@ -137,4 +137,4 @@ class AtMost(Limit):
                 f"AtMost: {measure.what} = {self.value}", f"'{self.value.unit}' is no unit of it",
                 next_step=f"give it in a unit like '{measure.unit}'",
             )  # fmt: skip
-        yield self._bound(measure.what, measure.expression, plain(self.value), upper=True, unit=measure.unit)
+        yield self.bound(measure.what, measure.expression, plain(self.value), upper=True, unit=measure.unit)

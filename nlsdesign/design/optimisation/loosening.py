@@ -15,10 +15,11 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...processes import parallel_map
-from ...quantity import parse_unit, with_unit
+from ...foundation.arrays import Array
+from ...foundation.processes import parallel_map
+from ...foundation.quantity import parse_unit, with_unit
+from .defaults import BREAKS
 from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
 from .problem import contour_names
@@ -26,15 +27,11 @@ from .program import Program, Solution
 from .starts import starts
 from .variables import DesignVariable, scaled
 
-Floats = NDArray[np.float64]
-
 FEASIBLE = 1e-6
 """Relative give below which a limit counts as kept."""
 _MOST = 1e3
 _MOST_RAISED = 10.0
 """Beyond this factor a give is no advice but another design."""
-_MOST_STRAIN = 5.0
-"""Nominal strain at which soft rubbers break: the tensile curve of PMC-770 ends there (Schepelmann 2014)."""
 _RANGE = 4.0
 """By what factor a size that is freed may leave its present value, either way."""
 
@@ -50,15 +47,7 @@ def _outwards(value: float, upper: bool) -> float:
 
 @dataclass(frozen=True)
 class Give:
-    """How far one limit would have to move for all others to be kept.
-
-    Parameters
-    ----------
-    bound
-        The limit.
-    amount
-        In SI, positive.
-    """
+    """How far one limit would have to move for all others to be kept."""
 
     bound: Bound
     amount: float
@@ -71,7 +60,7 @@ class Give:
     @property
     def sensible(self) -> bool:
         """Whether a designer could consider it: within ten times, and within what rubber can stretch."""
-        if self.bound.value == 0.0 or (self.bound.unit == "1" and self.moved > _MOST_STRAIN):
+        if self.bound.value == 0.0 or (self.bound.unit == "1" and self.moved > BREAKS):
             return False
         ratio = self.moved / self.bound.value
         return ratio <= _MOST_RAISED if self.bound.upper else ratio >= 1.0 / _MOST_RAISED
@@ -126,7 +115,7 @@ class Loosened:
     """
 
     def __init__(
-        self, search: Search, free: Sequence[str], *, largest_error: float | None, best: Floats | None
+        self, search: Search, free: Sequence[str], *, largest_error: float | None, best: Array | None
     ) -> None:
         self.free, self.candidates = tuple(free), _candidates(search, free)
         self.open = search.question.search([*free, *self.candidates], search.rounding)
@@ -152,17 +141,10 @@ class Loosened:
         )
         return program.with_unknowns(slacks, 0.0, _MOST)
 
-    def least(self, names: Sequence[str], slacks: Sequence[int], start: Floats | None = None) -> Solution:
+    def least(self, names: Sequence[str], slacks: Sequence[int], start: Array | None = None) -> Solution:
         """Return where the sum of some slacks is least; the solution says whether it is one.
 
-        Parameters
-        ----------
-        names
-            Candidates that may move; the others stay as declared.
-        slacks
-            Indices of the limits that may give.
-        start
-            Where to begin, before the starts of the whole.
+        ``names``: candidates that may move; the others stay as declared.
         """
         lower, upper = self._box(names)
         allowed = np.isin(np.arange(len(self.bounds)), slacks)
@@ -176,29 +158,16 @@ class Loosened:
         return min(outcomes, key=lambda outcome: (not outcome.solved, outcome.cost))
 
     def several(
-        self, questions: Sequence[tuple[Sequence[str], Sequence[int]]], start: Floats | None = None
+        self, questions: Sequence[tuple[Sequence[str], Sequence[int]]], start: Array | None = None
     ) -> list[Solution]:
-        """Return the answers to several questions, side by side on the cores.
-
-        Parameters
-        ----------
-        questions
-            Names and slacks as for :meth:`least`.
-        start
-            As for :meth:`least`.
-        """
+        """Return the answers to several questions, side by side on the cores."""
         self.program.prepare()
         return list(parallel_map(lambda k: self.least(*questions[k], start), len(questions)))
 
     def designed(self, names: Sequence[str], outcome: Solution) -> Freed:
         """Return freed numbers at the best design with them, found from a solution of :meth:`least`.
 
-        Parameters
-        ----------
-        names
-            Of candidates.
-        outcome
-            With them freed; where no better design is found from there, its own values count.
+        ``outcome``: with them freed; where no better design is found from there, its own values count.
         """
         lower, upper = self._box(names)
         point = outcome.point[: self.count]
@@ -207,15 +176,7 @@ class Loosened:
         return freed if better.solved and freed.error is not None else self.freed(names, outcome)
 
     def freed(self, names: Sequence[str], outcome: Solution) -> Freed:
-        """Return freed numbers with their values at a solution.
-
-        Parameters
-        ----------
-        names
-            Of candidates.
-        outcome
-            Of :meth:`least`.
-        """
+        """Return freed numbers with their values at a solution."""
         values = self.open.problem.named(outcome.point[: self.count])
         shown = tuple(self.open.problem.design.shown_units[name] for name in names)
         error = None
@@ -225,18 +186,10 @@ class Loosened:
         return Freed(tuple(names), tuple(values[name] for name in names), shown, error)
 
     def give(self, index: int, outcome: Solution) -> Give:
-        """Return how far a limit gives at a solution.
-
-        Parameters
-        ----------
-        index
-            Of the limit.
-        outcome
-            Of :meth:`least`.
-        """
+        """Return how far a limit gives at a solution."""
         return Give(self.bounds[index], float(outcome.point[self.count + index]) * self.bounds[index].scale)
 
-    def _box(self, names: Sequence[str]) -> tuple[Floats, Floats]:
+    def _box(self, names: Sequence[str]) -> tuple[Array, Array]:
         """Return the bounds of all unknowns with these candidates freed and the others held."""
         lower, upper = self.program.lower.copy(), self.program.upper.copy()
         for i, variable in enumerate(self.open.problem.variables):

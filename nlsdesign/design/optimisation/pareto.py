@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ConvergenceError, ValueRangeError
-from ...processes import parallel_map
-from ...quantity import parse_unit, with_unit
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError, ValueRangeError
+from ...foundation.processes import parallel_map
+from ...foundation.quantity import parse_unit, with_unit
 from ..curves.target import Target
 from .conflict import feasible_point
 from .design_search import Search
@@ -34,8 +34,6 @@ from .program import Program, Rows, Solution
 from .settings import DesignSettings
 from .solve import USUAL, Wanted
 from .starts import starts
-
-Floats = NDArray[np.float64]
 
 _UNBOUNDED = 1e6
 """Bound, relative to the scale of a goal, that never binds."""
@@ -127,7 +125,7 @@ class _Tried(NamedTuple):
 
     bounds: tuple[float, ...]
     outcome: Solution
-    values: Floats
+    values: Array
 
     def within(self, bounds: Sequence[float]) -> bool:
         """Whether this design keeps other bounds than its own."""
@@ -147,17 +145,17 @@ class _Ladder:
         return tuple(goal.measured(self.search.problem.design) for goal in self.goals)
 
     @cached_property
-    def _points(self) -> list[Floats]:
+    def _points(self) -> list[Array]:
         settings, problem = self.search.question.settings, self.search.problem
         sizes = [v.name for v in problem.scalars if v.name != problem.law.cam.pretension]
         return [problem.at(start) for start in starts(settings.starts, settings.seed, sizes)]
 
     @cached_property
-    def scales(self) -> Floats:
+    def scales(self) -> Array:
         """Size of each goal at the first start."""
         return _sizes(self.values(self._points[0]))
 
-    def values(self, point: Floats) -> Floats:
+    def values(self, point: Array) -> Array:
         """Return the goals at a point in SI."""
         problem = self.search.problem
         return np.array([float(np.max(problem.evaluate(m.expression, point))) for m in self.measures])
@@ -178,12 +176,12 @@ class _Ladder:
         )  # fmt: skip
 
     @cached_property
-    def _cost_scales(self) -> Floats:
+    def _cost_scales(self) -> Array:
         design = self.search.problem.design
         costs = ca.vertcat(*[goal.cost(design) for goal in self.goals])
         return _sizes(self.search.problem.evaluate(costs, self._points[0]))
 
-    def _solved(self, start: Floats, goal: int, bounds: Sequence[float]) -> _Tried:
+    def _solved(self, start: Array, goal: int, bounds: Sequence[float]) -> _Tried:
         # Small costs are made about 1; large ones are squares of errors, which may become small.
         weights = _OTHERS / self._cost_scales
         weights[goal] = 1.0 / min(self._cost_scales[goal], 1.0)
@@ -200,7 +198,7 @@ class _Ladder:
         for goal in range(count):
             begin = [*self._points, *(each.outcome.point for each in reached)]
 
-            def tried(number: int, goal: int = goal, begin: list[Floats] = begin) -> _Tried:
+            def tried(number: int, goal: int = goal, begin: list[Array] = begin) -> _Tried:
                 return self._solved(begin[number], goal, open_ended)
 
             outcomes = []
@@ -223,7 +221,7 @@ class _Ladder:
             )
         return min(solved, key=lambda each: each.outcome.cost)
 
-    def between(self, ends: list[_Tried], lowest: Floats, highest: Floats, points: int) -> list[_Tried]:
+    def between(self, ends: list[_Tried], lowest: Array, highest: Array, points: int) -> list[_Tried]:
         """Return the best of the first goal for each combination of bounds on the others."""
         ladders = [
             np.linspace(low, high, points)[1:-1][::-1]
@@ -239,7 +237,7 @@ class _Ladder:
             cells[bounds] = self._bettered(cells[bounds], [*ends, *cells.values()], span)
         return list(cells.values())
 
-    def _from_nearest(self, known: Sequence[_Tried], bounds: tuple[float, ...], span: Floats) -> _Tried:
+    def _from_nearest(self, known: Sequence[_Tried], bounds: tuple[float, ...], span: Array) -> _Tried:
         def distance(each: _Tried) -> float:
             return float(np.sum(((each.values[1:] - np.array(bounds)) / span[1:]) ** 2))
 
@@ -252,7 +250,7 @@ class _Ladder:
         assert tried is not None
         return tried
 
-    def _bettered(self, cell: _Tried, known: Sequence[_Tried], span: Floats) -> _Tried:
+    def _bettered(self, cell: _Tried, known: Sequence[_Tried], span: Array) -> _Tried:
         inside = [each for each in known if each.within(cell.bounds)]
         if not inside:
             return cell
@@ -264,7 +262,7 @@ class _Ladder:
         return again if again.outcome.solved else cell
 
 
-def _sizes(values: Floats) -> Floats:
+def _sizes(values: Array) -> Array:
     sizes = np.abs(values)
     return np.where(np.isfinite(sizes) & (sizes > 0.0), sizes, 1.0)
 
@@ -300,7 +298,7 @@ def _front(actuator: Assembly, ladder: _Ladder, reached: Sequence[_Tried]) -> Pa
     )
 
 
-def _betters(one: Floats, other: Floats, digits: Floats) -> bool:
+def _betters(one: Array, other: Array, digits: Array) -> bool:
     return bool(np.all(one <= other + digits) and np.any(one < other - 10.0 * digits))
 
 

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import InfeasibleError, NlsError, ValueRangeError, unknown_name
+from ...foundation.arrays import Array
+from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError, unknown_name
+from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
 from ...model.structure import CamNames
-from ...symbolic import Expression
 from ..curves.target import Target
 from ..statics.declared_cam import declared_cam
 from ..statics.energy import closed_form
@@ -24,8 +24,6 @@ from .program import Rows
 from .shape import ContourVariables, Shape, given, parallel, through_centre
 from .starts import Start, StartSizes, start_values
 from .variables import DesignVariable, scalar
-
-Floats = NDArray[np.float64]
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""
@@ -82,25 +80,13 @@ class DesignProblem:
         """The symbols as a column."""
         return ca.vertcat(*[v.symbol for v in self.variables])
 
-    def named(self, point: Floats) -> dict[str, float]:
-        """Return the variables in SI by name.
-
-        Parameters
-        ----------
-        point
-            Shape (variables,), scaled.
-        """
+    def named(self, point: Array) -> dict[str, float]:
+        """Return the variables in SI by name."""
         values = self.evaluate(ca.vertcat(*[v.value for v in self.variables]), point)
         return {v.name: float(value) for v, value in zip(self.variables, values, strict=True)}
 
-    def chosen(self, point: Floats) -> dict[str, float]:
-        """Return the scaled values by name, without states and torque errors, which follow from them.
-
-        Parameters
-        ----------
-        point
-            Shape (variables,) or longer, scaled.
-        """
+    def chosen(self, point: Array) -> dict[str, float]:
+        """Return the scaled values by name, without states and torque errors, which follow from them."""
         kept = self._chosen
         return {v.name: float(value) for v, value in zip(self.variables[:kept], point[:kept], strict=True)}
 
@@ -109,39 +95,22 @@ class DesignProblem:
         """Number of variables from which the others follow."""
         return len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
 
-    def evaluate(self, expression: Expression, point: Floats) -> Floats:
-        """Return the value of an expression of the variables.
-
-        Parameters
-        ----------
-        expression
-            Column.
-        point
-            Shape (variables,), scaled.
-        """
-        result: Floats = np.array(
+    def evaluate(self, expression: Expression, point: Array) -> Array:
+        """Return the value of an expression of the variables."""
+        result: Array = np.array(
             ca.Function("value", [self.vector], [expression])(point), dtype=float
         ).ravel()
         return result
 
-    def at(self, start: Start) -> Floats:
-        """Return the point where a search begins.
-
-        Parameters
-        ----------
-        start
-            Relative to the sizes of the problem.
-        """
+    def at(self, start: Start) -> Array:
+        """Return the point where a search begins."""
         values = start_values(start, scalars=self.scalars, contour=self.contour, sizes=self.sizes)
         return self.completed(values)
 
-    def completed(self, values: dict[str, float]) -> Floats:
+    def completed(self, values: dict[str, float]) -> Array:
         """Return a point at which the equations of states and torque errors hold.
 
-        Parameters
-        ----------
-        values
-            Scaled values by name; what is missing starts as it does by itself.
+        ``values``: scaled values by name; what is missing starts as it does by itself.
         """
         point = np.array([values.get(v.name, v.start) for v in self.variables])
         if self.states.shape[0]:
@@ -163,31 +132,8 @@ def design_problem(
 ) -> DesignProblem:
     """Write the design problem of a cam spring.
 
-    Parameters
-    ----------
-    model
-        Flat model of the actuator.
-    cam
-        Its declared cam.
-    target
-        Torque curve.
-    free
-        Full names of what may change; the contour is ``<cam>.contour`` or ``<cam>.lever_arm``.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-    rounding
-        Width over which knots of the rubber's law are rounded, relative to its stretch.
-    symbols
-        Where the numbers of ``target`` are symbols: what stands for them.
-
-    Raises
-    ------
-    UnknownNameError
-        If a free name does not exist, with the nearest that may change.
-    ValueRangeError
-        If it exists and a design cannot change it.
-    ArrangementError
-        If the cam has no contour, or the structure does not say which spring is meant.
+    ``free``: full names of what may change; the contour is ``<cam>.contour`` or ``<cam>.lever_arm``.
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     made = declared_cam(cam)
     law = elastic_law(model, spring)
@@ -224,26 +170,12 @@ def design_problem(
 
 
 def contour_names(cam: CamNames) -> tuple[str, str]:
-    """Return the two names by which the contour of a cam is called free.
-
-    Parameters
-    ----------
-    cam
-        Names around it.
-    """
+    """Return the two names by which the contour of a cam is called free."""
     return f"{cam.name}.contour", f"{cam.name}.lever_arm"
 
 
 def movable_numbers(model: FlatModel, cam: CamNames) -> dict[str, Variable]:
-    """Return the single numbers that a design may change, by name.
-
-    Parameters
-    ----------
-    model
-        Flat model of the actuator.
-    cam
-        Names around the cam.
-    """
+    """Return the single numbers that a design may change, by name."""
     ratios = [body.motor.gear_ratio for body in model.bodies if body.motor is not None]
     names = [*cam.numbers, cam.anchor_distance, *ratios]
     return {name: model.variable(name) for name in names if name is not None}

@@ -9,12 +9,10 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...processes import parallel_map
-from ...symbolic import Expression
-
-Floats = NDArray[np.float64]
+from ...foundation.arrays import Array
+from ...foundation.processes import parallel_map
+from ...foundation.symbolic import Expression
 
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 PROVED_INFEASIBLE = "Infeasible_Problem_Detected"
@@ -66,7 +64,7 @@ class Solution:
 
     solved: bool
     status: str
-    point: Floats
+    point: Array
     cost: float
     iterations: int
     prices: tuple[float, ...]
@@ -93,23 +91,15 @@ class Program:
     """
 
     unknowns: Expression
-    lower: Floats
-    upper: Floats
+    lower: Array
+    upper: Array
     cost: Expression
     rows: tuple[Rows, ...]
     parameters: Expression | None = None
     iterations: int = 300
 
     def with_unknowns(self, symbols: Expression, lower: float, upper: float) -> Program:
-        """Return a copy with more unknowns at the end, all between the same bounds.
-
-        Parameters
-        ----------
-        symbols
-            Column.
-        lower, upper
-            Bounds.
-        """
+        """Return a copy with more unknowns at the end, all between the same bounds."""
         count = symbols.shape[0]
         return replace(
             self,
@@ -120,22 +110,16 @@ class Program:
 
     def solve(
         self,
-        start: Floats,
+        start: Array,
         *,
-        lower: Floats | None = None,
-        upper: Floats | None = None,
-        parameters: Floats | None = None,
+        lower: Array | None = None,
+        upper: Array | None = None,
+        parameters: Array | None = None,
     ) -> Solution:
         """Solve from a starting point.
 
-        Parameters
-        ----------
-        start
-            Shape (n,).
-        lower, upper
-            Other bounds of the unknowns, shape (n,); an unknown is held where they are equal.
-        parameters
-            Numbers for the parameters of the program, if it has any.
+        ``lower``, ``upper``: other bounds of the unknowns, shape (n,); an unknown is held where they are
+        equal.
         """
         sizes = [r.expression.shape[0] for r in self.rows]
         answer = self._solver(
@@ -153,17 +137,9 @@ class Program:
         _ = self._solver
 
     def solve_all(
-        self, starts: Sequence[Floats], progress: Callable[[], None] = lambda: None
+        self, starts: Sequence[Array], progress: Callable[[], None] = lambda: None
     ) -> list[Solution]:
-        """Solve from several starting points side by side on the cores; the order is kept.
-
-        Parameters
-        ----------
-        starts
-            Shape (n,) each.
-        progress
-            Called after each.
-        """
+        """Solve from several starting points side by side on the cores; the order is kept."""
         outcomes = []
         self.prepare()
         for outcome in parallel_map(lambda number: self.solve(starts[number]), len(starts)):

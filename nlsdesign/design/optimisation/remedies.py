@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...foundation.arrays import Array
 from .design_search import Search
 from .loosening import Freed, Give, Loosened
-
-Floats = NDArray[np.float64]
 
 _ENOUGH = 1.0 + 1e-3
 
@@ -38,13 +34,7 @@ class Remedies:
     everything: Freed | None
 
     def sentences(self, largest: float) -> list[str]:
-        """Return the advice as sentences.
-
-        Parameters
-        ----------
-        largest
-            Largest torque of the target in N·m, to which errors are related.
-        """
+        """Return the advice as sentences."""
         sentences = [f"{freed}: {_percent(freed.error, largest)}" for freed in self.enough]
         for give, also in self.gives:
             sentences.append(f"{give}" + ("" if also is None else f", and {also}"))
@@ -68,25 +58,9 @@ def _percent(error: float | None, largest: float) -> str:
 
 
 def find_remedies(
-    search: Search, free: Sequence[str], best: Floats, *, allowed: float, error: float, binding: Sequence[int]
+    search: Search, free: Sequence[str], best: Array, *, allowed: float, error: float, binding: Sequence[int]
 ) -> Remedies:
-    """Return what would bring a design within its target.
-
-    Parameters
-    ----------
-    search
-        That missed.
-    free
-        What may change in it.
-    best
-        Where it came to, shape (variables,).
-    allowed
-        Rms torque error in N·m that is asked for.
-    error
-        That was kept.
-    binding
-        Indices of the limits that the design sits on.
-    """
+    """Return what would bring a design within its target."""
     loose = Loosened(search, free, largest_error=allowed, best=best)
     assert loose.error is not None
     outcomes = loose.several([([name], [loose.error]) for name in loose.candidates])

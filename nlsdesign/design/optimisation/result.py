@@ -7,20 +7,18 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...data_frames import Axis, data_frame
-from ...prefixes import prefixed, without_power
-from ...quantity import Quantity, parse_unit, with_unit
+from ...foundation.arrays import Array
+from ...foundation.data_frames import Axis, data_frame
+from ...foundation.quantity import Quantity, parse_unit, with_unit
+from ...foundation.written_numbers import prefixed, without_power
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from ..tolerance.tolerance_result import ToleranceResult
 from .remedies import Remedies
 from .size_ranges import SizeRange
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -71,13 +69,13 @@ class TorqueCheck:
         Of the squared error, shape (n,); all alike for ``None``.
     """
 
-    angles: Floats
-    torques: Floats
-    targets: Floats
-    weights: Floats | None = None
+    angles: Array
+    torques: Array
+    targets: Array
+    weights: Array | None = None
 
     @property
-    def errors(self) -> Floats:
+    def errors(self) -> Array:
         """Torque minus target."""
         return self.torques - self.targets
 
@@ -108,16 +106,16 @@ class DesignCurves:
         Of each piece of rubber by path.
     """
 
-    angles: Floats
-    lever_arms: Floats
-    radii_of_curvature: Floats
-    radii: Floats
-    torques: Floats
-    stiffnesses: Floats
-    extensions: Floats
-    forces: Floats
-    strains: Mapping[str, Floats]
-    stresses: Mapping[str, Floats]
+    angles: Array
+    lever_arms: Array
+    radii_of_curvature: Array
+    radii: Array
+    torques: Array
+    stiffnesses: Array
+    extensions: Array
+    forces: Array
+    strains: Mapping[str, Array]
+    stresses: Mapping[str, Array]
 
     @property
     def energy(self) -> float:
@@ -334,13 +332,7 @@ def _in_its_unit(state: LimitState) -> LimitState:
 
 
 def design_frames(design: CamDesign) -> dict[str, Any]:
-    """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    """
+    """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`."""
     rows = [
         (name if len(q.values) == 1 else f"{name}[{k}]", each, q.unit, q.source, q.spread)
         for name, q in design.changes
@@ -371,13 +363,7 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
 
 
 def result_rows(design: CamDesign) -> list[tuple[str, str]]:
-    """Return what a design prints: pairs of text.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    """
+    """Return what a design prints: pairs of text."""
     target, check, curves, rho = design.target, design.check, design.curves, design.contour.radii_of_curvature
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
 from ..curves.numbers import in_si
 from ..statics.contour import Contour
 from ..tolerance.monte_carlo import FEWEST_DRAWS, MOST_DRAWS

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ...foundation.symbolic import Expression
 from ...model import FlatModel
-from ...symbolic import Expression
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
 from .program import Rows
@@ -84,19 +84,7 @@ class _Support(NamedTuple):
 def through_centre(
     anchor: Expression, last_angle: float, size: float, *, end: Expression
 ) -> tuple[ContourVariables, Shape]:
-    """Return the contour of a cam through whose centre the cable passes to an anchor.
-
-    Parameters
-    ----------
-    anchor
-        Distance of the anchor in m.
-    last_angle
-        Cam angle at the end in rad, for bounds and start.
-    size
-        Typical length of the contour in m.
-    end
-        The same angle as it must be reached: a number, or a symbol.
-    """
+    """Return the contour of a cam through whose centre the cable passes to an anchor."""
     turned = ca.SX.sym("last_direction")
     last = DesignVariable(
         "last_direction", turned, turned, last_angle, last_angle + np.pi / 2, last_angle + 0.6
@@ -122,15 +110,7 @@ def through_centre(
 
 
 def parallel(last_angle: Expression, size: float) -> tuple[ContourVariables, Shape]:
-    """Return the contour of a cam whose cable leaves to one side and stays parallel: φ = θ, h = p.
-
-    Parameters
-    ----------
-    last_angle
-        Cam angle at the end in rad.
-    size
-        Typical length of the contour in m.
-    """
+    """Return the contour of a cam whose cable leaves to one side and stays parallel: φ = θ, h = p."""
     slope = _length("first_slope", size, start=0.3)._replace(lower=-_LARGEST_RADIUS / size)
     arm = _length("first_lever_arm", size, start=0.5)
     variables = ContourVariables(_radii(size), slope, arm)
@@ -145,19 +125,7 @@ def parallel(last_angle: Expression, size: float) -> tuple[ContourVariables, Sha
 
 
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
-    """Return the shape of a declared cam that stays as it is.
-
-    Parameters
-    ----------
-    model
-        Flat model.
-    cam
-        The declared cam.
-    last_angle
-        Cam angle at the end in rad.
-    spring
-        Path of the part that holds the cam.
-    """
+    """Return the shape of a declared cam that stays as it is."""
     contour = contour_of_cam(cam, last_angle=last_angle, points=INTERVALS + 1)
     if isinstance(cam, DesignedCam):
         # As the search saw it that designed the contour, without the change of sides of the fitted cam.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint
 from .goals import Goal, GoalMeasure, rms_of_mean_square

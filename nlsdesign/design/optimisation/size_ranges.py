@@ -7,16 +7,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...processes import parallel_map
-from ...quantity import parse_unit, with_unit
+from ...foundation.arrays import Array
+from ...foundation.processes import parallel_map
+from ...foundation.quantity import parse_unit, with_unit
 from .design_search import Search, row_of
 from .limits import MaximumTorqueError
 from .program import Program, Solution
 from .variables import scaled
-
-Floats = NDArray[np.float64]
 
 _SMALL = 1e-3
 """Rms error, relative to the largest torque, that counts as nothing."""
@@ -71,17 +69,10 @@ class SizeRange:
         return self.highest > _WIDE * self.lowest + 1e-12
 
 
-def size_ranges(search: Search, best: Floats, rms: float) -> tuple[SizeRange, ...]:
+def size_ranges(search: Search, best: Array, rms: float) -> tuple[SizeRange, ...]:
     """Return the range of each free size over which the target is met as well, by two more solutions each.
 
-    Parameters
-    ----------
-    search
-        That found the design.
-    best
-        Where, shape (variables,).
-    rms
-        Its torque error in N·m; more than this, or 1 ‰ of the largest torque, is not allowed on the way.
+    ``rms``: its torque error in N·m; more than this, or 1 ‰ of the largest torque, is not allowed on the way.
     """
     problem = search.problem
     if not problem.scalars:

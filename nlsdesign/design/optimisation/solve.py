@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ConvergenceError, InfeasibleError, NlsError
+from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
+from ...foundation.processes import parallel_map
 from ...model import flatten
 from ...model.derived_deck import derived
 from ...model.roles import series_cam
-from ...processes import parallel_map
 from ..curves.target import Target
 from ..statics.declared_cam import with_contour
 from ..statics.smooth_cables import with_smooth_cables
@@ -113,22 +113,7 @@ def require_designable(
     spring: str | None,
     settings: DesignSettings,
 ) -> None:
-    """Refuse, without a search, a design whose names do not fit the assembly.
-
-    Parameters
-    ----------
-    actuator, target, free, keep, goals, spring, settings
-        As for :func:`design_cam`, without stocks.
-
-    Raises
-    ------
-    UnknownNameError
-        If a free name, or a name in a limit or goal, does not exist.
-    ValueRangeError
-        If something may not be free, or changes neither a goal nor a limit.
-    ArrangementError
-        If the structure does not say which spring is meant, or its cam has no contour.
-    """
+    """Refuse, without a search, a design whose names do not fit the assembly."""
     names = None if free is None else tuple(free)
     require_once(names or (), [])
     question, movable = Wanted(target, names, tuple(keep), spring, tuple(goals)).question(actuator, settings)
@@ -137,13 +122,7 @@ def require_designable(
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What is asked for, whatever the assembly.
-
-    Parameters
-    ----------
-    target, free, keep, spring, goals
-        As :func:`design_cam`.
-    """
+    """What is asked for, whatever the assembly."""
 
     target: Target
     free: tuple[str, ...] | None
@@ -152,20 +131,7 @@ class Wanted:
     goals: tuple[Goal, ...]
 
     def question(self, actuator: Assembly, settings: DesignSettings) -> tuple[Question, tuple[str, ...]]:
-        """Return the question for one assembly, and the names of what is free.
-
-        Parameters
-        ----------
-        actuator
-            Assembly with a cam spring.
-        settings
-            How the search is carried out.
-
-        Raises
-        ------
-        ArrangementError
-            If the structure does not say which spring is meant.
-        """
+        """Return the question for one assembly, and the names of what is free."""
         # The finished design is measured on the assembly as it is declared.
         model = flatten(with_smooth_cables(actuator))
         names = series_cam(model, self.spring)
@@ -182,15 +148,7 @@ class Wanted:
         return question, contour_names(names)[:1] if self.free is None else self.free
 
     def designed(self, actuator: Assembly, settings: DesignSettings) -> CamDesign:
-        """Return the design of one assembly.
-
-        Parameters
-        ----------
-        actuator
-            Assembly with a cam spring.
-        settings
-            How the search is carried out.
-        """
+        """Return the design of one assembly."""
         question, free = self.question(actuator, settings)
         search = question.search(free)
         search.require_influence()
@@ -202,15 +160,7 @@ class Wanted:
         return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
-        """Return the best design over all combinations of a stock, with what became of the others.
-
-        Parameters
-        ----------
-        options
-            Combinations in words, each with its assembly.
-        settings
-            How the search is carried out.
-        """
+        """Return the best design over all combinations of a stock, with what became of the others."""
         hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
         hasty = replace(hasty, progress=_no_word)
 

@@ -39,17 +39,7 @@ class Start(NamedTuple):
 
 
 def starts(count: int, seed: int, sizes: Sequence[str]) -> Iterator[Start]:
-    """Yield starts; the first four do not depend on the seed.
-
-    Parameters
-    ----------
-    count
-        How many.
-    seed
-        Of those after the fourth.
-    sizes
-        Names of the free numbers besides the pretension.
-    """
+    """Yield starts; the first four do not depend on the seed."""
     draw = np.random.default_rng(seed)
     for number in range(count):
         if number < len(_ALWAYS):
@@ -76,19 +66,7 @@ def start_values(
     contour: ContourVariables | None,
     sizes: StartSizes,
 ) -> dict[str, float]:
-    """Return the scaled values of the variables at a start by name.
-
-    Parameters
-    ----------
-    start
-        Relative.
-    scalars
-        Single numbers that are free.
-    contour
-        Variables of the contour, where it is free.
-    sizes
-        What the start is relative to.
-    """
+    """Return the scaled values of the variables at a start by name."""
     values = {}
     for variable in scalars:
         values[variable.name] = variable.start

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...errors import ValueRangeError
-from ...quantity import with_unit
-from ...symbolic import Expression, depends
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import with_unit
+from ...foundation.symbolic import Expression, depends
 from ..statics.relaxing_law import RelaxingLaw
 from .design_point import DesignPoint
 
@@ -82,14 +82,7 @@ class SteadyCycle:
     down: tuple[Expression, ...]
 
     def over_angle(self, of: Callable[[_Place, Forces], Expression]) -> Expression:
-        """Return the integral over the angle from zero to the amplitude.
-
-        Parameters
-        ----------
-        of
-            What is integrated, from the place and the force: in equilibrium, and what is added to it on the
-            way up and on the way down.
-        """
+        """Return the integral over the angle from zero to the amplitude."""
         total = ca.SX(0)
         for k, interval in enumerate(self.intervals):
             for i, place in enumerate(interval.places):
@@ -126,21 +119,7 @@ class SteadyCycle:
 def steady_cycle(design: DesignPoint, frequency: float, amplitude: float | None = None) -> SteadyCycle:
     """Return the steady cycle of a design.
 
-    Parameters
-    ----------
-    design
-        The design in symbols.
-    frequency
-        Of the angle, in Hz.
-    amplitude
-        Largest angle in rad; the last angle of the target for ``None``.
-
-    Raises
-    ------
-    ValueRangeError
-        If the amplitude lies beyond the target, or is too small a part of it.
-    ArrangementError
-        If the rubber relaxes by a law that is not affine in its states.
+    ``amplitude``: largest angle in rad; the last angle of the target for ``None``.
     """
     last, law = design.target.last_angle, design.relaxing
     if amplitude is not None and not _SHORTEST * last <= amplitude <= last * (1 + 1e-9):

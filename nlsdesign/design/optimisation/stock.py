@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from ...components.assembly.named_parts import Assembly
 from ...components.assembly.other_rubber import with_rubber
 from ...components.materials.library import material
-from ...errors import ValueRangeError, unknown_name
-from ...quantity import Quantity
+from ...foundation.errors import ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity
 from ..curves.numbers import plain
 
 _MOST = 1000
@@ -138,20 +138,7 @@ class RubberStock(StockChoice):
 
 
 def require_once(names: Sequence[str], choices: Sequence[StockChoice]) -> None:
-    """Refuse a number that is free and offered from a stock at once.
-
-    Parameters
-    ----------
-    names
-        That are free.
-    choices
-        Of the stock.
-
-    Raises
-    ------
-    ValueRangeError
-        If a name is in both.
-    """
+    """Refuse a number that is free and offered from a stock at once."""
     for each in choices:
         if each.chosen in names:
             raise ValueRangeError(
@@ -161,20 +148,7 @@ def require_once(names: Sequence[str], choices: Sequence[StockChoice]) -> None:
 
 
 def combinations(actuator: Assembly, choices: Sequence[StockChoice]) -> list[tuple[str, Assembly]]:
-    """Return every combination of options in words, with its assembly.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    choices
-        In the order in which they are put into the assembly.
-
-    Raises
-    ------
-    ValueRangeError
-        If there are too many.
-    """
+    """Return every combination of options in words, with its assembly."""
     combined = [("", actuator)]
     for choice in choices:
         combined = [

@@ -20,9 +20,9 @@ import casadi as ca
 import numpy as np
 from scipy.special import ndtri
 
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity
-from ...symbolic import Expression
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity
+from ...foundation.symbolic import Expression
 from ..curves.numbers import in_si, plain
 from ..tolerance.causes import AnchorCause, Cause, NumberCause, ProfileCause, WaveCause
 from ..tolerance.declared_spreads import SpreadRules, spring_causes

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from ...foundation.symbolic import Expression
 from ...model import Variable
-from ...symbolic import Expression
 
 
 class DesignVariable(NamedTuple):
@@ -23,15 +23,7 @@ class DesignVariable(NamedTuple):
 
 
 def scalar(variable: Variable, small: float) -> DesignVariable:
-    """Return a single number: a length that may be zero in units of its size, all others as a logarithm.
-
-    Parameters
-    ----------
-    variable
-        Parameter of the flat model, with its range.
-    small
-        Size in SI of a number that is zero now.
-    """
+    """Return a single number: a length that may be zero in units of its size, all others as a logarithm."""
     symbol = ca.SX.sym(variable.name)
     now, low, high = variable.start, variable.minimum, variable.maximum
     if low > 0.0 and now > 0.0:
@@ -48,41 +40,19 @@ class VariableScale(NamedTuple):
     at_one: float
 
     def position(self, value: float) -> float:
-        """Return the symbol's value at which the variable has a value in SI.
-
-        Parameters
-        ----------
-        value
-            In SI.
-        """
+        """Return the symbol's value at which the variable has a value in SI."""
         if self.at_zero > 0.0:
             return math.log(max(value, 1e-300) / self.at_zero)
         return value / self.at_one
 
 
 def scale_of(variable: DesignVariable) -> VariableScale:
-    """Return the scale of a variable.
-
-    Parameters
-    ----------
-    variable
-        As made by :func:`scalar`.
-    """
+    """Return the scale of a variable."""
     ends = (float(ca.evalf(ca.substitute(variable.value, variable.symbol, at))) for at in (0.0, 1.0))
     return VariableScale(*ends)
 
 
 def scaled(variable: DesignVariable, value: float, scale: VariableScale | None = None) -> float:
-    """Return the symbol's value at which a variable has a value in SI, within its range.
-
-    Parameters
-    ----------
-    variable
-        As made by :func:`scalar`.
-    value
-        In SI.
-    scale
-        Of the variable, where it is known already.
-    """
+    """Return the symbol's value at which a variable has a value in SI, within its range."""
     position = (scale or scale_of(variable)).position(value)
     return min(max(position, variable.lower), variable.upper)

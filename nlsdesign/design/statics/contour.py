@@ -19,12 +19,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
-from ...errors import ValueRangeError
-
-Floats = NDArray[np.float64]
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,19 +42,19 @@ class Contour:
         D; infinite for a parallel cable.
     """
 
-    directions: Floats
-    lever_arms: Floats
-    slopes: Floats
-    radii_of_curvature: Floats
+    directions: Array
+    lever_arms: Array
+    slopes: Array
+    radii_of_curvature: Array
     anchor_distance: float
 
     @cached_property
-    def angles(self) -> Floats:
+    def angles(self) -> Array:
         """Cam angle θ at which the cable touches each point."""
         return self.directions - np.arcsin(self.lever_arms / self.anchor_distance)
 
     @cached_property
-    def points(self) -> Floats:
+    def points(self) -> Array:
         """Points in the frame of the cam, shape (n, 2)."""
         sine, cosine = np.sin(self.directions), np.cos(self.directions)
         return np.column_stack(
@@ -63,12 +62,12 @@ class Contour:
         )
 
     @cached_property
-    def radii(self) -> Floats:
+    def radii(self) -> Array:
         """Distance of the points from the centre."""
         return np.hypot(self.lever_arms, self.slopes)
 
     @cached_property
-    def free_lengths(self) -> Floats:
+    def free_lengths(self) -> Array:
         """Length of the cable between contact point and anchor; a cam that reaches the anchor has none.
 
         With an infinite anchor distance it is infinite; see :attr:`taken_lengths`.
@@ -76,21 +75,21 @@ class Contour:
         return np.sqrt(self.anchor_distance**2 - self.lever_arms**2) - self.slopes
 
     @cached_property
-    def arc_lengths(self) -> Floats:
+    def arc_lengths(self) -> Array:
         """Length of the contour from its first point."""
         rho = self.radii_of_curvature
         steps = (rho[1:] + rho[:-1]) / 2 * np.diff(self.directions)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
     @cached_property
-    def taken_lengths(self) -> Floats:
+    def taken_lengths(self) -> Array:
         """Length of cable that the cam has taken up since the first point: the integral of the lever arm."""
         root = np.sqrt(self.anchor_distance**2 - self.lever_arms**2)
         straight = (self.lever_arms[0] ** 2 - self.lever_arms**2) / (root + root[0])
-        result: Floats = self.arc_lengths + straight - (self.slopes - self.slopes[0])
+        result: Array = self.arc_lengths + straight - (self.slopes - self.slopes[0])
         return result
 
-    def surface(self, cable_radius: float = 0.0) -> Floats:
+    def surface(self, cable_radius: float = 0.0) -> Array:
         """Return the points of the cam below a cable of that radius, in the frame of the cam.
 
         Parameters
@@ -118,7 +117,7 @@ class Contour:
         normals = np.column_stack([np.sin(self.directions), np.cos(self.directions)])
         return self.points - cable_radius * normals
 
-    def cable(self, angle: float) -> Floats:
+    def cable(self, angle: float) -> Array:
         """Return contact point and anchor in the resting frame, for the right-hand cable.
 
         The left-hand cable is the same turned by half a turn. With an infinite anchor distance the second
@@ -153,7 +152,7 @@ class Contour:
             anchor = np.array([10.0 * self.radii.max(), side * touched[1]])
         return np.array([touched * [1.0, side], anchor])
 
-    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Floats, Floats]:
+    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Array, Array]:
         """Return the two halves of the cam as closed polygons in the resting frame: lower, upper.
 
         Between the ends of its two lips each half is closed by a straight line; so is the channel of the
@@ -176,18 +175,13 @@ class Contour:
         return turn(lower, angle), turn(-lower, angle)
 
 
-def turn(points: Floats, angle: float) -> Floats:
+def turn(points: Array, angle: float) -> Array:
     """Turn points about the centre.
 
-    Parameters
-    ----------
-    points
-        Shape (n, 2).
-    angle
-        In rad, anticlockwise.
+    ``points``: shape (n, 2).
     """
     cosine, sine = np.cos(angle), np.sin(angle)
-    result: Floats = points @ np.array([[cosine, sine], [-sine, cosine]])
+    result: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
     return result
 
 

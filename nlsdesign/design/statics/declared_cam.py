@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from ...components.transmission.cam import Cam, TwoSidedCam
 from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
-from ...errors import ArrangementError, ValueRangeError
-from ...quantity import Quantity, significant
+from ...foundation.arrays import Array, Mask
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import Quantity, significant
 from .contour import Contour, contour_from_lever_arm
 
-Floats = NDArray[np.float64]
 Made = TypeVar("Made", bound=Cam)
 
 _SAMPLES_PER_VALUE = 12
@@ -56,13 +56,7 @@ class CamFit:
 
 @dataclass(frozen=True)
 class DeclaredCam(ABC, Generic[Made]):
-    """A cam of an assembly as the design sees it.
-
-    Parameters
-    ----------
-    part
-        The cam.
-    """
+    """A cam of an assembly as the design sees it."""
 
     part: Made
 
@@ -80,26 +74,15 @@ class DeclaredCam(ABC, Generic[Made]):
     def contour(self, last_angle: float | None, points: int) -> Contour:
         """Return the contour, without the change of sides or the onset near angle zero.
 
-        Parameters
-        ----------
-        last_angle
-            In rad; the end of the cam's table for ``None``.
-        points
-            Number of points.
+        ``last_angle``: in rad; the end of the cam's table for ``None``.
         """
 
     @abstractmethod
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam like this one with a given lever arm.
 
-        Parameters
-        ----------
-        angles, lever_arms
-            Shape (n,); angles ascend from zero.
-        count
-            Number of control values.
-        anchor
-            Another distance of the anchor in m; its own for ``None``.
+        ``angles``, ``lever_arms``: shape (n,); angles ascend from zero. ``anchor``: another distance of the
+        anchor in m; its own for ``None``.
         """
 
 
@@ -122,7 +105,7 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
         arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.changeover.number)
         return contour_from_lever_arm(angles, arms, anchor_distance=self.part.anchor_distance.number)
 
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, fitted through the law of this kind."""
         # The control values are fitted to h(θ) through the law of the cam, which changes sides over the
         # angle w, so that the change costs nothing where h starts at zero. A jump is rounded over w.
@@ -162,7 +145,7 @@ class _OneSided(DeclaredCam[OneSidedCam]):
         arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.onset.number / 2)
         return contour_from_lever_arm(angles, arms, anchor_distance=np.inf)
 
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, fitted through the law of this kind."""
         width = self.part.onset.number
         dense, wanted = _dense(angles, lever_arms, count)
@@ -197,8 +180,8 @@ class _Anchored(DeclaredCam[AnchoredCam]):
         values = np.array(self.part.support.values)
         step = end / (len(values) - 3)
 
-        def support(at: Floats, order: int = 0) -> Floats:
-            basis: Floats = _basis_derivative(at, end, len(values), order) @ values / step**order
+        def support(at: Array, order: int = 0) -> Array:
+            basis: Array = _basis_derivative(at, end, len(values), order) @ values / step**order
             return basis
 
         directions = np.linspace(0.0, end, max(points, 1001))
@@ -211,7 +194,7 @@ class _Anchored(DeclaredCam[AnchoredCam]):
         p = support(directions)
         return Contour(directions, p, support(directions, 1), p + support(directions, 2), anchor)
 
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, fitted through the law of this kind."""
         width, old = self.part.changeover.number, self.part.anchor_distance
         anchor = old.number if anchor is None else anchor
@@ -240,13 +223,6 @@ class DesignedCam:
     The contour of the fitted cam ripples: it is the second derivative of a spline that follows the lever arm
     of the designed contour to micrometres, through the change of sides near angle zero. What is cut is the
     designed one.
-
-    Parameters
-    ----------
-    part
-        The declared cam.
-    designed
-        The contour.
     """
 
     part: Cam
@@ -282,24 +258,13 @@ class _Designed(DeclaredCam[Cam]):
             self.designed.anchor_distance,
         )
 
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, of the kind of the declared one."""
         return declared_cam(self.part).fitted(angles, lever_arms, count, anchor)
 
 
 def declared_cam(part: object) -> DeclaredCam[Any]:
-    """Return a cam of an assembly as the design sees it.
-
-    Parameters
-    ----------
-    part
-        Any part.
-
-    Raises
-    ------
-    ArrangementError
-        If it has no contour.
-    """
+    """Return a cam of an assembly as the design sees it."""
     if isinstance(part, DesignedCam):
         return _Designed(part.part, part.designed)
     if isinstance(part, TwoSidedCam):
@@ -317,12 +282,7 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
 def with_contour(part: object, contour: Contour | None) -> object:
     """Return a part as what the design sees of it: with its contour where that was designed.
 
-    Parameters
-    ----------
-    part
-        Declared cam.
-    contour
-        That it was fitted to; ``None`` where that is not known.
+    ``contour``: that it was fitted to; ``None`` where that is not known.
     """
     return DesignedCam(part, contour) if contour is not None and isinstance(part, Cam) else part
 
@@ -390,22 +350,12 @@ def cam_from_profile(
     return made.fitted(theta, arm, count, anchor_distance)
 
 
-def spline_basis(at: Floats, last: float, count: int) -> Floats:
-    """Return the values of all uniform cubic B-splines of a cam, shape (n, count).
-
-    Parameters
-    ----------
-    at
-        Angles, shape (n,).
-    last
-        End of the table.
-    count
-        Number of control values.
-    """
+def spline_basis(at: Array, last: float, count: int) -> Array:
+    """Return the values of all uniform cubic B-splines of a cam, shape (n, count)."""
     return _basis_derivative(at, last, count, 0)
 
 
-def _basis_derivative(at: Floats, last: float, count: int, order: int) -> Floats:
+def _basis_derivative(at: Array, last: float, count: int, order: int) -> Array:
     """Return a derivative, 0 to 2, of all B-splines with respect to the angle in steps of the knots."""
     offset = (at / last * (count - 3))[:, None] - (np.arange(count) - 1)[None, :]
     outer, inner, sign = np.clip(2 - abs(offset), 0, None), np.clip(1 - abs(offset), 0, None), np.sign(offset)
@@ -428,30 +378,30 @@ def _end(end: float, wanted: float | None) -> float:
     return wanted
 
 
-def _lever_arms(row: Quantity, last: Quantity, at: Floats) -> Floats:
+def _lever_arms(row: Quantity, last: Quantity, at: Array) -> Array:
     """Return a spline, continued below zero as the cubic that it is there."""
     end, values = last.number, np.array(row.values)
     first = np.linspace(0.0, end / (len(values) - 3), 4)
     start = np.polynomial.Polynomial.fit(first, spline_basis(first, end, len(values)) @ values, 3)
-    result: Floats = np.where(at < 0.0, start(at), spline_basis(at, end, len(values)) @ values)
+    result: Array = np.where(at < 0.0, start(at), spline_basis(at, end, len(values)) @ values)
     return result
 
 
-def _dense(angles: Floats, lever_arms: Floats, count: int) -> tuple[Floats, Floats]:
+def _dense(angles: Array, lever_arms: Array, count: int) -> tuple[Array, Array]:
     dense = np.linspace(0.0, angles[-1], max(_SAMPLES_PER_VALUE * count, len(angles)))
     return dense, make_interp_spline(angles, lever_arms, k=3)(dense)
 
 
-def _row(old: Quantity, values: Floats) -> Quantity:
+def _row(old: Quantity, values: Array) -> Quantity:
     """Return designed control values; the spread of those before was of another cam, made another way."""
     return replace(old.with_value(significant(values), _SOURCE), spread=0.0)
 
 
-def _jumps(wanted: Floats) -> bool:
+def _jumps(wanted: Array) -> bool:
     return bool(abs(wanted[0]) > _JUMP * np.max(np.abs(wanted)))
 
 
-def _solved(basis: Floats, wanted: Floats, used: NDArray[np.bool_]) -> Floats:
+def _solved(basis: Array, wanted: Array, used: Mask) -> Array:
     # Within the onset of a jump no angle is used, and the control values that act there alone are free: they
     # go on as their neighbours do.
     smooth = _LOOSE * np.diff(np.eye(basis.shape[1]), n=3, axis=0)[: 0 if used.all() else None]
@@ -460,5 +410,5 @@ def _solved(basis: Floats, wanted: Floats, used: NDArray[np.bool_]) -> Floats:
     return np.asarray(values, dtype=float)
 
 
-def _largest(errors: Floats, where: NDArray[np.bool_]) -> float:
+def _largest(errors: Array, where: Mask) -> float:
     return float(np.max(np.abs(errors)[where], initial=0.0))

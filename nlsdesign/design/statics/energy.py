@@ -16,15 +16,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import InfeasibleError, ValueRangeError
+from ...foundation.arrays import Array
+from ...foundation.errors import InfeasibleError, ValueRangeError
 from ...model import flatten
 from ..curves.target import Target
 from .equilibrium import ElasticLaw, elastic_law
-
-Floats = NDArray[np.float64]
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _CELLS = 600
@@ -36,31 +34,13 @@ _JUST_ABOVE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class CamProfile:
-    """Lever arm over the angle and what the elements do meanwhile; arrays of shape (n,), in SI.
+    """Lever arm over the angle and what the elements do meanwhile; arrays of shape (n,), in SI."""
 
-    Parameters
-    ----------
-    angles
-        From zero to the last angle of the target.
-    extensions
-        δ(θ), counted from angle zero.
-    lever_arms
-        h(θ); the first is the limit from above.
-    forces
-        Force of one element.
-    torques
-        N·h·F.
-    elements
-        N.
-    pretension
-        e₀.
-    """
-
-    angles: Floats
-    extensions: Floats
-    lever_arms: Floats
-    forces: Floats
-    torques: Floats
+    angles: Array
+    extensions: Array
+    lever_arms: Array
+    forces: Array
+    torques: Array
     elements: float
     pretension: float
 
@@ -78,22 +58,8 @@ def energy_profile(
 ) -> CamProfile:
     """Return the closed-form cam for the rubber, pretension and number of elements of an actuator.
 
-    Parameters
-    ----------
-    actuator
-        Assembly with a cam spring; its present cam does not matter.
-    target
-        Torque curve.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-    points
-        Number of angles.
-
-    Raises
-    ------
-    InfeasibleError
-        If the rubber cannot store the energy below the target, or carries no force at angle zero that
-        could give its slope.
+    ``actuator``: assembly with a cam spring; its present cam does not matter. ``spring``: path of the cam
+    spring; decided from the structure if it is left out.
     """
     model = flatten(actuator)
     law = elastic_law(model, spring)
@@ -107,28 +73,7 @@ def energy_profile(
 def closed_form(
     law: ElasticLaw, target: Target, *, elements: float, pretension: float = 0.0, points: int = 401
 ) -> CamProfile:
-    """Return the closed-form cam for an elastic law.
-
-    Parameters
-    ----------
-    law
-        Equilibrium law of one element.
-    target
-        Torque curve.
-    elements
-        Number of equal elements.
-    pretension
-        Extension at angle zero in m.
-    points
-        Number of angles.
-
-    Raises
-    ------
-    InfeasibleError
-        As :func:`energy_profile`.
-    ValueRangeError
-        If fewer than three angles are asked for.
-    """
+    """Return the closed-form cam for an elastic law."""
     if points < 3:
         raise ValueRangeError(f"points = {points}", "a profile needs at least three angles")
     angles = np.linspace(0.0, target.last_angle, points)
@@ -155,15 +100,15 @@ def _first_lever_arm(law: ElasticLaw, target: Target, elements: float, pretensio
     return float(np.sqrt(slope / (elements * stiffness))) if np.isfinite(stiffness) else 0.0
 
 
-def _work(law: ElasticLaw, start: Floats, end: Floats) -> Floats:
+def _work(law: ElasticLaw, start: Array, end: Array) -> Array:
     """Return ∫F de between pairs of extensions by Gauss's rule with eight points."""
     half = (end - start)[..., None] / 2
     places = start[..., None] + half * (1.0 + _GAUSS)
-    result: Floats = (law.force(places) * _WEIGHTS * half).sum(axis=-1)
+    result: Array = (law.force(places) * _WEIGHTS * half).sum(axis=-1)
     return result
 
 
-def _stretched(law: ElasticLaw, energies: Floats, pretension: float) -> Floats:
+def _stretched(law: ElasticLaw, energies: Array, pretension: float) -> Array:
     """Return the extensions beyond the pretension at which one element has taken up the given energies."""
     grid, stored = _stored(law, float(energies[-1]), pretension)
     cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
@@ -180,7 +125,7 @@ def _stretched(law: ElasticLaw, energies: Floats, pretension: float) -> Floats:
     return extensions
 
 
-def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Floats, Floats]:
+def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Array, Array]:
     longest = 1e-3
     while longest < _LONGEST:
         grid = longest * np.linspace(0.0, 1.0, _CELLS + 1) ** 2

@@ -9,13 +9,14 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...errors import ArrangementError, ConvergenceError
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, ConvergenceError
+from ...foundation.symbolic import Expression, depends
 from ...model import FlatModel, Variable
 from ...model.roles import series_cam, series_spring
 from ...model.structure import CamNames
-from ...symbolic import Expression, depends
 from .rounding import rounded
 
 _NEWTON_STEPS = 30
@@ -51,50 +52,26 @@ class ElasticLaw:
         return tuple(piece.name for piece in self.cam.specimens)
 
     @property
-    def numbers(self) -> NDArray[np.float64]:
+    def numbers(self) -> Array:
         """Values of the parameters, shape (parameters,)."""
         return np.array([v.start for v in self.parameters])
 
-    def force(self, extension: ArrayLike) -> NDArray[np.float64]:
+    def force(self, extension: ArrayLike) -> Array:
         """Return the force at the numbers of the model.
 
-        Parameters
-        ----------
-        extension
-            In m, any shape.
-
-        Returns
-        -------
-        numpy.ndarray
-            Of the same shape, in N.
+        Result: of the same shape, in N.
         """
         return self._evaluated(extension, 0)
 
-    def stiffness(self, extension: ArrayLike) -> NDArray[np.float64]:
+    def stiffness(self, extension: ArrayLike) -> Array:
         """Return d(force)/d(extension) at the numbers of the model.
 
-        Parameters
-        ----------
-        extension
-            In m, any shape.
-
-        Returns
-        -------
-        numpy.ndarray
-            Of the same shape, in N/m.
+        Result: of the same shape, in N/m.
         """
         return self._evaluated(extension, 1)
 
     def without_knots(self, longest: float, share: float) -> ElasticLaw:
-        """Return the law with rounded knots.
-
-        Parameters
-        ----------
-        longest
-            Extension in m up to which the law is looked at.
-        share
-            Width of the rounding relative to that range.
-        """
+        """Return the law with rounded knots."""
         places = np.linspace(0.0, longest, 101).reshape(1, -1)
         numbers = np.repeat(self.numbers[:, None], places.size, axis=1)
         extension, parameters = ca.SX.sym("extension"), ca.SX.sym("parameters", len(self.parameters))
@@ -104,10 +81,10 @@ class ElasticLaw:
         results = [force, ca.jacobian(force, extension), *old[2:]]
         return replace(self, function=ca.Function("law", [extension, parameters], results))
 
-    def _evaluated(self, extension: ArrayLike, which: int) -> NDArray[np.float64]:
+    def _evaluated(self, extension: ArrayLike, which: int) -> Array:
         given = np.asarray(extension, dtype=float)
         values = self._with_numbers(given.reshape(1, -1))[which]
-        result: NDArray[np.float64] = np.array(values, dtype=float).reshape(given.shape)
+        result: Array = np.array(values, dtype=float).reshape(given.shape)
         return result
 
     @cached_property
@@ -167,19 +144,7 @@ def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
 def torque_function(model: FlatModel, spring: str | None = None) -> ca.Function:
     """Return the torque of a spring in equilibrium as a function (angle, parameters) -> torque.
 
-    Parameters
-    ----------
-    model
-        Flat model of an assembly.
-    spring
-        Path of the spring; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no spring of that name.
-    ArrangementError
-        If the structure does not decide, or the spring's angle is neither state nor input.
+    ``spring``: path of the spring; decided from the structure if it is left out.
     """
     tie = series_spring(model, spring)
     signals, angle, parameters = _at_rest(model, tie.motion, tie.states)
@@ -189,19 +154,7 @@ def torque_function(model: FlatModel, spring: str | None = None) -> ca.Function:
 def cam_function(model: FlatModel, spring: str | None = None) -> ca.Function:
     """Return the law of a cam as a function (angle, parameters) -> (lever arm, extension without pretension).
 
-    Parameters
-    ----------
-    model
-        Flat model of an assembly.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no cam spring of that name.
-    ArrangementError
-        If the structure does not decide, or the spring's angle is neither state nor input.
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     cam = series_cam(model, spring)
     signals, angle, parameters = _at_rest(model, cam.angle, cam.states)
@@ -210,7 +163,7 @@ def cam_function(model: FlatModel, spring: str | None = None) -> ca.Function:
     return ca.Function("cam", [angle, parameters], results)
 
 
-def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) -> NDArray[np.float64]:
+def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) -> Array:
     """Return the torque of a spring over its angle with all relaxation at rest.
 
     Parameters
@@ -236,7 +189,7 @@ def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) 
     """
     given = np.asarray(angles, dtype=float)
     torque = torque_function(model, spring)(given.reshape(1, -1), model.start(model.parameters))
-    result: NDArray[np.float64] = np.array(torque, dtype=float).reshape(given.shape)
+    result: Array = np.array(torque, dtype=float).reshape(given.shape)
     return result
 
 
@@ -264,22 +217,7 @@ def _at_rest(
 
 
 def handle_of(angle: Expression, movable: Expression, motion: str) -> tuple[int, Expression]:
-    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio).
-
-    Parameters
-    ----------
-    angle
-        Of the spring.
-    movable
-        States and inputs, as a column.
-    motion
-        Name of the angle, for messages.
-
-    Raises
-    ------
-    ArrangementError
-        If no single state or input turns it.
-    """
+    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio)."""
     slopes = ca.SX(ca.jacobian(angle, movable))
     places = [i for i in range(movable.shape[0]) if not slopes[i].is_zero()]
     places.sort(key=lambda i: not ca.is_equal(slopes[i], ca.SX(1)))
@@ -292,15 +230,7 @@ def handle_of(angle: Expression, movable: Expression, motion: str) -> tuple[int,
 
 
 def resting_states(rates: Expression, states: Expression) -> Expression:
-    """Return the states at which the rates vanish; those that never move at rest stay at zero.
-
-    Parameters
-    ----------
-    rates
-        Derivatives of the states.
-    states
-        Symbols, as a column.
-    """
+    """Return the states at which the rates vanish; those that never move at rest stay at zero."""
     moving = [i for i in range(states.shape[0]) if not rates[i].is_zero()]
     idle = [i for i in range(states.shape[0]) if i not in moving]
     result = ca.SX.zeros(states.shape)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ArrangementError
+from ...foundation.errors import ArrangementError
+from ...foundation.symbolic import Expression, depends
 from ...model import FlatModel
 from ...model.flat import Symbols
 from ...model.roles import series_cam
 from ...model.structure import CamNames, body_moved_by
-from ...symbolic import Expression, depends
 from .equilibrium import cam_function, handle_of, resting_states
 
 _ANGLE = 0.2
@@ -45,20 +45,7 @@ def relaxing_law(model: FlatModel, spring: str | None = None) -> RelaxingLaw:
     The model stands at an angle where its cam has a lever arm; the pretension makes up for the extension
     there, and the speed of the body that turns the cam is the rate of the extension over that lever arm.
 
-    Parameters
-    ----------
-    model
-        Flat model of an assembly.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no cam spring of that name.
-    ArrangementError
-        If the structure does not decide, the cam has no lever arm, the angle of the spring is neither state
-        nor input, or the element relaxes by a law that is not affine in its states.
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     cam, symbols = series_cam(model, spring), model.symbols()
     arm, before = _at_the_cut(model, cam)

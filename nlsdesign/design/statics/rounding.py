@@ -9,37 +9,27 @@ where w is a share of the largest |v| that occurs. Everything else stays as it i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...symbolic import Expression
+from ...foundation.arrays import Array
+from ...foundation.symbolic import Expression
+from ...model.graph import applied, as_results, fold, read_graph
 
 _CORNERS = (ca.OP_FMAX, ca.OP_FMIN, ca.OP_FABS)
 
 
 def has_corners(function: ca.Function) -> bool:
-    """Tell whether a function of SX contains a maximum, minimum or absolute value.
-
-    Parameters
-    ----------
-    function
-        Any.
-    """
-    return any(function.instruction_id(k) in _CORNERS for k in range(function.n_instructions()))
+    """Tell whether a function of SX contains a maximum, minimum or absolute value."""
+    return any(step.operation in _CORNERS for step in read_graph(function).steps)
 
 
-def rounded(function: ca.Function, samples: list[NDArray[np.float64]], share: float) -> ca.Function:
+def rounded(function: ca.Function, samples: list[Array], share: float) -> ca.Function:
     """Return a function of SX with all corners rounded.
 
-    Parameters
-    ----------
-    function
-        Of columns.
-    samples
-        For each argument typical values, shape (argument, samples) or (argument,).
-    share
-        Width of the rounding relative to the largest distance from the corner among the samples.
+    ``samples``: for each argument typical values, shape (argument, samples) or (argument,).
     """
     arguments = [ca.SX.sym(function.name_in(i), function.size1_in(i)) for i in range(function.n_in())]
     _, distances = _rewritten(function, arguments, [])
@@ -55,31 +45,18 @@ def _rewritten(
     function: ca.Function, arguments: list[Expression], widths: list[float]
 ) -> tuple[list[Expression], list[Expression]]:
     """Return the results, with corners rounded where widths are given, and the distances from the corners."""
-    results = [ca.SX.zeros(function.sparsity_out(i)) for i in range(function.n_out())]
-    work: dict[int, Expression] = {}
     distances: list[Expression] = []
-    for k in range(function.n_instructions()):
-        code, out, into = (
-            function.instruction_id(k),
-            function.instruction_output(k),
-            function.instruction_input(k),
-        )
-        if code == ca.OP_OUTPUT:
-            results[out[0]].nz[out[1]] = work[into[0]]
-        elif code == ca.OP_INPUT:
-            work[out[0]] = arguments[into[0]].nz[into[1]]
-        elif code == ca.OP_CONST:
-            work[out[0]] = ca.SX(function.instruction_constant(k))
-        elif code in _CORNERS:
-            a = work[into[0]]
-            b = ca.SX(0) if code == ca.OP_FABS else work[into[1]]
-            width = widths[len(distances)] if widths else 0.0
-            distances.append(a - b)
-            work[out[0]] = _corner(code, a, b, width)
-        else:
-            operands = [work[i] for i in into]
-            work[out[0]] = (ca.SX.binary if len(operands) == 2 else ca.SX.unary)(code, *operands)
-    return results, distances
+
+    def written(operation: int, operands: Sequence[Expression]) -> Expression:
+        if operation not in _CORNERS:
+            return applied(operation, operands)
+        a, b = operands if len(operands) == 2 else (operands[0], ca.SX(0))
+        width = widths[len(distances)] if widths else 0.0
+        distances.append(a - b)
+        return _corner(operation, a, b, width)
+
+    values = fold(read_graph(function), lambda i, k: arguments[i].nz[k], ca.SX, combined=written)
+    return as_results(function, values), distances
 
 
 def _corner(code: int, a: Expression, b: Expression, width: float) -> Expression:

@@ -10,11 +10,6 @@ def with_smooth_cables(actuator: Assembly) -> Assembly:
     """Return the assembly with every cable that goes slack in its smooth form.
 
     Within the range of a design the cable is taut, where the two forms agree.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
     """
     for path, part in actuator.walk():
         if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from ...quantity import Quantity
+from ...foundation.arrays import Array, Mask
+from ...foundation.quantity import Quantity
 from ..curves.numbers import in_si
 from .declared_cam import declared_cam
 from .energy import CamProfile
-
-Floats = NDArray[np.float64]
 
 _JUMP = 1e-3
 """First lever arm, relative to the largest, from which it counts as a jump."""
@@ -105,11 +103,11 @@ def unmakeable_parts(
     return tuple(sorted(result, key=lambda part: part.first))
 
 
-def _with_radius(reason: str, radii: Floats) -> str:
+def _with_radius(reason: str, radii: Array) -> str:
     return f"{reason} (radius of curvature down to {1e3 * float(radii.min()):.3g} mm)"
 
 
-def _runs(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(where: Mask) -> list[tuple[int, int]]:
     """Return first and last index of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

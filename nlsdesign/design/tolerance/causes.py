@@ -8,22 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from ...quantity import parse_unit, with_unit
-
-Floats = NDArray[np.float64]
+from ...foundation.arrays import Array
+from ...foundation.quantity import parse_unit, with_unit
 
 
 def shown_unit(unit: str) -> str:
-    """Return the unit in which a length, an area or a stress of a spring is shown.
-
-    Parameters
-    ----------
-    unit
-        In SI.
-    """
+    """Return the unit in which a length, an area or a stress of a spring is shown."""
     return {"m": "mm", "m^2": "mm^2", "Pa": "MPa"}.get(unit, unit)
 
 
@@ -47,7 +39,7 @@ class SpreadReading(ABC):
         """
 
     @abstractmethod
-    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+    def drawn(self, generator: np.random.Generator, count: int) -> Array:
         """Return deviations in units of the standard deviation, shape (count,).
 
         Parameters
@@ -59,7 +51,7 @@ class SpreadReading(ABC):
         """
 
     @abstractmethod
-    def at(self, shares: Floats) -> Floats:
+    def at(self, shares: Array) -> Array:
         """Return the deviations below which given shares of all lie, in units of the standard deviation.
 
         Parameters
@@ -82,13 +74,13 @@ class NormalSpread(SpreadReading):
         """Return the spread itself."""
         return spread
 
-    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+    def drawn(self, generator: np.random.Generator, count: int) -> Array:
         """Return standard normal numbers."""
         return generator.standard_normal(count)
 
-    def at(self, shares: Floats) -> Floats:
+    def at(self, shares: Array) -> Array:
         """Return quantiles of the standard normal distribution."""
-        result: Floats = ndtri(shares)
+        result: Array = ndtri(shares)
         return result
 
 
@@ -108,11 +100,11 @@ class UniformSpread(SpreadReading):
         """Return spread/√3."""
         return spread / math.sqrt(3.0)
 
-    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+    def drawn(self, generator: np.random.Generator, count: int) -> Array:
         """Return numbers between −√3 and √3."""
         return generator.uniform(-math.sqrt(3.0), math.sqrt(3.0), count)
 
-    def at(self, shares: Floats) -> Floats:
+    def at(self, shares: Array) -> Array:
         """Return quantiles between −√3 and √3."""
         return math.sqrt(3.0) * (2.0 * shares - 1.0)
 
@@ -183,11 +175,6 @@ class WaveCause(Cause):
     """An error of the contour's support function, a·cos(kπφ/φ_e) over the direction φ of the cable.
 
     With k = 0 it is an offset: a tool of another radius, or a thicker cable.
-
-    Parameters
-    ----------
-    order
-        k.
     """
 
     order: int
@@ -206,27 +193,11 @@ class ProfileCause(Cause):
     numbers: tuple[tuple[str, float], ...]
 
 
-def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: SpreadReading) -> Floats:
+def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: SpreadReading) -> Array:
     """Return independent deviations in units of their standard deviations.
 
     Each cause draws from a generator of its own, seeded by the seed and its name, so that another cause more
     or less, or another design with the same names, changes no other deviation.
-
-    Parameters
-    ----------
-    causes
-        In the order of the columns.
-    count
-        Number of draws.
-    seed
-        Any whole number from zero.
-    reading
-        How spreads are read.
-
-    Returns
-    -------
-    numpy.ndarray
-        Shape (count, causes).
     """
     columns = [reading.drawn(np.random.default_rng([seed, *cause.name.encode()]), count) for cause in causes]
     return np.column_stack(columns) if columns else np.zeros((count, 0))

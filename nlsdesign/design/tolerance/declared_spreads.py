@@ -13,11 +13,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ...errors import unknown_name
+from ...foundation.errors import unknown_name
+from ...foundation.quantity import Quantity
 from ...model import FlatModel, Variable
 from ...model.roles import series_cam
 from ...model.structure import CamNames, SpringNames
-from ...quantity import Quantity
 from ..curves.numbers import in_si
 from .causes import (
     AnchorCause,
@@ -109,23 +109,7 @@ class SpreadRules:
 def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> tuple[Cause, ...]:
     """Return everything that deviates in a cam spring, whether it matters or not.
 
-    Parameters
-    ----------
-    model
-        Flat model of the actuator.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-    rules
-        How spreads are read.
-
-    Raises
-    ------
-    UnknownNameError
-        If a spread is given for a name that does not exist, with the nearest that does.
-    UnitError
-        If a spread is given in a unit of something else.
-    ValueRangeError
-        If a given spread is negative or no number.
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     cam = series_cam(model, spring)
     tie = next(each for each in model.springs if cam in each.cams)

@@ -26,15 +26,13 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from ...errors import ConvergenceError
-from ...symbolic import depends
+from ...foundation.arrays import Array, Indices
+from ...foundation.errors import ConvergenceError
+from ...foundation.symbolic import depends
 from ..statics.equilibrium import ElasticLaw
 from .causes import AnchorCause, Cause, ProfileCause, WaveCause
-
-Floats = NDArray[np.float64]
 
 _RUN_OUT = 101
 """Nodes over the quarter turn beyond that, where the lever arm is held."""
@@ -69,28 +67,28 @@ class MadeCam:
         δ at the angles without errors, shape (n,), in m.
     """
 
-    angles: Floats
+    angles: Array
     anchor: float
     table: CubicHermiteSpline
     profiles: dict[str, CubicHermiteSpline]
-    extensions: Floats
+    extensions: Array
 
     @cached_property
-    def lever_arms(self) -> Floats:
+    def lever_arms(self) -> Array:
         """H without errors at the angles, shape (n,), in m."""
-        result: Floats = self.table(self.angles)
+        result: Array = self.table(self.angles)
         return result
 
     @cached_property
-    def _directions(self) -> Floats:
+    def _directions(self) -> Array:
         return self.angles + np.arcsin(self.lever_arms / self.anchor)
 
     @cached_property
-    def _slopes(self) -> Floats:
+    def _slopes(self) -> Array:
         """P' without errors at the angles."""
         # Within the change of sides at angle zero the slope is none of the contour's.
         first = self.table(np.maximum(self.angles, self.angles[1]), 1)
-        slopes: Floats = first / (1.0 + first / np.sqrt(self.anchor**2 - self.lever_arms**2))
+        slopes: Array = first / (1.0 + first / np.sqrt(self.anchor**2 - self.lever_arms**2))
         return slopes
 
     @property
@@ -100,14 +98,8 @@ class MadeCam:
             return 0.0
         return float(np.max(np.hypot(self.lever_arms, self._slopes))) * (1.0 + _CLEARANCE)
 
-    def shape(self, cause: Cause) -> Callable[[Floats, Floats], Floats] | None:
-        """Return the error of the contour per standard deviation over u and φ; None for other causes.
-
-        Parameters
-        ----------
-        cause
-            Any.
-        """
+    def shape(self, cause: Cause) -> Callable[[Array, Array], Array] | None:
+        """Return the error of the contour per standard deviation over u and φ; None for other causes."""
         if isinstance(cause, ProfileCause):
             profile = self.profiles[cause.name]
             return lambda u, _: profile(u)
@@ -116,25 +108,11 @@ class MadeCam:
             return lambda _, phi: size * np.cos(rate * phi) if rate else np.full_like(phi, size)
         return None
 
-    def deviating(self, causes: Sequence[Cause], deviations: Floats) -> tuple[Floats, Floats]:
+    def deviating(self, causes: Sequence[Cause], deviations: Array) -> tuple[Array, Array]:
         """Return lever arms and extensions of made cams.
 
-        Parameters
-        ----------
-        causes
-            Of any kind; those that are not of the cam are passed over.
-        deviations
-            In units of the standard deviations, shape (draws, causes).
-
-        Returns
-        -------
-        tuple of numpy.ndarray
-            Each of shape (draws, n), in m.
-
-        Raises
-        ------
-        ConvergenceError
-            If the point of contact is not found.
+        ``causes``: of any kind; those that are not of the cam are passed over. ``deviations``: in units of
+        the standard deviations, shape (draws, causes). Result: each of shape (draws, n), in m.
         """
         draws = len(deviations)
         shapes = [
@@ -152,27 +130,21 @@ class MadeCam:
         return arms[:, self._kept], self.extensions + longer[:, self._kept]
 
     @cached_property
-    def _grid(self) -> Floats:
+    def _grid(self) -> Array:
         """The angles, with finer ones where an error of the edge sets in, close to zero."""
         return np.concatenate([[0.0], self.angles[1] * np.geomspace(1e-4, 0.9, _FINER), self.angles[1:]])
 
     @property
-    def _kept(self) -> NDArray[np.intp]:
+    def _kept(self) -> Indices:
         return np.append(0, np.arange(_FINER + 1, _FINER + len(self.angles)))
 
-    def distance(self, causes: Sequence[Cause], deviations: Floats) -> Floats:
-        """Return the distance of the anchors of made springs, shape (draws,), in m.
-
-        Parameters
-        ----------
-        causes, deviations
-            As for :meth:`deviating`.
-        """
+    def distance(self, causes: Sequence[Cause], deviations: Array) -> Array:
+        """Return the distance of the anchors of made springs, shape (draws,), in m."""
         moves = [c.deviation if isinstance(c, AnchorCause) else 0.0 for c in causes]
-        result: Floats = self.anchor + deviations @ np.array(moves)
+        result: Array = self.anchor + deviations @ np.array(moves)
         return result
 
-    def _touched(self, anchors: Floats, shapes: Sequence[tuple[Callable[..., Floats], Floats]]) -> Floats:
+    def _touched(self, anchors: Array, shapes: Sequence[tuple[Callable[..., Array], Array]]) -> Array:
         """Return the lever arms where the cables touch, for anchors of shape (draws,)."""
         count = len(self._grid)
         wanted = np.tile(self._grid, len(anchors))
@@ -207,13 +179,10 @@ class MadeCam:
             )  # fmt: skip
         return arms.reshape(-1, count)
 
-    def sensitivity(self, cause: Cause) -> tuple[Floats, Floats]:
+    def sensitivity(self, cause: Cause) -> tuple[Array, Array]:
         """Return dh and dδ per standard deviation of a cause, to first order, shape (n,) each, in m.
 
-        Parameters
-        ----------
-        cause
-            Of any kind; one that is not of the cam changes nothing.
+        ``cause``: of any kind; one that is not of the cam changes nothing.
         """
         root = np.sqrt(self.anchor**2 - self.lever_arms**2)
         if isinstance(cause, AnchorCause):
@@ -229,19 +198,10 @@ class MadeCam:
         return arms, np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def made_cam(law: ElasticLaw, cam: ca.Function, angles: Floats, causes: Sequence[Cause]) -> MadeCam:
+def made_cam(law: ElasticLaw, cam: ca.Function, angles: Array, causes: Sequence[Cause]) -> MadeCam:
     """Return the contour of a declared cam.
 
-    Parameters
-    ----------
-    law
-        Behind the cam; only its names and numbers are used.
-    cam
-        (angle, parameters) -> (lever arm, extension).
-    angles
-        From zero, shape (n,), in rad.
-    causes
-        Whose declared numbers of the cam are wanted.
+    ``law``: behind the cam; only its names and numbers are used.
     """
     numbers, names = law.numbers, [v.name for v in law.parameters]
     anchored = law.cam.anchor_distance

@@ -8,17 +8,14 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...model import FlatModel
 from ...model.structure import CamNames
 from ..curves.target import Target
 from ..statics.equilibrium import cam_function, elastic_law
 from .causes import Cause, NumberCause
 from .made_cam import MadeCam, made_cam
-
-Floats = NDArray[np.float64]
-
 
 _LONG = 2000
 """Number of instructions of a law from which on it is not written out for each angle."""
@@ -57,14 +54,14 @@ class MadeSpring:
 
     cam: CamNames
     causes: tuple[Cause, ...]
-    angles: Floats
-    targets: Floats
-    importance: Floats
+    angles: Array
+    targets: Array
+    importance: Array
     contour: MadeCam
     force: ca.Function = field(repr=False)
     moved: tuple[str, ...]
-    numbers: Floats
-    ranges: Floats
+    numbers: Array
+    ranges: Array
 
     @property
     def rubs(self) -> bool:
@@ -72,23 +69,23 @@ class MadeSpring:
         return bool(self.cam.guides)
 
     @cached_property
-    def wanted(self) -> Floats:
+    def wanted(self) -> Array:
         """Targets of all columns."""
         return np.tile(self.targets, 2) if self.rubs else self.targets
 
     @cached_property
-    def weights(self) -> Floats:
+    def weights(self) -> Array:
         """Weights of the columns in the mean over angle and stroke, as the target says; their sum is 1."""
         steps = np.diff(self.angles)
         weights = self.importance * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
         weights = weights / np.sum(weights)
-        result: Floats = np.tile(weights / 2, 2) if self.rubs else weights
+        result: Array = np.tile(weights / 2, 2) if self.rubs else weights
         return result
 
     @cached_property
-    def nominal(self) -> Floats:
+    def nominal(self) -> Array:
         """Torque without deviations, shape (columns,)."""
-        result: Floats = self.torques(np.zeros((1, len(self.causes))))[0]
+        result: Array = self.torques(np.zeros((1, len(self.causes))))[0]
         return result
 
     @cached_property
@@ -100,7 +97,7 @@ class MadeSpring:
         return forces.expand() if self.force.n_instructions() < _LONG else forces
 
     @cached_property
-    def _amounts(self) -> Floats:
+    def _amounts(self) -> Array:
         """Change of each moved number per standard deviation of each cause, shape (causes, moved)."""
         amounts = np.zeros((len(self.causes), len(self.moved)))
         for k, cause in enumerate(self.causes):
@@ -109,54 +106,29 @@ class MadeSpring:
                     amounts[k, self.moved.index(name)] += amount
         return amounts
 
-    def rms(self, torques: Floats) -> Floats:
+    def rms(self, torques: Array) -> Array:
         """Return the root of the mean over angle and stroke of the squared error.
 
-        Parameters
-        ----------
-        torques
-            Shape (draws, columns), in N·m.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (draws,), in N·m.
+        ``torques``: shape (draws, columns), in N·m.
         """
-        result: Floats = np.sqrt((torques - self.wanted) ** 2 @ self.weights)
+        result: Array = np.sqrt((torques - self.wanted) ** 2 @ self.weights)
         return result
 
-    def held(self, deviations: Floats) -> int:
+    def held(self, deviations: Array) -> int:
         """Return in how many draws a number had to be held at the end of its range.
 
-        Parameters
-        ----------
-        deviations
-            In units of the standard deviations, shape (draws, causes).
+        ``deviations``: in units of the standard deviations, shape (draws, causes).
         """
         free = self.numbers + deviations @ self._amounts
         outside = np.any((free < self.ranges[:, 0]) | (free > self.ranges[:, 1]), axis=1)
         near = self.contour.distance(self.causes, deviations) < self.contour.nearest_anchor
         return int(np.sum(outside | near))
 
-    def torques(self, deviations: Floats, touched: tuple[Floats, Floats] | None = None) -> Floats:
+    def torques(self, deviations: Array, touched: tuple[Array, Array] | None = None) -> Array:
         """Return the torque of made springs.
 
-        Parameters
-        ----------
-        deviations
-            In units of the standard deviations, shape (draws, causes).
-        touched
-            Lever arms and extensions, where they are known already.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (draws, columns), in N·m.
-
-        Raises
-        ------
-        ConvergenceError
-            If the point of contact of cable and cam is not found.
+        ``deviations``: in units of the standard deviations, shape (draws, causes). Result: shape (draws,
+        columns), in N·m.
         """
         arms, longer = touched or self.contour.deviating(self.causes, deviations)
         numbers = np.clip(self.numbers + deviations @ self._amounts, self.ranges[:, 0], self.ranges[:, 1])
@@ -170,7 +142,7 @@ class MadeSpring:
         exponent = self._exponent(numbers)[:, None]
         return np.concatenate([torques * np.exp(exponent), torques * np.exp(-exponent)], axis=1)
 
-    def _exponent(self, numbers: Floats) -> Floats:
+    def _exponent(self, numbers: Array) -> Array:
         """Return the sum of µφ of all guides, shape (draws,)."""
         total = np.zeros(len(numbers))
         for guide in self.cam.guides:
@@ -178,7 +150,7 @@ class MadeSpring:
         return total
 
     @cached_property
-    def sensitivities(self) -> Floats:
+    def sensitivities(self) -> Array:
         """Change of the torque per standard deviation of each cause, to first order, (causes, columns)."""
         place = {name: k for k, name in enumerate(self.moved)}
         stretch, numbers = ca.SX.sym("stretch"), ca.SX.sym("numbers", len(self.moved))
@@ -201,7 +173,7 @@ class MadeSpring:
             rows.append(self._both_strokes(row, elements * arms * pull, amounts))
         return np.array(rows).reshape(len(self.causes), len(self.wanted))
 
-    def _both_strokes(self, row: Floats, torque: Floats, amounts: Floats) -> Floats:
+    def _both_strokes(self, row: Array, torque: Array, amounts: Array) -> Array:
         if not self.rubs:
             return row
         numbers = self.numbers[None, :]
@@ -221,27 +193,7 @@ def made_spring(
 ) -> MadeSpring:
     """Return the springs that are made from a model's numbers.
 
-    Parameters
-    ----------
-    model
-        Flat model of the actuator.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-    target
-        Torque curve.
-    causes
-        What deviates, and what may be trimmed.
-    angles
-        Number of angles from zero to the last one of the target.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no cam spring of that name.
-    ArrangementError
-        If the structure does not decide.
-    ConvergenceError
-        If the inner states of the rubber find no equilibrium.
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     law = elastic_law(model, spring)
     cam, grid = law.cam, np.linspace(0.0, target.last_angle, angles)

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ValueRangeError
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
+from ...foundation.processes import parallel_map
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
-from ...processes import parallel_map
 from ..curves.target import Target
 from ..statics.smooth_cables import with_smooth_cables
 from .causes import NumberCause, SpreadReading, draw_deviations, shown_unit
@@ -22,8 +22,6 @@ from .made_spring import MadeSpring, made_spring
 from .tolerance_result import SHARES, CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect, quantile
 from .trimming import Trim, Trimmed, trimmed
 
-Floats = NDArray[np.float64]
-
 _ANGLES = 101
 FEWEST_DRAWS, MOST_DRAWS = 20, 100_000
 _SMALL = 0.01
@@ -31,7 +29,7 @@ _SMALL = 0.01
 _NODES, _STRATA = 41, 800
 _BAND = (0.05, 0.5, 0.95)
 
-_Built = tuple[tuple[Floats, Floats], Floats]
+_Built = tuple[tuple[Array, Array], Array]
 
 
 class _BestTrim(NamedTuple):
@@ -158,18 +156,18 @@ def _checked(what: str, given: int, least: int, most: int) -> None:
         )  # fmt: skip
 
 
-def _quantiles(errors: Floats) -> tuple[QuantileEstimate, ...]:
+def _quantiles(errors: Array) -> tuple[QuantileEstimate, ...]:
     return tuple(quantile(errors, share) for share in SHARES)
 
 
-def _mean_of_strokes(made: MadeSpring, torques: Floats) -> Floats:
+def _mean_of_strokes(made: MadeSpring, torques: Array) -> Array:
     if not made.rubs:
         return torques
     half = torques.shape[1] // 2
     return (torques[:, :half] + torques[:, half:]) / 2
 
 
-def _band(made: MadeSpring, torques: Floats) -> Floats:
+def _band(made: MadeSpring, torques: Array) -> Array:
     """Return the band of the torque; of two strokes it reaches from the lower to the upper."""
     half = torques.shape[1] // (2 if made.rubs else 1)
     low, high = torques[:, -half:], torques[:, :half]
@@ -184,8 +182,8 @@ def _band(made: MadeSpring, torques: Floats) -> Floats:
 
 def _tried(
     made: MadeSpring,
-    deviations: Floats,
-    touched: tuple[Floats, Floats],
+    deviations: Array,
+    touched: tuple[Array, Array],
     trims: Sequence[tuple[str, tuple[float, float]]],
 ) -> tuple[list[TrimEffect], _BestTrim | None]:
     """Return the effect of each trim, and the best."""
@@ -208,12 +206,12 @@ class _WithLess:
     Of small causes only the part of first order is taken off.
     """
 
-    def __init__(self, made: MadeSpring, deviations: Floats, built: _Built, best: _BestTrim | None) -> None:
+    def __init__(self, made: MadeSpring, deviations: Array, built: _Built, best: _BestTrim | None) -> None:
         self.made, self.deviations, self.best = made, deviations, best
         self.touched, torques = built
         self.torques = (torques, torques if best is None else best.result.torques)
 
-    def small(self, rows: tuple[Floats, Floats], column: int, share: float) -> tuple[float, float]:
+    def small(self, rows: tuple[Array, Array], column: int, share: float) -> tuple[float, float]:
         """Return the quantiles for a cause that does little, from its rows as built and after the trim."""
         off = share * self.deviations[:, column, None]
         pairs = zip(self.torques, rows, strict=True)
@@ -230,7 +228,7 @@ class _WithLess:
         after = trimmed(made, less, column=best.column, ends=best.ends, touched=touched, start=best.result)
         return self._quantiles(built, after.torques)
 
-    def _quantiles(self, *torques: Floats) -> tuple[float, float]:
+    def _quantiles(self, *torques: Array) -> tuple[float, float]:
         built, after = (float(np.quantile(self.made.rms(each), SHARES[-1])) for each in torques)
         return built, after
 
@@ -265,10 +263,10 @@ def _effects(
     return list(parallel_map(effect, len(acting)))
 
 
-def _without(rows: Floats, tangent: Floats, weights: Floats) -> Floats:
+def _without(rows: Array, tangent: Array, weights: Array) -> Array:
     """Return rows without their part along a tangent, in the mean over angle and stroke."""
     along = (rows * tangent) @ weights / (tangent**2 @ weights)
-    result: Floats = rows - along[:, None] * tangent
+    result: Array = rows - along[:, None] * tangent
     return result
 
 

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import bdtr
 
-from ...data_frames import Axis, data_frame
-from ...prefixes import prefixed, shared_prefix, without_power
-from ...quantity import parse_unit, with_unit
+from ...foundation.arrays import Array
+from ...foundation.data_frames import Axis, data_frame
+from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.written_numbers import prefixed, shared_prefix, without_power
 from ..curves.target import Target
 from .causes import Cause
-
-Floats = NDArray[np.float64]
 
 SHARES = (0.5, 0.9, 0.95)
 """Shares of the made springs for which the largest error is stated."""
@@ -49,18 +47,11 @@ class QuantileEstimate:
         return f"{100 * self.share:g} % below {value} {unit} rms ({low} to {high} with 95 % confidence)"
 
 
-def quantile(errors: Floats, share: float) -> QuantileEstimate:
+def quantile(errors: Array, share: float) -> QuantileEstimate:
     """Return a quantile of independent draws with its confidence interval.
 
     The number of draws below the true quantile is binomial, whatever the distribution, so two of the ordered
     draws enclose it.
-
-    Parameters
-    ----------
-    errors
-        Shape (draws,).
-    share
-        Between 0 and 1.
     """
     ordered, count = np.sort(errors), len(errors)
     fewer = bdtr(np.arange(count + 1), count, share)
@@ -121,9 +112,9 @@ class TrimEffect:
     name: str
     unit: str
     quantiles: tuple[QuantileEstimate, ...]
-    errors: Floats
-    settings: Floats
-    band: Floats
+    errors: Array
+    settings: Array
+    band: Array
 
     @property
     def needed(self) -> tuple[float, float]:
@@ -168,12 +159,12 @@ class ToleranceResult:
     """
 
     target: Target
-    angles: Floats
-    nominal: Floats
+    angles: Array
+    nominal: Array
     nominal_rms: float
-    errors: Floats
+    errors: Array
     quantiles: tuple[QuantileEstimate, ...]
-    band: Floats
+    band: Array
     causes: tuple[CauseEffect, ...]
     trims: tuple[TrimEffect, ...]
     without_effect: tuple[str, ...]

@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError, unknown_name
+from ...foundation.arrays import Array, Indices
+from ...foundation.errors import ArrangementError, ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity
 from ...model import FlatModel
 from ...model.structure import CamNames
-from ...quantity import Quantity
 from ..curves.numbers import in_si
 from .causes import AnchorCause, Cause, NumberCause
 from .made_spring import MadeSpring
-
-Floats = NDArray[np.float64]
 
 _STEPS = 12
 _SETTLED = 1e-4
@@ -99,20 +97,20 @@ class Trimmed:
         Shape (draws,), in N·m.
     """
 
-    settings: Floats
-    places: Floats
-    torques: Floats
-    tangents: Floats
-    rms: Floats
+    settings: Array
+    places: Array
+    torques: Array
+    tangents: Array
+    rms: Array
 
 
 def trimmed(
     spring: MadeSpring,
-    deviations: Floats,
+    deviations: Array,
     *,
     column: int,
     ends: tuple[float, float],
-    touched: tuple[Floats, Floats] | None = None,
+    touched: tuple[Array, Array] | None = None,
     start: Trimmed | None = None,
 ) -> Trimmed:
     """Return springs whose trim makes their rms error least.
@@ -120,25 +118,8 @@ def trimmed(
     The error over the angle is nearly linear in the trim, so Gauss and Newton's step is used, with the
     change of the torque in the step before as derivative.
 
-    Parameters
-    ----------
-    spring
-        As made.
-    deviations
-        In units of the standard deviations, shape (draws, causes); the column of the trim is zero.
-    column
-        Of the trim.
-    ends
-        Range of the number as set, in SI.
-    touched
-        Lever arms and extensions before the trim, where they are known already.
-    start
-        Trim of similar springs.
-
-    Raises
-    ------
-    ArrangementError
-        If the number does not change the torque.
+    ``deviations``: in units of the standard deviations, shape (draws, causes); the column of the trim is
+    zero.
     """
     cause = spring.causes[column]
     if not np.max(np.abs(spring.sensitivities[column])) > 1e-12 * np.max(np.abs(spring.wanted)):
@@ -157,23 +138,21 @@ class _TrimSearch:
     """Springs with a trim in units of its cause."""
 
     def __init__(
-        self, spring: MadeSpring, deviations: Floats, column: int, touched: tuple[Floats, Floats] | None
+        self, spring: MadeSpring, deviations: Array, column: int, touched: tuple[Array, Array] | None
     ) -> None:
         self.spring, self.deviations, self.column = spring, deviations, column
         # What moves the cam moves the points of contact too; all else leaves them where they are.
-        self.fixed: tuple[Floats, Floats] | None = None
+        self.fixed: tuple[Array, Array] | None = None
         if isinstance(spring.causes[column], NumberCause):
             self.fixed = touched or spring.contour.deviating(spring.causes, deviations)
 
-    def torques(self, rows: NDArray[np.intp], at: Floats) -> Floats:
+    def torques(self, rows: Indices, at: Array) -> Array:
         changed = self.deviations[rows].copy()
         changed[:, self.column] = at
         known = None if self.fixed is None else (self.fixed[0][rows], self.fixed[1][rows])
         return self.spring.torques(changed, known)
 
-    def settled(
-        self, ends: tuple[Floats, Floats], start: Trimmed | None
-    ) -> tuple[Floats, Floats, Floats, Floats]:
+    def settled(self, ends: tuple[Array, Array], start: Trimmed | None) -> tuple[Array, Array, Array, Array]:
         """Return places, torques, tangents and rms errors at the best places within the ends."""
         spring, (low, high), count = self.spring, ends, len(self.deviations)
         active = np.arange(count)
@@ -207,21 +186,15 @@ class _TrimSearch:
 
 
 def trim_range(
-    spring: MadeSpring, deviations: Floats, *, column: int, ends: tuple[float, float]
-) -> tuple[Floats, Floats]:
-    """Return the least and largest trim of each spring in units of its cause, shape (draws,) each.
-
-    Parameters
-    ----------
-    spring, deviations, column, ends
-        As for :func:`trimmed`.
-    """
+    spring: MadeSpring, deviations: Array, *, column: int, ends: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Return the least and largest trim of each spring in units of its cause, shape (draws,) each."""
     cause = spring.causes[column]
     start = cause.nominal + deviations @ _moves(spring, column)
     return (ends[0] - start) / cause.deviation, (ends[1] - start) / cause.deviation
 
 
-def _moves(spring: MadeSpring, column: int) -> Floats:
+def _moves(spring: MadeSpring, column: int) -> Array:
     """Return how far each cause moves the number of a trim per standard deviation, shape (causes,), in SI."""
     own, moves = spring.causes[column], np.zeros(len(spring.causes))
     for k, cause in enumerate(spring.causes):

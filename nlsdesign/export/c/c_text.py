@@ -1,15 +1,22 @@
-"""C99 text: number types, literals, identifiers and comments."""
+"""C99 text: number types, literals, identifiers, comments, and structures.
+
+Members of structures are named as the variables: ``spring.rubber.relaxing.dashpot.strain``.
+"""
 
 from __future__ import annotations
 
 import math
 import re
 import textwrap
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
-from ...errors import ExportError, nearest
+from ...foundation.errors import ExportError, nearest
+from ...model.flat import Variable
 
 # C99 and C++ together: the headers are meant to be included from both.
 _KEYWORDS = frozenset(
@@ -26,126 +33,87 @@ _KEYWORDS = frozenset(
 )
 
 
-@dataclass(frozen=True)
-class Real:
-    """A floating-point type of C: how its numbers and functions are written.
+class Real(StrEnum):
+    """A floating-point type of C: how its numbers and functions are written."""
 
-    Parameters
-    ----------
-    name
-        ``"double"`` or ``"float"``.
-    suffix
-        Suffix of literals and of functions of ``math.h``.
-    largest
-        Largest finite number.
-    epsilon
-        Distance from 1 to the next number.
-    portable
-        Functions of ``math.h`` that are replaced by our own, see :mod:`.elementary`.
-    """
+    DOUBLE = "double"
+    FLOAT = "float"
 
-    name: str
-    suffix: str
-    largest: float
-    epsilon: float
-    portable: frozenset[str] = frozenset()
+    @classmethod
+    def named(cls, name: str) -> Real:
+        """Return the type of that name, ``"double"`` or ``"float"``."""
+        if name not in tuple(cls):
+            raise ExportError(
+                f"real='{name}'",
+                "must be 'double' or 'float'",
+                did_you_mean=nearest(name, list(cls)),
+            )
+        return cls(name)
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of literals and of functions of ``math.h``."""
+        return "f" if self is Real.FLOAT else ""
+
+    @property
+    def largest(self) -> float:
+        """Largest finite number."""
+        return float(self._format.max)
+
+    @property
+    def epsilon(self) -> float:
+        """Distance from 1 to the next number."""
+        return float(self._format.eps)
+
+    @property
+    def _format(self) -> np.finfo[Any]:
+        return np.finfo(np.float32 if self is Real.FLOAT else np.float64)
 
     def round(self, value: float) -> float:
-        """Return the number of this type that is nearest to a value.
-
-        Parameters
-        ----------
-        value
-            Any number.
-        """
+        """Return the number of this type that is nearest to a value."""
         with np.errstate(over="ignore"):
-            return float(np.float32(value)) if self.name == "float" else float(value)
+            return float(np.float32(value)) if self is Real.FLOAT else float(value)
 
     def literal(self, value: float) -> str:
-        """Return a number as C text that reads back as the same number.
-
-        Parameters
-        ----------
-        value
-            Any number but NaN; an infinite one becomes ``INFINITY``.
-
-        Raises
-        ------
-        ExportError
-            If a finite value has no finite counterpart in this type.
-        """
+        """Return a number as C text that reads back as the same number; an infinite one as ``INFINITY``."""
         if math.isnan(value):
             raise ExportError(
                 "the equations", "contain the constant NaN", next_step="correct the law that contains it"
             )
         if math.isinf(value):
-            return f"({'-' if value < 0 else ''}({self.name})INFINITY)"
+            return f"({'-' if value < 0 else ''}({self})INFINITY)"
         rounded = self.round(value)
         if math.isinf(rounded):
             raise ExportError(
                 f"the constant {value:g}",
-                f"is too large for {self.name}",
+                f"is too large for {self}",
                 next_step="export with real='double'",
             )
-        text = str(np.float32(value)) if self.name == "float" else repr(rounded)
+        text = str(np.float32(value)) if self is Real.FLOAT else repr(rounded)
         return (text if any(mark in text for mark in ".e") else text + ".0") + self.suffix
 
     def bound(self, value: float) -> str:
-        """Return a limit as C text; an infinite limit becomes the largest finite number.
-
-        Parameters
-        ----------
-        value
-            A minimum or maximum.
-        """
+        """Return a limit as C text; an infinite limit becomes the largest finite number."""
         return self.literal(min(max(value, -self.largest), self.largest))
 
     def function(self, name: str) -> str:
-        """Return the name of a function of ``math.h`` for this type, or of our own in its place.
+        """Return the name of a function of C for this type from its name for ``double``."""
+        return name + self.suffix
 
-        Parameters
-        ----------
-        name
-            Name for ``double``.
-        """
-        return ("portable_" if name in self.portable else "") + name + self.suffix
-
-
-DOUBLE = Real("double", "", float(np.finfo(np.float64).max), float(np.finfo(np.float64).eps))
-FLOAT = Real("float", "f", float(np.finfo(np.float32).max), float(np.finfo(np.float32).eps))
-
-
-def real_type(name: str) -> Real:
-    """Return the number type of that name.
-
-    Parameters
-    ----------
-    name
-        ``"double"`` or ``"float"``.
-
-    Raises
-    ------
-    ExportError
-        If it is neither.
-    """
-    for each in (DOUBLE, FLOAT):
-        if each.name == name:
-            return each
-    raise ExportError(
-        f"real='{name}'",
-        "must be 'double' or 'float'",
-        did_you_mean=nearest(name, ["double", "float"]),
-    )
+    def table(self, name: str, rows: Sequence[Sequence[float]]) -> list[str]:
+        """Return the definition of a table of constants, NaN too; none where it has no column."""
+        width = len(rows[0]) if rows else 0
+        if not width:
+            return []
+        lines = [f"static const {self} {name}[{len(rows)}][{width}] = {{"]
+        for row in rows:
+            cells = (f"({self})NAN" if math.isnan(v) else self.literal(v) for v in row)
+            lines.append("    {" + ", ".join(cells) + "},")
+        return [*lines, "};"]
 
 
 def identifier(text: str) -> str:
-    """Return a C and C++ identifier made from a name.
-
-    Parameters
-    ----------
-    text
-        Any name; other characters become ``_``.
-    """
+    """Return a C and C++ identifier made from any name; other characters become ``_``."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", text) or "_"
     if name[0].isdigit():
         name = "_" + name
@@ -153,25 +121,13 @@ def identifier(text: str) -> str:
 
 
 def comment(text: str) -> str:
-    """Return text that cannot end, nest or continue a C comment.
-
-    Parameters
-    ----------
-    text
-        Any text; line breaks become spaces.
-    """
+    """Return text on one line that cannot end, nest or continue a C comment."""
     flat = " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
     return flat.rstrip("\\")
 
 
 def wrapped(text: str) -> list[str]:
-    """Return a C comment of several lines.
-
-    Parameters
-    ----------
-    text
-        Any text.
-    """
+    """Return a text as a C comment of as many lines as it needs."""
     lines = textwrap.wrap(comment(text), 104, break_on_hyphens=False)
     return [("/* " if i == 0 else "   ") + line for i, line in enumerate(lines[:-1])] + [
         ("   " if len(lines) > 1 else "/* ") + lines[-1] + " */"
@@ -179,26 +135,85 @@ def wrapped(text: str) -> list[str]:
 
 
 def signature(head: str, *parameters: str) -> str:
-    """Return the head of a function, with one parameter per line if they do not fit on one line.
-
-    Parameters
-    ----------
-    head
-        Result type and name.
-    parameters
-        The parameters.
-    """
+    """Return the head of a function, with one parameter per line if they do not fit on one line."""
     line = f"{head}({', '.join(parameters)})"
     return line if len(line) < 110 else f"{head}(\n    " + ",\n    ".join(parameters) + ")"
 
 
 def string(text: str) -> str:
-    """Return a C string literal.
-
-    Parameters
-    ----------
-    text
-        Any text; line breaks become spaces.
-    """
+    """Return a C string literal of one line."""
     flat = " ".join(text.split())
     return '"' + flat.replace("\\", "\\\\").replace('"', '\\"').replace("??", '?""?') + '"'
+
+
+@dataclass
+class _Branch:
+    leaf: Variable | None = None
+    branches: dict[str, _Branch] = field(default_factory=dict)
+
+
+def _tree(variables: Iterable[Variable]) -> _Branch:
+    root = _Branch()
+    for variable in variables:
+        branch = root
+        for part in variable.name.split("."):
+            member = identifier(re.sub(r"\[(\d+)\]$", r"_\1", part))
+            branch = branch.branches.setdefault(member, _Branch())
+        if branch.leaf is not None:
+            raise ExportError(
+                f"'{branch.leaf.name}' and '{variable.name}'",
+                "become the same member of a C structure",
+                next_step="rename one of them",
+            )
+        branch.leaf = variable
+    return root
+
+
+def _leaf_name(member: str, branch: _Branch) -> str:
+    # A name that is also a prefix of longer names gets a trailing underscore.
+    return member + "_" if branch.branches else member
+
+
+def member_paths(variables: Sequence[Variable]) -> dict[str, str]:
+    """Return the path of each variable inside its structure in C; two of one path are an ``ExportError``."""
+    paths: dict[str, str] = {}
+
+    def walk(branch: _Branch, path: str) -> None:
+        for member, below in branch.branches.items():
+            if below.leaf is not None:
+                paths[below.leaf.name] = path + _leaf_name(member, below)
+            walk(below, f"{path}{member}.")
+
+    walk(_tree(variables), "")
+    return {variable.name: paths[variable.name] for variable in variables}
+
+
+def structure(
+    name: str, variables: Sequence[Variable], real: Real, title: str, *, numbered: bool = False
+) -> list[str]:
+    """Return the lines of one ``typedef struct``, its members numbered in the order of the model or not."""
+    numbers = {variable.name: f"{i}: " if numbered else "" for i, variable in enumerate(variables)}
+    lines = [f"/* {comment(title)} */", "typedef struct {"]
+    if not variables:
+        lines.append("    char none; /* C99 knows no empty structure */")
+
+    def walk(branch: _Branch, indent: str) -> None:
+        for member, below in branch.branches.items():
+            if below.leaf is not None:
+                remark = numbers[below.leaf.name] + _remark(below.leaf)
+                lines.append(f"{indent}{real} {_leaf_name(member, below)}; /* {remark} */")
+            if below.branches:
+                lines.append(f"{indent}struct {{")
+                walk(below, indent + "    ")
+                lines.append(f"{indent}}} {member};")
+
+    walk(_tree(variables), "    ")
+    return [*lines, f"}} {name};"]
+
+
+def _remark(variable: Variable) -> str:
+    limits = ""
+    if variable.minimum > -float("inf") or variable.maximum < float("inf"):
+        limits = f", {variable.minimum:.6g} to {variable.maximum:.6g}"
+    source = f"; {variable.source}" if variable.source else ""
+    return comment(f"[{variable.unit}{limits}] {variable.description}{source}")

@@ -15,14 +15,13 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from functools import lru_cache
 from types import MappingProxyType
 
 from ..files import filled
-from .c_text import DOUBLE, FLOAT, Real
+from .c_text import Real
 
 _LN2 = Fraction("0.693147180559945309417232121458176568075500134360255254120680009493")
 _PI = Fraction("3.141592653589793238462643383279502884197169399375105820974944592308")
@@ -134,29 +133,15 @@ _POLYNOMIALS: Mapping[str, Mapping[str, tuple[float, ...]]] = MappingProxyType(
 _VARIABLE = {"exp": "r", "erfc": "t"}
 
 
-def portable(real: Real) -> Real:
-    """Return the number type whose elementary functions are our own.
-
-    Parameters
-    ----------
-    real
-        Number type.
-    """
-    return replace(real, portable=frozenset(_definitions(real.name)[1]))
+def own_functions(real: Real) -> frozenset[str]:
+    """Return the names of the functions of ``math.h`` that ours replace."""
+    return frozenset(_definitions(real)[1])
 
 
 def elementary_functions(real: Real, lines: Iterable[str]) -> list[str]:
-    """Return the definitions that statements need, each after those that it needs itself.
-
-    Parameters
-    ----------
-    real
-        Number type.
-    lines
-        C statements.
-    """
-    head, definitions = _definitions(real.name)
-    needed = set(_called("\n".join(lines), real))
+    """Return the definitions that C statements need, each after those that it needs itself."""
+    head, definitions = _definitions(real)
+    needed = _called("\n".join(lines), real)
     for name in reversed(list(definitions)):
         if name in needed:
             needed |= _called(definitions[name], real)
@@ -169,34 +154,54 @@ def _called(text: str, real: Real) -> set[str]:
 
 
 @lru_cache(maxsize=2)
-def _definitions(name: str) -> tuple[str, Mapping[str, str]]:
+def _definitions(real: Real) -> tuple[str, Mapping[str, str]]:
     """Return the head of the shell, and the text of each function, each defined before it is used."""
-    text = filled("elementary.c", _numbers(name))
-    head, *parts = [part.strip("\n") for part in re.split(r"\n\n(?=/\*)", text)]
-    suffix = "f" if name == "float" else ""
-    heads = [re.search(rf"^static \w+ portable_(\w+?){suffix}\(", part, re.MULTILINE) for part in parts]
+    single = real is Real.FLOAT
+    numbers = {
+        "real": real,
+        "f": real.suffix,
+        "word": "uint32_t" if single else "uint64_t",
+        **{key: str(number) for key, number in _integers(single).items()},
+        **{key: real.literal(number) for key, number in _reals(real).items()},
+    }
+    for key, polynomial in _POLYNOMIALS[real].items():
+        # Horner's scheme
+        text, variable = real.literal(polynomial[-1]), _VARIABLE.get(key, "z")
+        for number in reversed(polynomial[:-1]):
+            text = f"{real.literal(number)} + {variable} * ({text})"
+        numbers[f"polynomial_{key}"] = text
+    head, *parts = [part.strip("\n") for part in re.split(r"\n\n(?=/\*)", filled("elementary.c", numbers))]
+    heads = [re.search(rf"^static \w+ portable_(\w+?){real.suffix}\(", part, re.MULTILINE) for part in parts]
     return head, MappingProxyType({one[1]: part for one, part in zip(heads, parts, strict=True) if one})
 
 
-def _numbers(name: str) -> dict[str, str]:
-    """Return what the shell needs for one number type."""
-    single = name == "float"
-    real = FLOAT if single else DOUBLE
+def _format(single: bool) -> tuple[int, int, float]:
+    """Return binary digits and bias of a format, and the number that shifts digits behind the point out."""
     digits, bias = (23, 127) if single else (52, 1023)
-    shift = 1.5 * 2.0**digits
-    root_half = _bits(math.sqrt(0.5), single)
-    ln2 = _parts(_LN2, 15 if single else 41, parts=2)
-    half_pi = _parts(_PI / 2, 12 if single else 32, parts=4)
-    integers = {
+    return digits, bias, 1.5 * 2.0**digits
+
+
+def _integers(single: bool) -> dict[str, int]:
+    """Return the whole numbers of the shell."""
+    digits, bias, shift = _format(single)
+    return {
         "digits": digits,
         "shift_less_two_biases": _bits(shift, single) - 2 * bias,
         "shift_less_bias_below": _bits(shift, single) - (bias - 1),
         "one_bits": _bits(1.0, single),
-        "root_half_bits": root_half,
+        "root_half_bits": _bits(math.sqrt(0.5), single),
         "fraction_mask": 2**digits - 1,
     }
+
+
+def _reals(real: Real) -> dict[str, float]:
+    """Return the floating-point numbers of the shell."""
+    single = real is Real.FLOAT
+    digits, bias, shift = _format(single)
+    ln2 = _parts(_LN2, 15 if single else 41, parts=2)
+    half_pi = _parts(_PI / 2, 12 if single else 32, parts=4)
     pi = _parts(_PI, digits + 1, parts=2)
-    reals = {
+    return {
         "zero": 0.0,
         "bias": float(bias),
         "half": 0.5,
@@ -233,18 +238,6 @@ def _numbers(name: str) -> dict[str, str]:
         "erf_near": 0.9,
         "erf_one": 4.1 if single else 6.1,
     }
-    polynomials = {
-        f"polynomial_{key}": _nested(_VARIABLE.get(key, "z"), numbers, real)
-        for key, numbers in _POLYNOMIALS[name].items()
-    }
-    return {
-        "real": name,
-        "f": real.suffix,
-        "word": "uint32_t" if single else "uint64_t",
-        **{key: str(number) for key, number in integers.items()},
-        **{key: real.literal(number) for key, number in reals.items()},
-        **polynomials,
-    }
 
 
 def _bits(value: float, single: bool) -> int:
@@ -259,10 +252,3 @@ def _parts(number: Fraction, bits: int, *, parts: int) -> list[float]:
         split.append(float(math.floor(number / unit) * unit))
         number -= Fraction(split[-1])
     return [*split, float(number)]
-
-
-def _nested(variable: str, numbers: Sequence[float], real: Real) -> str:
-    text = real.literal(numbers[-1])
-    for number in reversed(numbers[:-1]):
-        text = f"{real.literal(number)} + {variable} * ({text})"
-    return text

@@ -1,4 +1,13 @@
-"""The discrete model in Python with the guards of the C code; the reference for its self-test."""
+"""The guards of a step: status word, what stands in for a reading that cannot be true, and both in Python.
+
+A reading is refused when it is not finite, outside its range, or further from the last good one than the
+machine can have moved since. Three refused readings in a row that agree with one another are believed: then
+it was the last good one that no longer holds. Where the model expects a reading, that takes the place of a
+refused one, so an observer goes on as its model does; elsewhere the last readings are extrapolated for three
+samples and held from then on.
+
+:class:`GuardedModel` does so in Python with the equations of the model: the reference for the C code.
+"""
 
 from __future__ import annotations
 
@@ -7,55 +16,190 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...model.flat import FlatModel
-from .c_text import DOUBLE, Real
-from .reading_guard import ReadingGuard, mover, reading_numbers
-from .status_bits import (
-    INPUT_HELD,
-    INPUT_SATURATED,
-    OUT_OF_TABLE,
-    OUTPUT_HELD,
-    STATE_RESTARTED,
-    WAITING,
-    index_bit,
-)
+from ...foundation.arrays import Array
+from ...foundation.errors import ExportError
+from ...model.flat import FlatModel, Variable
+from .c_text import Real
+
+INPUT_HELD = 1 << 0
+INPUT_SATURATED = 1 << 1
+STATE_RESTARTED = 1 << 2
+OUTPUT_HELD = 1 << 3
+PARAMETER_REFUSED = 1 << 4
+INPUT_OUT_OF_RANGE = 1 << 5
+INPUT_JUMPED = 1 << 6
+INPUT_STALE = 1 << 7
+OUT_OF_TABLE = 1 << 8
+RECOVERED = 1 << 9
+WAITING = 1 << 10
+FIRST_INDEX_BIT, LAST_INDEX_BIT = 16, 30
+
+STATUS_BITS = {
+    "INPUT_HELD": (
+        INPUT_HELD,
+        "an input was not finite; its last good value, or what was expected, was used",
+    ),
+    "INPUT_SATURATED": (INPUT_SATURATED, "a command was outside its range, the limit was used"),
+    "STATE_RESTARTED": (
+        STATE_RESTARTED,
+        "the next state was not finite; the next sample begins anew from its readings",
+    ),
+    "OUTPUT_HELD": (OUTPUT_HELD, "an output was not finite, the last good outputs were given"),
+    "PARAMETER_REFUSED": (
+        PARAMETER_REFUSED,
+        "a parameter was not finite or outside its range, it was not taken",
+    ),
+    "INPUT_OUT_OF_RANGE": (INPUT_OUT_OF_RANGE, "a reading was outside its range; what was expected was used"),
+    "INPUT_JUMPED": (
+        INPUT_JUMPED,
+        "a reading changed faster than its largest rate; what was expected was used",
+    ),
+    "INPUT_STALE": (
+        INPUT_STALE,
+        "a reading has not changed for its stale time while the drive has; it was used all the same",
+    ),
+    "OUT_OF_TABLE": (OUT_OF_TABLE, "a table was read beyond its ends, where it holds its last numbers"),
+    "RECOVERED": (RECOVERED, "a reading is used again after a gap"),
+    "WAITING": (WAITING, "no usable reading has come yet; the outputs are those of the start"),
+}
 
 
-def first_outputs(model: FlatModel, real: Real = DOUBLE) -> list[float]:
-    """Return the outputs held before the first finite ones: those at the start, or 0.
+def index_bit(index: int) -> int:
+    """Return the bit that names an input or parameter, counted from 0; all from 14 on share the last."""
+    return 1 << min(FIRST_INDEX_BIT + index, LAST_INDEX_BIT)
+
+
+AGREEING = 3
+"""Refused readings in a row that must agree with one another to be believed."""
+GAP = 3
+"""Samples without a usable reading that are extrapolated, and from which on a model resumes from the next."""
+MOST = 1_000_000
+"""Samples up to which gaps and rests are counted; a window of so many samples admits any reading."""
+
+
+@dataclass(frozen=True)
+class ReadingNumbers:
+    """Numbers of one measured input, per sample.
 
     Parameters
     ----------
-    model
-        Discrete model.
-    real
-        Number type of the C code.
+    lowest, highest
+        Range of the reading.
+    change
+        Largest change from sample to sample.
+    noticeable
+        Change of what moves the machine that the reading cannot fail to show; negative where that is unknown.
+    patience
+        Samples without change after which the reading is stale.
     """
+
+    lowest: float
+    highest: float
+    change: float
+    noticeable: float
+    patience: int
+
+
+def reading_numbers(variable: Variable, sample_time: float, real: Real) -> ReadingNumbers | None:
+    """Return the numbers of an input of a sampled model, ``None`` where it is a command."""
+    limits = variable.plausibility
+    if limits is None:
+        return None
+    patience = limits.stale_time / sample_time - 1e-9
+    return ReadingNumbers(
+        max(variable.minimum, -real.largest),
+        min(variable.maximum, real.largest),
+        min(limits.largest_rate * sample_time + limits.resolution, real.largest),
+        limits.noticeable if limits.moved_by is not None else -1.0,
+        math.ceil(patience) if patience < MOST else MOST + 1,
+    )
+
+
+def mover(model: FlatModel, variable: Variable) -> tuple[str, int] | None:
+    """Return the group, ``"inputs"`` or ``"states"``, and the index of what moves a measured reading."""
+    name = variable.plausibility.moved_by if variable.plausibility is not None else None
+    if name is None:
+        return None
+    for group, variables in (("inputs", model.inputs), ("states", model.states)):
+        for index, candidate in enumerate(variables):
+            if candidate.name == name:
+                return group, index
+    raise ExportError(
+        f"input '{variable.name}' of '{model.name}'", f"is moved by '{name}', which is no input or state"
+    )
+
+
+@dataclass
+class ReadingGuard:
+    """The guard of one measured input; ``last`` is its last good reading, or the start value before that."""
+
+    numbers: ReadingNumbers
+    real: Real
+    last: float
+
+    def __post_init__(self) -> None:
+        self.slope = self.candidate = self.mover = 0.0
+        self.missed = self.agreeing = self.unchanged = 0
+        self.seen = self.moved = False
+
+    def take(self, given: float, mover: float) -> tuple[float, int, bool]:
+        """Return what is used, the flags of the status word, and whether the model has to resume."""
+        flaw = self._flaw(given)
+        if flaw:
+            self.missed = min(self.missed + 1, MOST)
+            ahead = self.last + min(self.missed, GAP) * self.slope
+            return min(max(ahead, self.numbers.lowest), self.numbers.highest), flaw, False
+        flags = RECOVERED if self.missed else 0
+        resume = self.agreeing >= AGREEING or self.missed >= GAP
+        same = self.seen and given == self.last
+        if self._stale and not same:
+            flags |= RECOVERED
+        self.slope = given - self.last if self.seen and not self.missed and not self.agreeing else 0.0
+        if same:
+            self.unchanged = min(self.unchanged + 1, MOST)
+            self.moved = self.moved or abs(mover - self.mover) > self.numbers.noticeable
+        else:
+            self.unchanged, self.moved, self.mover = 0, False, mover
+        if self._stale:
+            flags |= INPUT_STALE
+        self.last, self.missed, self.agreeing, self.seen = given, 0, 0, True
+        return given, flags, resume
+
+    @property
+    def _stale(self) -> bool:
+        return self.moved and self.unchanged >= self.numbers.patience
+
+    def _flaw(self, given: float) -> int:
+        if not self.numbers.lowest <= given <= self.numbers.highest:
+            self.agreeing = 0
+            return INPUT_OUT_OF_RANGE if abs(given) <= self.real.largest else INPUT_HELD
+        if not self.seen or abs(given - self.last) <= self.numbers.change * (self.missed + 1):
+            self.agreeing = 0
+            return 0
+        agrees = self.agreeing > 0 and abs(given - self.candidate) <= self.numbers.change
+        self.agreeing = self.agreeing + 1 if agrees else 1
+        self.candidate = given
+        return 0 if self.agreeing >= AGREEING else INPUT_JUMPED
+
+
+def first_outputs(model: FlatModel, real: Real = Real.DOUBLE) -> list[float]:
+    """Return the outputs held before the first finite ones: those at the start, or 0."""
     start = model.evaluate(model.start(model.states).tolist(), model.start(model.inputs).tolist())
-    values = [real.round(start[each.name]) for each in model.outputs]
+    values = [real.round(start[variable.name]) for variable in model.outputs]
     return [value if math.isfinite(value) else 0.0 for value in values]
 
 
 @dataclass
 class GuardedModel:
-    """One running instance of a discrete model, evaluated by CasADi, with the guards of the C code.
-
-    Parameters
-    ----------
-    model
-        Discrete model; its parameter and start values are used.
-    real
-        Number type whose range counts as finite.
-    """
+    """One running instance of a discrete model, evaluated by CasADi, with the guards of the C code."""
 
     model: FlatModel
-    real: Real = DOUBLE
+    real: Real = Real.DOUBLE
 
     def __post_init__(self) -> None:
         model = self.model
-        self.state: NDArray[np.float64] = model.start(model.states)
+        self.state: Array = model.start(model.states)
         self.begun = False
         self._inputs = [min(max(v.start, v.minimum), v.maximum) for v in model.inputs]
         self._outputs = first_outputs(model, self.real)
@@ -68,18 +212,7 @@ class GuardedModel:
         self._movers = {i: mover(model, model.inputs[i]) for i in self._guards}
 
     def step(self, inputs: Sequence[float]) -> tuple[list[float], int]:
-        """Advance by one sample.
-
-        Parameters
-        ----------
-        inputs
-            Shape (inputs,); any numbers, NaN and infinity too.
-
-        Returns
-        -------
-        tuple
-            The outputs, shape (outputs,), and the status word.
-        """
+        """Advance by one sample of any numbers, shape (inputs,); return the outputs and the status word."""
         status, resume = self._take(inputs)
         if not self.begun:
             if not all(guard.seen for guard in self._guards.values()):
@@ -111,7 +244,7 @@ class GuardedModel:
             resume = resume or again
         return status, resume
 
-    def _settled(self, state: NDArray[np.float64], which: int) -> NDArray[np.float64]:
+    def _settled(self, state: Array, which: int) -> Array:
         if self.model.begin is None:
             return state
         w = self.model.look_up(state.tolist(), self._inputs)

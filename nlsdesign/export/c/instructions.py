@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
+from ...model.graph import fold, read_graph
 from .c_text import Real
 
 _INLINE = 64  # longest text that is written inside another expression
@@ -68,22 +69,16 @@ class _Graph:
 
     def __init__(self, function: ca.Function, inputs: Sequence[Sequence[str]]) -> None:
         self.nodes: list[_Node] = []
-        self.results: dict[tuple[int, int], int] = {}
-        work: dict[int, int] = {}
-        for k in range(function.n_instructions()):
-            operation = function.instruction_id(k)
-            read, written = function.instruction_input(k), function.instruction_output(k)
-            if operation == ca.OP_OUTPUT:
-                self.results[written[0], written[1]] = work[read[0]]
-                continue
-            if operation == ca.OP_INPUT:
-                node = _Node(operation, text=inputs[read[0]][read[1]])
-            elif operation == ca.OP_CONST:
-                node = _Node(operation, value=float(function.instruction_constant(k)))
-            else:
-                node = self._choice(_Node(operation, tuple(work[i] for i in read)))
-            self.nodes.append(node)
-            work[written[0]] = len(self.nodes) - 1
+        self.results = fold(
+            read_graph(function),
+            lambda argument, element: self._added(_Node(ca.OP_INPUT, text=inputs[argument][element])),
+            lambda value: self._added(_Node(ca.OP_CONST, value=value)),
+            combined=lambda operation, operands: self._added(self._choice(_Node(operation, tuple(operands)))),
+        )
+
+    def _added(self, node: _Node) -> int:
+        self.nodes.append(node)
+        return len(self.nodes) - 1
 
     def _choice(self, node: _Node) -> _Node:
         """Return one choice for the sum of two half choices with opposite conditions."""
@@ -110,8 +105,8 @@ class _Graph:
 
 
 class _Printer:
-    def __init__(self, graph: _Graph, real: Real, prefix: str) -> None:
-        self.graph, self.real, self.prefix = graph, real, prefix
+    def __init__(self, graph: _Graph, real: Real, prefix: str, own: Collection[str]) -> None:
+        self.graph, self.real, self.prefix, self.own = graph, real, prefix, own
         self.texts: dict[int, _Text] = {}
         self.lines: list[str] = []
 
@@ -144,8 +139,9 @@ class _Printer:
             left, right = self.number(operands[0], strength), self.number(operands[1], strength - 1)
             return _Text(f"{left} {sign} {right}", strength)
         if operation in _FUNCTIONS:
-            arguments = ", ".join(self.number(i, _CHOICE) for i in operands)
-            return _Text(f"{self.real.function(_FUNCTIONS[operation])}({arguments})", _CALL)
+            name, arguments = _FUNCTIONS[operation], ", ".join(self.number(i, _CHOICE) for i in operands)
+            prefix = "portable_" if name in self.own else ""
+            return _Text(f"{prefix}{self.real.function(name)}({arguments})", _CALL)
         if operation in _LOGICAL:
             return self._logical(operation, operands)
         return self._special(operation, operands)
@@ -179,7 +175,7 @@ class _Printer:
         if operation == ca.OP_INV:
             return _Text(f"{self.real.literal(1.0)} / {self.number(operands[0], _UNARY)}", _PRODUCT)
         if operation == ca.OP_SIGN:
-            return _Text(f"({self.real.name})(({first} > {zero}) - ({first} < {zero}))", _UNARY)
+            return _Text(f"({self.real})(({first} > {zero}) - ({first} < {zero}))", _UNARY)
         if operation in (ca.OP_FMIN, ca.OP_FMAX):
             # One machine instruction; fmin() of math.h is a library call because of its rule for NaN.
             second, sign = self.number(operands[1], _UNARY), "<" if operation == ca.OP_FMIN else ">"
@@ -195,7 +191,7 @@ class _Printer:
     def name(self, index: int) -> None:
         """Write a value as a named constant."""
         text = self.texts[index]
-        kind = "int" if text.logical else self.real.name
+        kind = "int" if text.logical else self.real
         self.lines.append(f"const {kind} {self.prefix}{index} = {text.text};")
         self.texts[index] = _Text(f"{self.prefix}{index}", _ATOM, text.logical)
 
@@ -207,30 +203,17 @@ def print_statements(
     *,
     real: Real,
     prefix: str = "a",
+    own: Collection[str] = (),
 ) -> list[str]:
-    """Return C statements that compute the structural nonzeros of all results.
+    """Return C statements that compute the structural nonzeros of all results of an SX function.
 
-    Parameters
-    ----------
-    function
-        An SX function.
-    inputs
-        C text of each nonzero of each argument.
-    targets
-        Left-hand side for each nonzero of each result, for instance ``"f[0]"`` or ``"const double y0"``; they
-        are written last, so that a result may overwrite an argument.
-    real
-        Number type.
-    prefix
-        First letters of the names of intermediate values.
-
-    Raises
-    ------
-    ExportError
-        If an operation or a constant has no counterpart in C.
+    The nonzeros of its arguments are given as C text. Those of its results get left-hand sides such as
+    ``"f[0]"`` or ``"const double y0"``; they are written last, so that a result may overwrite an argument.
+    Intermediate values are called ``<prefix><i>``; functions among ``own`` are those of :mod:`.elementary`.
+    An operation or a constant without a counterpart in C is an ``ExportError``.
     """
     graph = _Graph(function, inputs)
-    printer, uses, results = _Printer(graph, real, prefix), graph.uses(), set(graph.results.values())
+    printer, uses, results = _Printer(graph, real, prefix, own), graph.uses(), set(graph.results.values())
     for index, node in enumerate(graph.nodes):
         if not uses[index]:
             continue
@@ -247,13 +230,5 @@ def print_statements(
 
 
 def named_indices(lines: Sequence[str], letter: str) -> set[int]:
-    """Return the numbers i of all names such as ``w<i>`` in statements.
-
-    Parameters
-    ----------
-    lines
-        C statements.
-    letter
-        First letter of the names.
-    """
+    """Return the numbers i of all names such as ``w<i>`` in statements."""
     return {int(number) for line in lines for number in re.findall(rf"(?<![\w.]){letter}(\d+)\b", line)}

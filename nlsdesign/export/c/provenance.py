@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from ...errors import ExportError
-from ...locations import version
+from ...foundation.errors import ExportError
+from ...foundation.locations import version
+from ...foundation.quantity import Quantity
 from ...model.flat import FlatModel
 from ...model.origin import Origin
-from ...quantity import Quantity
 from .c_text import comment, string, wrapped
 
 SHORT = 12
@@ -34,11 +34,6 @@ _DATE_VARIABLE = "SOURCE_DATE_EPOCH"
 def export_date() -> datetime:
     """Return the date of the export in UTC: now, or what ``SOURCE_DATE_EPOCH`` says, in seconds since 1970.
 
-    Raises
-    ------
-    ExportError
-        If the variable is set and is no such number.
-
     Notes
     -----
     With the variable an export is the same bytes every time, as https://reproducible-builds.org proposes.
@@ -56,15 +51,7 @@ def export_date() -> datetime:
 
 
 def stamped(text: str, model: FlatModel) -> str:
-    """Return a generated file with a last comment: version, date, deck, and a digest of what is above.
-
-    Parameters
-    ----------
-    text
-        The file.
-    model
-        That it is generated from.
-    """
+    """Return a generated file with a last comment: version, date, deck, and a digest of what is above."""
     deck = f"deck {model.origin.digest[:SHORT]}" if model.origin else "no deck"
     digest = hashlib.sha256(text.encode()).hexdigest()
     date = f"{export_date():%Y-%m-%d %H:%M} UTC"
@@ -82,15 +69,7 @@ class Stamp(NamedTuple):
 def stamp_of(text: str) -> Stamp | None:
     r"""Return what the last comment of a file says, and the digest of what is above it.
 
-    Parameters
-    ----------
-    text
-        A file with line ends as ``\n``.
-
-    Returns
-    -------
-    Stamp
-        ``None`` where the file has no such comment.
+    Result: ``None`` where the file has no such comment.
     """
     match = _STAMPED.search(text)
     if match is None:
@@ -99,13 +78,7 @@ def stamp_of(text: str) -> Stamp | None:
 
 
 def origin_lines(model: FlatModel) -> list[str]:
-    """Return lines of a comment: the deck of a model with its digest, its parents, and what was changed.
-
-    Parameters
-    ----------
-    model
-        Any model.
-    """
+    """Return lines of a comment: the deck of a model with its digest, its parents, and what was changed."""
     origin = model.origin
     if origin is None:
         return ["   Made without a deck."]
@@ -120,15 +93,7 @@ def origin_lines(model: FlatModel) -> list[str]:
 
 
 def origin_macros(model: FlatModel, name: str) -> list[str]:
-    """Return ``#define`` lines for the deck of a model, empty texts where there is none.
-
-    Parameters
-    ----------
-    model
-        Any model.
-    name
-        Prefix of all C names.
-    """
+    """Return ``#define`` lines for the deck of a model, empty texts where there is none."""
     upper, origin = name.upper(), model.origin or Origin("", "")
     return [
         f"#define {upper}_DECK {string(origin.deck)}",
@@ -138,13 +103,7 @@ def origin_macros(model: FlatModel, name: str) -> list[str]:
 
 
 def number_lines(model: FlatModel) -> list[str]:
-    """Return a comment with all numbers of the deck behind a model, none where there is no deck.
-
-    Parameters
-    ----------
-    model
-        Any model.
-    """
+    """Return a comment with all numbers of the deck behind a model, none where there is no deck."""
     numbers = model.origin.numbers if model.origin else {}
     if not numbers:
         return []
@@ -171,13 +130,6 @@ def interface_version(header: str, model: FlatModel) -> str:
     """Return a number that is another one where structures, functions or units of a header are others.
 
     It is the CRC-32 of the header without comments and macros, and of the units of the variables.
-
-    Parameters
-    ----------
-    header
-        Text of the header.
-    model
-        Whose interface it is.
     """
     bare = re.sub(r"/\*.*?\*/", " ", header, flags=re.DOTALL)
     lines = [" ".join(line.split()) for line in bare.splitlines() if not line.lstrip().startswith("#")]

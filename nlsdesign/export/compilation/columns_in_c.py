@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...simulation.column_graph import Call, ColumnGraph, Operation, TableReading
 from ..files import filled, shell
 
@@ -73,7 +73,7 @@ class ColumnsInC(NamedTuple):
     """
 
     text: str
-    numbers: NDArray[np.float64]
+    numbers: Array
 
 
 class _Given:
@@ -100,19 +100,13 @@ class _Given:
         return first
 
     @property
-    def numbers(self) -> NDArray[np.float64]:
+    def numbers(self) -> Array:
         """All of them; at least one, so that there is something to point at."""
         return np.array(self._numbers or [0.0])
 
 
 def sampled_run_in_c(graph: ColumnGraph) -> ColumnsInC:
-    """Return C code of a run of samples, for many columns.
-
-    Parameters
-    ----------
-    graph
-        (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
-    """
+    """Return C code of a run of samples, for many columns."""
     written = [filled("columns.c", {"width": str(WIDTH)})]
     if graph.tables:
         written.append(shell("columns_look_up.c"))

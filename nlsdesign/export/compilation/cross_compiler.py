@@ -11,9 +11,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 
-from ...errors import ExportError, unknown_name
-from ...interruption import usual_temporary_folder
-from ...processes import run_to_end
+from ...foundation.errors import ExportError, unknown_name
+from ...foundation.processes import run_to_end, usual_temporary_folder
 from ..files import shell
 
 STRICT = (
@@ -69,13 +68,7 @@ ALL_PLATFORMS = tuple(PLATFORMS)
 
 
 def host_platform() -> str:
-    """Return the name of the platform this program runs on.
-
-    Raises
-    ------
-    ExportError
-        If nothing can be built for it.
-    """
+    """Return the name of the platform this program runs on."""
     processor = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
         machine.machine().lower(), machine.machine()
     )
@@ -90,18 +83,7 @@ def host_platform() -> str:
 
 
 def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
-    """Return platforms by name; only the host when nothing is chosen.
-
-    Parameters
-    ----------
-    names
-        Keys of :data:`PLATFORMS`.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such platform.
-    """
+    """Return platforms by name; only the host when nothing is chosen."""
     chosen = [host_platform()] if names is None else list(dict.fromkeys(names))
     for name in chosen:
         if name not in PLATFORMS:
@@ -110,13 +92,7 @@ def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
 
 
 def compiler() -> list[str]:
-    """Return the command of the C compiler.
-
-    Raises
-    ------
-    ExportError
-        If the ``ziglang`` wheel is not installed.
-    """
+    """Return the command of the C compiler."""
     if find_spec("ziglang") is None:
         raise ExportError(
             "the C compiler",
@@ -152,20 +128,7 @@ def _users_caches() -> Path:
 
 
 def run_compiler(arguments: Sequence[str | Path], *, about: str) -> None:
-    """Run the compiler.
-
-    Parameters
-    ----------
-    arguments
-        Its arguments.
-    about
-        What is being compiled, for the message.
-
-    Raises
-    ------
-    ExportError
-        If it is missing or finds a mistake.
-    """
+    """Run the compiler."""
     cache = str(cache_folder() / "zig")
     environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
     command = [*compiler(), *[str(each) for each in arguments]]
@@ -184,33 +147,7 @@ def compile_library(
     flags: Sequence[str] = ("-std=c99",),
     processor: Sequence[str] = BASELINE,
 ) -> Path:
-    """Compile C files to a shared library.
-
-    Parameters
-    ----------
-    sources
-        C files.
-    target
-        Path of the library.
-    platform
-        Machine to build for, this one by default.
-    include
-        Folders of foreign headers.
-    flags
-        Further flags.
-    processor
-        Which instructions it may take.
-
-    Returns
-    -------
-    pathlib.Path
-        ``target``.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or finds a mistake.
-    """
+    """Compile C files to a shared library."""
     where = platform or PLATFORMS[host_platform()]
     arguments: list[str | Path] = ["-target", where.target, *processor, "-shared", "-O2", *flags]
     # Same numbers on every machine: no fused multiply-add, IEEE comparisons.
@@ -234,31 +171,3 @@ def _windows(folder: Path) -> list[str | Path]:
     home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent
     headers = home / "lib" / "libc" / "include" / "any-windows-any"
     return ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]
-
-
-def compile_program(sources: Sequence[Path], target: Path, *, flags: Sequence[str] = STRICT) -> Path:
-    """Compile C files to a program for this machine.
-
-    Parameters
-    ----------
-    sources
-        C files.
-    target
-        Path of the program.
-    flags
-        Further flags.
-
-    Returns
-    -------
-    pathlib.Path
-        ``target``.
-
-    Raises
-    ------
-    ExportError
-        If the compiler is missing or finds a mistake.
-    """
-    where = PLATFORMS[host_platform()]
-    arguments: list[str | Path] = ["-target", where.target, *BASELINE, "-O2", "-ffp-contract=off", *flags]
-    run_compiler([*arguments, *sources, "-lm", "-o", target], about=f"{sources[0].name} for {where.name}")
-    return target

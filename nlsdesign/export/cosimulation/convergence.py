@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import ValueRangeError
+from ...foundation.errors import ValueRangeError
 from .cosimulate import FmuSystem, Signal
 from .coupling import Stepping
 

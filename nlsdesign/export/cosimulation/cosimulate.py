@@ -1,7 +1,8 @@
 """Several FMUs as one system: wired by name, stepped together, recorded.
 
 Row k of a result shows what holds at its time: continuous values at that time, and what sampled instances
-have computed from values read at that time, as in a simulated :class:`~nlsdesign.control.ClosedLoop`.
+have computed from values read at that time, as in a simulated
+:class:`~nlsdesign.feedback.control.ClosedLoop`.
 
 Order. Without ``order`` all sampled instances that are due read before any computes (Jacobi), as most masters
 do: what a sampled instance computes reaches the others one sample later. With ``order`` each reads what
@@ -22,21 +23,20 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ...errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
 from ...simulation.signals import Sine
 from ...simulation.trace import Trace
 from .coupling import Stepping
-from .fmu_archive import unpack
-from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description
+from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description, unpack
 from .fmu_instance import FmuInstance
 from .isolation import IsolatedWork, Watch
 from .master import Master
 from .run_plan import Given, Link, Plan, points_of
 from .wires import Wire, as_wire, check_wires, delay_of, ends, gain_to, split_name
 
-Array = NDArray[np.float64]
 _STEPS_OF_A_PERIOD = 4
 Signal: TypeAlias = Callable[[float], float] | tuple[ArrayLike, ArrayLike]
 """A function of time in s, or times and values between which it is linear and beyond which it is held."""
@@ -82,13 +82,7 @@ class CoSimulation:
     ends: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Array:
-        """Return one recorded signal.
-
-        Parameters
-        ----------
-        name
-            ``instance.variable``.
-        """
+        """Return one recorded signal."""
         return self.trace[name]
 
     @property
@@ -348,17 +342,7 @@ class _Run:
 def unpacked_fmus(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, FmuDescription]:
     """Unpack all archives and read their descriptions.
 
-    Parameters
-    ----------
-    fmus
-        FMU by name of the instance.
-    folder
-        Gets a folder for each; its owner removes it.
-
-    Raises
-    ------
-    ExportError
-        If an FMU is damaged, or the name of an instance is not one word.
+    ``folder``: gets a folder for each; its owner removes it.
     """
     descriptions: dict[str, FmuDescription] = {}
     for number, (name, path) in enumerate(fmus.items()):
@@ -371,22 +355,7 @@ def unpacked_fmus(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, Fmu
 
 
 def check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
-    """Check that an order is empty or names each instance once.
-
-    Parameters
-    ----------
-    order
-        Names of instances.
-    fmus
-        By name of the instance.
-
-    Raises
-    ------
-    UnknownNameError
-        If an instance does not exist, with the nearest that does.
-    ValueRangeError
-        If some are missing or named twice.
-    """
+    """Check that an order is empty or names each instance once."""
     for name in order:
         if name not in fmus:
             raise unknown_name("instance in order", name, fmus)
@@ -400,24 +369,7 @@ def check_signals(
     inputs: Mapping[str, Signal],
     parameters: Mapping[str, float],
 ) -> None:
-    """Check that what is given from outside exists and is driven once.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    wires, inputs
-        Wires and signals by target.
-    parameters
-        By ``instance.variable``.
-
-    Raises
-    ------
-    UnknownNameError
-        If an input or parameter does not exist, with the nearest that does.
-    ExportError
-        If an input is driven twice.
-    """
+    """Check that what is given from outside exists and is driven once."""
     valid = {
         "signal for input": (inputs, ends(descriptions, "input")),
         "parameter": (parameters, ends(descriptions)),

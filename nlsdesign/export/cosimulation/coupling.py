@@ -1,26 +1,244 @@
-"""How continuous FMUs are coupled between communication points: the input that each is given over a step.
+"""How values go from instance to instance: what an input reads, and how an output goes on meanwhile.
 
-Sampled values are constant between samples, so wires from sampled instances need no choice: only wires
-between continuous instances, and signals from outside into them, have an error of coupling. Within a step
-each instance gets constant inputs, the value at the middle of the step; what is taken for it decides the
-order.
+What an input reads at a communication point, and over a step, depends on its source. Values are read off one
+row of numbers, ``now``, that holds the present value of every output. A continuous output is a :class:`Curve`
+over time, of which the coupling says how it goes on beyond the present; a sampled one is held.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ConvergenceError, ValueRangeError
-from ...progress import Progress, Quiet
-from .feeds import Curve
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError, ValueRangeError
+from ...foundation.progress import Progress, Quiet
 
-Array = NDArray[np.float64]
+_ROUNDING = 1e-6
+"""Part of a sample time by which a time may fall short of a sample."""
+
+
+class Feed(Protocol):
+    """Source of one input."""
+
+    moves: ClassVar[bool]
+    """Whether the value changes between samples."""
+
+    def initial(self) -> float:
+        """Return the value during initialization."""
+        ...
+
+    def at(self, row: int, time: float) -> float:
+        """Return the value at a communication point."""
+        ...
+
+    def before(self, row: int, time: float) -> float:
+        """Return the value just before a communication point."""
+        ...
+
+    def over(self, row: int, time: float, length: float) -> float:
+        """Return the value that stands for the step from a communication point."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class GivenFeed:
+    """A signal from outside.
+
+    Parameters
+    ----------
+    values, left, middle
+        Value at each communication point, just before it, and to be held over the step from it.
+    """
+
+    values: Array
+    left: Array
+    middle: Array
+    moves: ClassVar[bool] = True
+
+    def initial(self) -> float:
+        """Return the first value."""
+        return float(self.values[0])
+
+    def at(self, row: int, time: float) -> float:
+        """Return the value at a communication point."""
+        return float(self.values[row])
+
+    def before(self, row: int, time: float) -> float:
+        """Return the value just before a communication point."""
+        return float(self.left[row])
+
+    def over(self, row: int, time: float, length: float) -> float:
+        """Return the value to be held over a step."""
+        return float(self.middle[row])
+
+
+@dataclass(frozen=True, eq=False)
+class HeldFeed:
+    """The value that stands in ``now``."""
+
+    now: Array
+    column: int
+    gain: float
+    samples: list[float] | None = None
+    first: float = 0.0
+    moves: ClassVar[bool] = False
+
+    def initial(self) -> float:
+        """Return the present value."""
+        return self.at(0, 0.0)
+
+    def at(self, row: int, time: float) -> float:
+        """Return the present value."""
+        if self.samples is not None and not self.samples:
+            return self.first
+        return self.gain * float(self.now[self.column])
+
+    def before(self, row: int, time: float) -> float:
+        """Return the present value."""
+        return self.at(row, time)
+
+    def over(self, row: int, time: float, length: float) -> float:
+        """Return the present value."""
+        return self.at(row, time)
+
+
+@dataclass(eq=False)
+class LateFeed:
+    """An earlier value of a sampled output.
+
+    Parameters
+    ----------
+    held
+        The present value.
+    samples
+        Everything that the source has computed, by sample.
+    period, delay
+        Sample time of the source and delay in s.
+    first
+        Value of the input before the first sample arrives; ``None`` for what the source shows before it.
+    """
+
+    held: HeldFeed
+    samples: list[float]
+    period: float
+    delay: float
+    first: float | None
+    moves: ClassVar[bool] = False
+
+    def initial(self) -> float:
+        """Return the value before the first sample."""
+        return self.at(0, 0.0)
+
+    def begin(self) -> None:
+        """Keep what the source shows before its first sample."""
+        if self.first is None:
+            self.first = self.held.at(0, 0.0)
+
+    def at(self, row: int, time: float) -> float:
+        """Return the value that was computed the delay ago."""
+        number = int((time - self.delay) / self.period + 1.0 + _ROUNDING) - 1
+        number = min(number, len(self.samples) - 1)
+        if number >= 0:
+            return self.held.gain * self.samples[number]
+        return self.held.at(row, time) if self.first is None else self.first
+
+    def before(self, row: int, time: float) -> float:
+        """Return the value just before a time."""
+        return self.at(row, time - 2 * _ROUNDING * self.period)
+
+    def over(self, row: int, time: float, length: float) -> float:
+        """Return the value at the beginning of the step; it does not change within."""
+        return self.at(row, time)
+
+
+@dataclass(eq=False)
+class Curve:
+    """A continuous output over time: known up to the present, and a slope beyond.
+
+    Parameters
+    ----------
+    column
+        In the row of present values.
+    smooth
+        Whether a slope makes sense; that of a discrete output is zero.
+    """
+
+    column: int
+    smooth: bool
+    times: list[float] = field(default_factory=list, init=False)
+    ends: list[float] = field(default_factory=list, init=False)
+    """Values at the end of the step that leads to each time."""
+    begins: list[float] = field(default_factory=list, init=False)
+    """Values at each time after inputs have jumped there."""
+    slope: float = field(default=0.0, init=False)
+    size: float = field(default=0.0, init=False)
+    """Largest absolute value so far."""
+
+    def arrive(self, time: float, value: float) -> None:
+        """Note the value at the end of a step."""
+        self.times.append(time)
+        self.ends.append(value)
+        self.begins.append(value)
+        self.size = max(self.size, abs(value))
+
+    def depart(self, value: float) -> None:
+        """Note the value at the same time after sampled inputs have changed."""
+        self.begins[-1] = value
+
+    def past_slope(self) -> float:
+        """Return the slope over the last step, zero before there is one."""
+        if not self.smooth or len(self.times) < 2:
+            return 0.0
+        return (self.ends[-1] - self.begins[-2]) / (self.times[-1] - self.times[-2])
+
+    def at(self, time: float) -> float:
+        """Return the value at a time, linear between what is known and along the slope beyond."""
+        if time >= self.times[-1]:
+            return self.begins[-1] + self.slope * (time - self.times[-1])
+        after = max(1, bisect_right(self.times, time))
+        begin, end = self.times[after - 1], self.times[after]
+        part = (time - begin) / (end - begin)
+        return self.begins[after - 1] + part * (self.ends[after] - self.begins[after - 1])
+
+
+@dataclass(frozen=True, eq=False)
+class CurveFeed:
+    """A continuous output."""
+
+    now: Array
+    curve: Curve
+    gain: float
+    delay: float
+    first: float
+    moves: ClassVar[bool] = True
+
+    def initial(self) -> float:
+        """Return the present value, or that before one arrives through a delay."""
+        return self.first if self.delay else self.gain * float(self.now[self.curve.column])
+
+    def at(self, row: int, time: float) -> float:
+        """Return the value at a communication point that the source has reached."""
+        if self.delay == 0.0:
+            return self.gain * float(self.now[self.curve.column])
+        return self._delayed(time)
+
+    def before(self, row: int, time: float) -> float:
+        """Return the value at a communication point; it does not jump."""
+        return self.at(row, time)
+
+    def over(self, row: int, time: float, length: float) -> float:
+        """Return the value at the middle of the step."""
+        return self._delayed(time + 0.5 * length)
+
+    def _delayed(self, time: float) -> float:
+        at = time - self.delay
+        return self.gain * self.curve.at(at) if at >= self.curve.times[0] else self.first
 
 
 class Steppable(Protocol):
@@ -53,15 +271,7 @@ class Coupling(Protocol):
         ...
 
     def step(self, system: Steppable, time: float, length: float) -> None:
-        """Take one step.
-
-        Parameters
-        ----------
-        system
-            All instances stand at the communication point.
-        time, length
-            Communication point and step in s.
-        """
+        """Take one step."""
         ...
 
 

@@ -1,17 +1,103 @@
-"""What an FMU says about itself, as plain data."""
+"""What an FMU says about itself, as plain data, and how its archive is unpacked.
+
+Archives of FMUs and systems come from anywhere: whatever they hold, nothing is written outside the folder
+that they are unpacked into, and foreign text is made fit for a message.
+"""
 
 from __future__ import annotations
 
 import math
+import shutil
+import stat
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import fmpy
 
-from ...errors import ExportError
-from .foreign_text import fit_to_show
+from ...foundation.errors import ExportError
+from ..files import BROKEN_ARCHIVE
+
+_LONGEST = 300
+
+
+def fit_to_show(text: object) -> str:
+    """Return text in one line of printable characters, cut where it is long."""
+    whole = str(text)
+    line = " ".join("".join(c if c.isprintable() else " " for c in whole[: 4 * _LONGEST]).split())
+    return line if len(line) <= _LONGEST else f"{line[:_LONGEST]} ..."
+
+
+MOST_ENTRIES = 10_000
+"""Entries of an archive; assumed: fifty times those of an FMU with sources and documentation."""
+MOST_BYTES = 2**30
+"""Bytes of all unpacked entries; assumed: more than any FMU seen, less than a usual disk has left."""
+
+
+def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
+    """Unpack an archive into a folder.
+
+    ``folder``: new; its owner removes it.
+    """
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            entries = opened.infolist()
+            _judge(what, entries, needs)
+            for entry in entries:
+                _write(opened, entry, folder)
+    except OSError as error:
+        raise ExportError(what, f"cannot be read ({error.strerror or error})") from error
+    except BROKEN_ARCHIVE as error:
+        raise ExportError(
+            what,
+            f"is not a valid archive, or damaged: {fit_to_show(error)}",
+            next_step="get or export it again",
+        ) from error
+
+
+def _judge(what: str, entries: list[zipfile.ZipInfo], needs: str) -> None:
+    if len(entries) > MOST_ENTRIES:
+        raise ExportError(what, f"has {len(entries)} entries, at most {MOST_ENTRIES} are unpacked")
+    size = sum(entry.file_size for entry in entries)
+    if size > MOST_BYTES:
+        raise ExportError(
+            what, f"would unpack to {size / 2**20:.0f} MiB, at most {MOST_BYTES // 2**20} MiB are taken"
+        )
+    names: set[str] = set()
+    for entry in entries:
+        objection = _objection(entry, names)
+        if objection:
+            raise ExportError(f"{what}, entry '{fit_to_show(entry.filename)}'", objection)
+        names.add(entry.filename)
+    if needs not in names:
+        raise ExportError(what, f"has no {needs}")
+
+
+def _objection(entry: zipfile.ZipInfo, names: set[str]) -> str | None:
+    path = PurePosixPath(entry.filename)
+    if path.is_absolute() or ".." in path.parts or ":" in entry.filename or "\\" in entry.filename:
+        return "leads out of the folder into which it is unpacked"
+    if stat.S_ISLNK(entry.external_attr >> 16):
+        return "is a link"
+    if entry.filename in names:
+        return "appears twice"
+    if not entry.filename or not entry.filename.isprintable():
+        return "has a name that cannot be written"
+    return None
+
+
+def _write(opened: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path) -> None:
+    target = folder / entry.filename
+    if entry.is_dir():
+        target.mkdir(parents=True, exist_ok=True)
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    # The library reads no more than the stated size, and checks it and the check sum at the end.
+    with opened.open(entry) as source, target.open("wb") as written:
+        shutil.copyfileobj(source, written)
+
 
 DESCRIPTION_FILE = "modelDescription.xml"
 _KINDS = {"Real": "real", "Float64": "real", "Integer": "integer", "Int32": "integer"}
@@ -94,22 +180,7 @@ class FmuDescription:
 
 
 def read_description(instance: str, archive: Path, folder: Path) -> FmuDescription:
-    """Read the description of an FMU that was unpacked.
-
-    Parameters
-    ----------
-    instance
-        Name of the instance, for messages.
-    archive
-        The FMU, for messages.
-    folder
-        Where it was unpacked.
-
-    Raises
-    ------
-    ExportError
-        If it is no valid co-simulation FMU of FMI 2.0 or 3.0, or states no possible sample time.
-    """
+    """Read the description of an FMU that was unpacked."""
     what = f"instance '{instance}' ({archive})"
     try:
         read = fmpy.read_model_description(str(folder))
@@ -134,18 +205,7 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
 
 
 def check_library(description: FmuDescription) -> None:
-    """Check that there is a binary for this machine.
-
-    Parameters
-    ----------
-    description
-        Of the FMU.
-
-    Raises
-    ------
-    ExportError
-        If there is none.
-    """
+    """Check that there is a binary for this machine."""
     if not description.library.is_file():
         place = description.library.parent.relative_to(description.folder).as_posix()
         raise ExportError(

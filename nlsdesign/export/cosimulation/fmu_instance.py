@@ -1,20 +1,138 @@
-"""One loaded instance of an FMU, with the same interface for FMI 2.0 and 3.0."""
+"""One loaded instance of an FMU: its life and its messages, the same for FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
+import fmpy
+import fmpy.fmi2
+import fmpy.fmi3
 import numpy as np
-from numpy.typing import NDArray
+from fmpy.fmi1 import FMICallException
 
-from ...errors import ConvergenceError, ExportError
-from .fmu_description import FmuDescription, FmuScalar
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError, ExportError
+from .fmu_description import FmuDescription, FmuScalar, fit_to_show
 from .isolation import Activity, Watch
-from .loaded_fmu import LoadedFmu, why
 
-Array = NDArray[np.float64]
+
+class LoadedFmu:
+    """An FMU that has been loaded and instantiated.
+
+    Parameters
+    ----------
+    description
+        Of the FMU.
+    watch
+        Told what is called, so that a crash can be explained.
+    """
+
+    def __init__(self, description: FmuDescription, watch: Watch) -> None:
+        self.name = description.instance
+        self.description = description
+        self.messages: list[str] = []
+        self.watch, self.number = watch, watch.names.index(self.name)
+        self.two = description.version == "2.0"
+        self._running = False
+        self.watch(self.number, Activity.LOADING)
+        self.fmu = self._load()
+        self.watch(self.number, Activity.INSTANTIATING)
+        try:
+            self._instantiate()
+        except Exception as error:
+            self.fmu.freeLibrary()
+            raise ExportError(
+                f"instance '{self.name}'", f"could not be made: {why(self.messages, error)}"
+            ) from error
+
+    def _load(self) -> Any:
+        here = os.getcwd()
+        kind = fmpy.fmi2.FMU2Slave if self.two else fmpy.fmi3.FMU3Slave
+        try:
+            return kind(
+                guid=self.description.token,
+                modelIdentifier=self.description.identifier,
+                unzipDirectory=str(self.description.folder),
+                instanceName=self.name,
+                libraryPath=str(self.description.library),
+            )
+        except Exception as error:
+            raise ExportError(
+                f"instance '{self.name}'", f"its library does not load: {why((), error)}"
+            ) from error
+        finally:
+            os.chdir(here)  # fmpy does not restore it where loading fails
+
+    def _instantiate(self) -> None:
+        def log(status: int, message: bytes) -> None:
+            if status > 0:
+                self.messages.append(message.decode("utf-8", errors="replace"))
+
+        if self.two:
+            callbacks = fmpy.fmi2.fmi2CallbackFunctions()
+            ctypes.memmove(
+                ctypes.byref(callbacks),
+                ctypes.byref(fmpy.fmi2.defaultCallbacks),
+                ctypes.sizeof(callbacks),
+            )
+            callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
+                lambda _e, _n, status, _c, text: log(status, text)
+            )
+            self.fmu.instantiate(callbacks=callbacks)
+        else:
+            self.fmu.instantiate(logMessage=lambda _e, status, _c, text: log(status, text))
+
+    @contextmanager
+    def explained(
+        self, what: str, kind: type[ExportError] | type[ConvergenceError] = ExportError
+    ) -> Iterator[None]:
+        """Raise what the FMU refuses within with its own message."""
+        try:
+            yield
+        except FMICallException as error:
+            raise kind(f"instance '{self.name}', {what}", why(self.messages, error)) from error
+
+    def begin(self, start: float, stop: float | None) -> None:
+        """Enter the initialization mode.
+
+        ``start``, ``stop``: times in s; ``None`` without an end.
+        """
+        self.watch(self.number, Activity.INITIALIZING)
+        with self.explained("initialization"):
+            if self.two:
+                self.fmu.setupExperiment(startTime=start, stopTime=stop)
+                self.fmu.enterInitializationMode()
+            else:
+                self.fmu.enterInitializationMode(startTime=start, stopTime=stop)
+
+    def run(self) -> None:
+        """Leave the initialization mode."""
+        self.watch(self.number, Activity.INITIALIZING)
+        with self.explained("initialization"):
+            self.fmu.exitInitializationMode()
+        self._running = True
+
+    def close(self) -> None:
+        """Terminate, free the instance and unload its library; never fails."""
+        self.watch(self.number, Activity.ENDING)
+        try:
+            if self._running:
+                self.fmu.terminate()
+        except FMICallException:
+            pass  # it failed before, which was reported
+        finally:
+            self.fmu.freeInstance()
+
+
+def why(messages: Sequence[str], error: object) -> str:
+    """Return the last message of the FMU, or the error without one, made fit to be shown."""
+    return fit_to_show(messages[-1] if messages else error)
+
+
 _STEPPING = int(Activity.STEPPING)
 _WARNING = 1
 """The highest status with which both versions of FMI go on."""
@@ -29,11 +147,6 @@ class FmuInstance(LoadedFmu):
         Of the FMU.
     watch
         Told what is called, so that a crash can be explained.
-
-    Raises
-    ------
-    ExportError
-        If its library cannot be loaded or instantiated, or lacks a function.
     """
 
     def __init__(self, description: FmuDescription, watch: Watch) -> None:
@@ -44,18 +157,7 @@ class FmuInstance(LoadedFmu):
             raise ExportError(f"instance '{self.name}'", f"could not be made: {error}") from error
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Set variables.
-
-        Parameters
-        ----------
-        values
-            Numbers by name.
-
-        Raises
-        ------
-        ExportError
-            With the message of the FMU if it refuses.
-        """
+        """Set variables."""
         for name, value in values.items():
             variable = self.description.variables[name]
             self.watch(self.number, Activity.SETTING)
@@ -70,12 +172,7 @@ class FmuInstance(LoadedFmu):
     def setter(self, names: Sequence[str], values: Array) -> Callable[[], None]:
         """Return a function that sets real variables to what an array holds when it is called.
 
-        Parameters
-        ----------
-        names
-            Of real variables.
-        values
-            Shape (n,), contiguous; the function reads it.
+        ``values``: shape (n,), contiguous; the function reads it.
         """
         variables = [self.description.variables[name] for name in names]
         call = self._access("fmi2SetReal" if self.two else "fmi3SetFloat64", variables, values.ctypes.data)
@@ -84,12 +181,7 @@ class FmuInstance(LoadedFmu):
     def reader(self, variables: Sequence[FmuScalar], values: Array) -> Callable[[], None]:
         """Return a function that reads variables into an array when it is called.
 
-        Parameters
-        ----------
-        variables
-            Reals first, then integers.
-        values
-            Shape (n,), contiguous; the function writes it.
+        ``values``: shape (n,), contiguous; the function writes it.
         """
         reals = [v for v in variables if v.kind == "real"]
         integers = [v for v in variables if v.kind != "real"]
@@ -152,18 +244,7 @@ class FmuInstance(LoadedFmu):
         return step
 
     def step(self, time: float, length: float) -> None:
-        """Advance by one communication step.
-
-        Parameters
-        ----------
-        time, length
-            Communication point and step in s.
-
-        Raises
-        ------
-        ConvergenceError
-            With the message of the FMU if it cannot.
-        """
+        """Advance by one communication step."""
         self.watch(self.number, _STEPPING)
         status = self._step(time, length)
         if status > _WARNING:
@@ -178,25 +259,13 @@ class FmuInstance(LoadedFmu):
             return self.fmu.getFMUstate() if self.two else self.fmu.getFMUState()
 
     def restore_state(self, state: Any) -> None:
-        """Go back to a state that was kept.
-
-        Parameters
-        ----------
-        state
-            From :meth:`keep_state`.
-        """
+        """Go back to a state that was kept."""
         self.watch(self.number, Activity.ROLLING_BACK)
         with self.explained("going back to an earlier state"):
             (self.fmu.setFMUstate if self.two else self.fmu.setFMUState)(state)
 
     def forget_state(self, state: Any) -> None:
-        """Free a state that was kept.
-
-        Parameters
-        ----------
-        state
-            From :meth:`keep_state`.
-        """
+        """Free a state that was kept."""
         self.watch(self.number, Activity.ROLLING_BACK)
         with self.explained("freeing a state"):
             (self.fmu.freeFMUstate if self.two else self.fmu.freeFMUState)(state)

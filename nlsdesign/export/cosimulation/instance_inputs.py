@@ -6,15 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .communication_points import rows_of, sample_times
-from .feeds import Curve, CurveFeed, Feed, GivenFeed, HeldFeed, LateFeed
+from ...foundation.arrays import Array
+from .coupling import Curve, CurveFeed, Feed, GivenFeed, HeldFeed, LateFeed
 from .fmu_instance import FmuInstance
-from .run_plan import Link, Plan
+from .run_plan import Link, Plan, rows_of, sample_times
 from .wires import split_name
-
-Array = NDArray[np.float64]
 
 
 class InstanceInputs:
@@ -42,43 +39,19 @@ class InstanceInputs:
         return [feed.initial() for feed in self.feeds]
 
     def present(self, row: int, time: float) -> list[float]:
-        """Return the values at a communication point.
-
-        Parameters
-        ----------
-        row, time
-            Number and time of the point.
-        """
+        """Return the values at a communication point."""
         return [feed.at(row, time) for feed in self.feeds]
 
     def before(self, row: int, time: float) -> list[float]:
-        """Return the values just before a communication point.
-
-        Parameters
-        ----------
-        row, time
-            Number and time of the point.
-        """
+        """Return the values just before a communication point."""
         return [feed.before(row, time) for feed in self.feeds]
 
     def over(self, row: int, time: float, length: float) -> list[float]:
-        """Return the values for the step from a communication point.
-
-        Parameters
-        ----------
-        row, time, length
-            Number and time of the point, and length of the step.
-        """
+        """Return the values for the step from a communication point."""
         return [feed.over(row, time, length) for feed in self.feeds]
 
     def apply(self, values: list[float]) -> bool:
-        """Set the inputs if they are others than before; return whether they were.
-
-        Parameters
-        ----------
-        values
-            One per input.
-        """
+        """Set the inputs if they are others than before; return whether they were."""
         if self._set is None or self._values.tolist() == values:
             return False
         self._values[:] = values
@@ -122,13 +95,7 @@ class ConnectedInputs:
         }
 
     def note_samples(self, names: Sequence[str]) -> None:
-        """Note what sampled instances have just computed.
-
-        Parameters
-        ----------
-        names
-            Of the instances.
-        """
+        """Note what sampled instances have just computed."""
         for source, samples in self.samples.items():
             if split_name(source)[0] in names:
                 samples.append(float(self._now[self._columns[source]]))
@@ -179,13 +146,7 @@ class ConnectedInputs:
 
 
 def due_by_row(plan: Plan) -> dict[int, list[str]]:
-    """Return the sampled instances that are due, in the order in which they compute, by row.
-
-    Parameters
-    ----------
-    plan
-        What is run.
-    """
+    """Return the sampled instances that are due, in the order in which they compute, by row."""
     due: dict[int, list[str]] = {}
     for name in plan.order or plan.descriptions:
         period = plan.descriptions[name].sample_time

@@ -8,14 +8,12 @@ fork, the work is done in this process.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import faulthandler
 import json
 import mmap
 import os
 import select
 import signal
-import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -25,21 +23,18 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ... import errors
-from ...errors import ExportError, NlsError
-from ...processes import signals_held
-from ...progress import Progress
-from .foreign_text import fit_to_show
+from ...foundation import errors
+from ...foundation.arrays import Array
+from ...foundation.errors import ExportError, NlsError
+from ...foundation.processes import ready_as_helper, signals_held
+from ...foundation.progress import Progress
+from .fmu_description import fit_to_show
 
-Array = NDArray[np.float64]
 _LOOK = 0.05
 """Seconds between two looks at the process."""
 _GRACE = 1.0
 """Seconds for a process that has closed its end of the pipe to end by itself."""
-_DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of Linux."""
 OUTPUT_FILE = "output.txt"
 """What the libraries print, in the folder of the work."""
 
@@ -87,28 +82,14 @@ class Watch:
     cells: Any = field(default_factory=lambda: memoryview(mmap.mmap(-1, 32)).cast("q"))
 
     def __call__(self, instance: int, activity: int) -> None:
-        """Note a call that begins.
-
-        Parameters
-        ----------
-        instance
-            Its number in the names.
-        activity
-            An :class:`Activity`.
-        """
+        """Note a call that begins."""
         cells = self.cells
         cells[0] = instance
         cells[1] = activity
         cells[3] += 1
 
     def at_row(self, row: int) -> None:
-        """Note how far the work is.
-
-        Parameters
-        ----------
-        row
-            Number of the row that is being filled.
-        """
+        """Note how far the work is."""
         self.cells[2] = row
 
     @property
@@ -153,15 +134,7 @@ class IsolatedWork:
     progress: Progress
 
     def result(self) -> Array:
-        """Do the work and return the array, shape (rows, columns).
-
-        Raises
-        ------
-        NlsError
-            What the work raised.
-        ExportError
-            If a library crashes, ends the process, or does not return in time.
-        """
+        """Do the work and return the array, shape (rows, columns)."""
         rows = len(self.times)
         memory = mmap.mmap(-1, max(1, 8 * rows * self.columns))
         array: Array = np.frombuffer(memory, dtype=np.float64, count=rows * self.columns)
@@ -298,13 +271,7 @@ class _Child:
         return self._ended
 
     def ended_within(self, seconds: float) -> None:
-        """Wait for its end, so that its own way to end is known.
-
-        Parameters
-        ----------
-        seconds
-            At most.
-        """
+        """Wait for its end, so that its own way to end is known."""
         until = time.monotonic() + seconds
         while not self.ended() and time.monotonic() < until:
             time.sleep(0.001)
@@ -322,11 +289,7 @@ def _made_ready(folder: Path) -> None:
     """Make the new process one that can crash quietly and leaves interruptions to its owner."""
     with contextlib.suppress(OSError):  # its owner did so already
         os.setpgid(0, 0)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+    ready_as_helper(signal.SIGKILL)
     faulthandler.disable()
     import resource
 

@@ -13,17 +13,16 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ConvergenceError
-from .feeds import Curve
+from ...foundation.arrays import Array
+from ...foundation.errors import ConvergenceError
+from .coupling import Curve
 from .fmu_instance import FmuInstance
 from .instance_inputs import ConnectedInputs, InstanceInputs, due_by_row
 from .isolation import Watch
 from .run_plan import Plan
 from .wires import split_name
 
-Array = NDArray[np.float64]
 Values = Callable[[InstanceInputs], list[float]]
 _ROUNDS = 50
 """Most rounds in which direct feedthrough between continuous instances settles."""
@@ -34,17 +33,7 @@ _TINY = 1e-18
 
 
 class Master:
-    """Instances that run together; fills one row per communication point.
-
-    Parameters
-    ----------
-    plan
-        What is run.
-    instances
-        By name, freshly made.
-    watch
-        Told how far the run is.
-    """
+    """Instances that run together; fills one row per communication point."""
 
     def __init__(self, plan: Plan, instances: Mapping[str, FmuInstance], watch: Watch) -> None:
         self._plan, self._instances, self._watch = plan, instances, watch
@@ -72,10 +61,7 @@ class Master:
     def run(self, rows: Array) -> None:
         """Run from the first communication point to the last.
 
-        Parameters
-        ----------
-        rows
-            Shape (points, columns); filled.
+        ``rows``: shape (points, columns); filled.
         """
         acts_at_once = self._plan.acts_at_once
         curves, coupling = self._connected.curves.values(), self._plan.coupling
@@ -180,13 +166,7 @@ class Master:
         self._advance(self._coupled)
 
     def rolling_back(self, work: Callable[[], None]) -> None:
-        """Do work within which a step may be taken again.
-
-        Parameters
-        ----------
-        work
-            Calls :meth:`advance` once, then :meth:`again`.
-        """
+        """Do work within which a step may be taken again."""
         for name in self._coupled:
             self._states[name] = self._instances[name].keep_state()
         work()

@@ -1,19 +1,81 @@
-"""What a run is made of: instances, wires with their numbers, signals from outside, communication points."""
+"""What a run is made of: instances, wires with their numbers, given signals, communication points.
+
+Instances exchange values at every sample of every sampled instance, and in between as often as asked.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .communication_points import communication_points
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
 from .coupling import Coupling
 from .fmu_description import FmuDescription
 from .wires import split_name
 
-Array = NDArray[np.float64]
+MOST_POINTS = 20_000_000
+"""Communication points of one run; a run with a hundred signals then fills 16 GB."""
+_SAME = 1e-9
+"""Times closer than this part of the step are one."""
+
+
+def sample_times(period: float, stop: float) -> Array:
+    """Return the samples of an instance from 0 to the end."""
+    return np.arange(math.floor(stop / period + 1e-6) + 1.0) * period
+
+
+def communication_points(
+    stop: float,
+    step: float,
+    *,
+    periods: Iterable[float],
+    changes: Iterable[tuple[float, float]],
+    parts: int = 1,
+) -> Array:
+    """Return the communication points in s, from 0 to the end.
+
+    What lies between two samples is divided into equal steps no longer than asked for, so step and sample
+    times are independent; sample times need not be multiples of each other.
+    """
+    rhythms = [(period, 0.0) for period in sorted(set(periods))] + sorted(set(changes))
+    expected = parts * (stop / step + sum(stop / period for period, _ in rhythms))
+    if not expected <= MOST_POINTS:
+        raise ValueRangeError(
+            f"stop={stop:g} s in steps of at most {step:g} s",
+            f"makes {expected:.3g} communication points, at most {MOST_POINTS} are possible",
+            next_step="take a longer step or an earlier end",
+        )
+    breaks = [np.array([0.0, stop])]
+    breaks += [sample_times(period, stop) + delay % period for period, delay in rhythms]
+    if not rhythms:
+        breaks.append(step * np.arange(math.floor(stop / step + 1e-6) + 1.0))
+    merged = _merged(np.concatenate(breaks), stop, _SAME * min([step, *(period for period, _ in rhythms)]))
+    gaps = np.diff(merged)
+    counts = parts * np.maximum(1, np.ceil(gaps / step - 1e-6).astype(int))
+    starts, lengths = np.repeat(merged[:-1], counts), np.repeat(gaps / counts, counts)
+    numbers = np.arange(len(starts)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.append(starts + numbers * lengths, merged[-1])
+
+
+def _merged(times: Array, stop: float, same: float) -> Array:
+    """Return ascending times up to the end, those that are one by rounding taken once."""
+    ascending = np.unique(times[times <= stop + same])
+    kept: Array = ascending[np.append(True, np.diff(ascending) > same)]
+    if len(kept) > 1 and kept[-1] >= stop - same:
+        kept[-1] = stop
+    return kept
+
+
+def rows_of(points: Array, times: Array) -> NDArray[np.int64]:
+    """Return the numbers of the points that are nearest to times."""
+    after = np.clip(np.searchsorted(points, times), 1, max(1, len(points) - 1))
+    nearer = np.abs(points[after - 1] - times) <= np.abs(points[np.minimum(after, len(points) - 1)] - times)
+    return np.where(nearer, after - 1, np.minimum(after, len(points) - 1))
 
 
 @dataclass(frozen=True)
@@ -56,25 +118,7 @@ class Given:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Everything that a run needs to know.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    links
-        All wires.
-    signals
-        Signals from outside by input.
-    parameters
-        By ``instance.variable``.
-    order
-        Of sampled instances that are due at the same time; empty if all read before any computes.
-    points
-        Communication points in s.
-    coupling
-        Of continuous instances.
-    """
+    """Everything that a run needs to know."""
 
     descriptions: Mapping[str, FmuDescription]
     links: tuple[Link, ...]
@@ -91,13 +135,7 @@ class Plan:
         return [*shown, *(link.target for link in self.links), *self.signals]
 
     def sampled(self, name: str) -> bool:
-        """Tell whether an instance, or the instance of a variable, is sampled.
-
-        Parameters
-        ----------
-        name
-            Of an instance, or ``instance.variable``.
-        """
+        """Tell whether an instance, or the instance of a variable, is sampled."""
         return self.descriptions[split_name(name)[0]].sample_time is not None
 
     @property
@@ -116,13 +154,7 @@ class Plan:
         return any(link.fresh and not link.delay and not self.sampled(link.target) for link in self.links)
 
     def curved(self, link: Link) -> bool:
-        """Tell whether the source of a wire is continuous.
-
-        Parameters
-        ----------
-        link
-            Wire.
-        """
+        """Tell whether the source of a wire is continuous."""
         return not self.sampled(link.source)
 
 
@@ -133,19 +165,7 @@ def points_of(
     step: float,
     parts: int = 1,
 ) -> Array:
-    """Return the communication points of a system in s.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    links
-        All wires.
-    stop, step
-        End and longest step in s.
-    parts
-        Parts into which each step is divided once more.
-    """
+    """Return the communication points of a system in s."""
     periods = {name: each.sample_time for name, each in descriptions.items() if each.sample_time is not None}
     changes = {
         (periods[split_name(link.source)[0]], link.delay)

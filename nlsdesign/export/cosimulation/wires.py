@@ -6,19 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...errors import ExportError, UnitError, ValueRangeError, unknown_name
-from ...quantity import Quantity, parse_unit
+from ...foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
+from ...foundation.quantity import Quantity, parse_unit
 from .fmu_description import FmuDescription
 
 
 def split_name(name: str) -> tuple[str, str]:
-    """Return instance and variable of ``instance.variable``.
-
-    Parameters
-    ----------
-    name
-        The first word is the instance.
-    """
+    """Return instance and variable of ``instance.variable``."""
     instance, _, variable = name.partition(".")
     return instance, variable
 
@@ -103,35 +97,12 @@ class Late(Wire):
 
 
 def as_wire(source: str | Wire) -> Wire:
-    """Return a wire for a source that may be a plain name.
-
-    Parameters
-    ----------
-    source
-        ``instance.variable`` or a wire.
-    """
+    """Return a wire for a source that may be a plain name."""
     return source if isinstance(source, Wire) else Wire(source)
 
 
 def check_wires(descriptions: Mapping[str, FmuDescription], wires: Mapping[str, Wire]) -> None:
-    """Check both ends, the units and the delay of each wire.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    wires
-        By target.
-
-    Raises
-    ------
-    UnknownNameError
-        If an end, or the instance whose samples count, does not exist, with the nearest that does.
-    UnitError
-        If units do not agree, the gain included.
-    ExportError
-        If a delay counts samples of an instance that has none.
-    """
+    """Check both ends, the units and the delay of each wire."""
     inputs, outputs = (ends(descriptions, causality) for causality in ("input", "output"))
     for target, wire in wires.items():
         if target not in inputs:
@@ -145,12 +116,7 @@ def check_wires(descriptions: Mapping[str, FmuDescription], wires: Mapping[str, 
 def ends(descriptions: Mapping[str, FmuDescription], causality: str | None = None) -> list[str]:
     """Return ``instance.variable`` of all variables of a causality.
 
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    causality
-        For instance ``"input"``; ``None`` for all.
+    ``causality``: for instance ``"input"``; ``None`` for all.
     """
     return [
         f"{name}.{variable.name}"
@@ -161,22 +127,7 @@ def ends(descriptions: Mapping[str, FmuDescription], causality: str | None = Non
 
 
 def delay_of(descriptions: Mapping[str, FmuDescription], wire: Wire) -> float:
-    """Return the stated delay of a wire in s.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    wire
-        Its source exists.
-
-    Raises
-    ------
-    UnknownNameError
-        If the instance whose samples count does not exist.
-    ExportError
-        If that instance is not sampled.
-    """
+    """Return the stated delay of a wire in s."""
     if not isinstance(wire.delay, SamplesOf):
         return float(wire.delay)
     counted = wire.delay.instance or split_name(wire.source)[0]
@@ -193,23 +144,7 @@ def delay_of(descriptions: Mapping[str, FmuDescription], wire: Wire) -> float:
 
 
 def gain_to(descriptions: Mapping[str, FmuDescription], target: str, wire: Wire) -> float:
-    """Return the factor between the numbers of both ends, each in the unit that its FMU states.
-
-    Parameters
-    ----------
-    descriptions
-        By instance.
-    target
-        Input.
-    wire
-        Its source exists.
-
-    Raises
-    ------
-    UnitError
-        If the units do not agree, the gain included. The radian is not compared, for torque is given in N·m
-        and in N·m/rad.
-    """
+    """Return the factor between the numbers of both ends, each in the unit that its FMU states."""
     number = wire.gain.number if isinstance(wire.gain, Quantity) else float(wire.gain)
     names = [_unit(descriptions, end) for end in (target, wire.source)]
     if None in names:

@@ -49,13 +49,7 @@ class ModelStructure:
 
 
 def model_structure(layout: FmuLayout) -> ModelStructure:
-    """Return the model structure of an FMU.
-
-    Parameters
-    ----------
-    layout
-        Its variables.
-    """
+    """Return the model structure of an FMU."""
     model = layout.model
     s = model.symbols()
     given = [(v, s.state[i]) for i, v in enumerate(layout.states) if v.causality == "output"]

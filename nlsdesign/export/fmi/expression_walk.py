@@ -12,6 +12,8 @@ from typing import TypeVar
 
 import casadi as ca
 
+from ...model.graph import fold, read_graph
+
 Interval = tuple[float, float]
 EVERYTHING: Interval = (-math.inf, math.inf)
 
@@ -40,25 +42,11 @@ class Dependence:
     nonlinear: int = 0
 
     def joined(self, other: Dependence) -> Dependence:
-        """Return the dependence of a sum.
-
-        Parameters
-        ----------
-        other
-            Of the other term.
-        """
+        """Return the dependence of a sum."""
         return Dependence(self.on | other.on, self.scaled | other.scaled, self.nonlinear | other.nonlinear)
 
     def times(self, factor: Dependence, changing: int) -> Dependence:
-        """Return the part of a product's dependence that comes through this operand.
-
-        Parameters
-        ----------
-        factor
-            Of the other operand.
-        changing
-            The symbols that change while the model runs.
-        """
+        """Return the part of a product's dependence that comes through this operand."""
         if not factor.on:
             return self
         return Dependence(self.on, self.on, self.on if factor.on & changing else self.nonlinear)
@@ -71,20 +59,8 @@ class Dependence:
 def dependences(function: ca.Function, symbols: Sequence[Sequence[int]], changing: int) -> list[Dependence]:
     """Return how each nonzero of the first result of an SX function depends on symbols.
 
-    Parameters
-    ----------
-    function
-        The function.
-    symbols
-        For each argument the number of the symbol that each element stands for. Looked-up numbers stand for
-        the argument of their table, and are nonlinear.
-    changing
-        Bits of the symbols that change while the model runs.
-
-    Returns
-    -------
-    list
-        One for each nonzero.
+    ``symbols``: for each argument the number of the symbol that each element stands for. Looked-up numbers
+    stand for the argument of their table, and are nonlinear.
     """
     looked_up = len(symbols) - 1
 
@@ -105,56 +81,27 @@ def dependences(function: ca.Function, symbols: Sequence[Sequence[int]], changin
             return weighed.times(weight, changing).joined(factor)
         return together.anyhow()
 
-    return _walk(function, given, lambda _: Dependence(), combined)
+    return _of_first_result(fold(read_graph(function), given, lambda _: Dependence(), combined=combined))
 
 
 def ranges(function: ca.Function, bounds: Sequence[Sequence[Interval]]) -> list[Interval]:
     """Return an interval that holds each nonzero of the first result, by interval arithmetic.
 
     The interval may be wider than the values that occur, never narrower.
-
-    Parameters
-    ----------
-    function
-        An SX function.
-    bounds
-        Range of each element of each argument.
-
-    Returns
-    -------
-    list
-        One for each nonzero.
     """
-    return _walk(
-        function,
+    values = fold(
+        read_graph(function),
         lambda argument, element: bounds[argument][element],
         lambda value: (value, value),
-        lambda operation, operands: _RANGES[operation](*operands) if operation in _RANGES else EVERYTHING,
+        combined=lambda operation, operands: _RANGES.get(operation, _anything)(*operands),
     )
+    return _of_first_result(values)
 
 
-def _walk(
-    function: ca.Function,
-    given: Callable[[int, int], _Value],
-    constant: Callable[[float], _Value],
-    combined: Callable[[int, Sequence[_Value]], _Value],
-) -> list[_Value]:
-    """Return what is known of each nonzero of the first result, in the order of computation."""
-    work: dict[int, _Value] = {}
-    results: dict[int, _Value] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        read, written = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_OUTPUT:
-            if written[0] == 0:
-                results[written[1]] = work[read[0]]
-        elif operation == ca.OP_INPUT:
-            work[written[0]] = given(read[0], read[1])
-        elif operation == ca.OP_CONST:
-            work[written[0]] = constant(float(function.instruction_constant(k)))
-        else:
-            work[written[0]] = combined(operation, [work[i] for i in read])
-    return [results[i] for i in range(len(results))]
+def _of_first_result(values: Mapping[tuple[int, int], _Value]) -> list[_Value]:
+    """Return what is known of each nonzero of the first result."""
+    first = {nonzero: value for (result, nonzero), value in values.items() if result == 0}
+    return [first[i] for i in range(len(first))]
 
 
 def _sum(a: Interval, b: Interval) -> Interval:
@@ -179,6 +126,10 @@ def _size(a: Interval) -> Interval:
 def _square(a: Interval) -> Interval:
     low, high = _size(a)
     return low * low, high * high
+
+
+def _anything(*_: Interval) -> Interval:
+    return EVERYTHING
 
 
 def _choice(_: Interval, a: Interval) -> Interval:

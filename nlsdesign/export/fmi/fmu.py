@@ -2,35 +2,125 @@
 
 A continuous model contains its own integrator, a discrete one the same C code as the controller.
 Archives are deterministic: the same model and date give the same bytes. The instantiation token is a hash of
-the content without the date.
+the content without the date. Binaries are compiled once: they are kept under a hash of all that they are
+made from.
 """
 
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import math
 import os
 import struct
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from pathlib import Path
 
-from ...errors import ExportError, ValueRangeError, nearest
+from ...foundation.errors import ExportError, ValueRangeError, nearest
+from ...foundation.text_files import draft, write_bytes
 from ...model.flat import FlatModel
-from ...writing import draft
 from ..c.c_text import identifier
-from ..compilation.cross_compiler import ALL_PLATFORMS, Platform, chosen_platforms
+from ..compilation import cross_compiler
+from ..compilation.cross_compiler import (
+    ALL_PLATFORMS,
+    Platform,
+    cache_folder,
+    chosen_platforms,
+    compile_library,
+)
 from ..files import shell
-from .authorship import Authorship
-from .compiled_binaries import compiled_binaries
-from .compiled_binaries import fmi_headers as fmi_headers
+from .authorship import Authorship, with_origin
 from .fmu_documentation import icon, page
-from .fmu_origin import with_origin
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons
 from .terminals import terminals
+
+MOST_KEPT = 200
+"""Number of binaries that are kept; the oldest go first. One has 20 to 60 kB."""
+_DIGEST = hashlib.sha256().digest_size
+
+
+def fmi_headers() -> Path:
+    """Return the folder of the headers of the FMI standard, which come with fmpy."""
+    import fmpy
+
+    return Path(fmpy.__file__).parent / "c-code"
+
+
+def compiled_binaries(
+    sources: Mapping[str, bytes], main: str, folder: Path, *, name: str, platforms: Sequence[Platform]
+) -> dict[str, bytes]:
+    """Return the shared library of an FMU for each platform, from the cache where nothing changed.
+
+    ``main``: the one to compile; it includes the others.
+    """
+
+    def binary(platform: Platform) -> bytes:
+        kept = cache_folder() / "fmu" / _key(sources, main, name, platform)
+        earlier = _read(kept)
+        if earlier is not None:
+            return earlier
+        place = folder / platform.name
+        place.mkdir(parents=True)
+        for file, content in sources.items():
+            (place / file).write_bytes(content)
+        target = place / f"{name}{platform.extension}"
+        compile_library([place / main], target, platform=platform, include=[fmi_headers()])
+        content = target.read_bytes()
+        _keep(kept, content)
+        return content
+
+    with ThreadPoolExecutor(max_workers=max(1, min(len(platforms), os.cpu_count() or 1))) as pool:
+        return dict(zip((p.name for p in platforms), pool.map(binary, platforms), strict=True))
+
+
+def _key(sources: Mapping[str, bytes], main: str, name: str, platform: Platform) -> str:
+    digest = hashlib.sha256(_compiler())
+    for text in (main, name, platform.target, platform.extension):
+        digest.update(f"{text}\0".encode())
+    for file, content in sorted(sources.items()):
+        digest.update(f"{file}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _compiler() -> bytes:
+    """Return what stands for compiler, flags and headers; nothing where the compiler is missing."""
+    try:
+        version = importlib.metadata.version("ziglang")
+    except importlib.metadata.PackageNotFoundError:
+        version = ""  # the compiler itself says that it is missing, where it is needed
+    digest = hashlib.sha256(f"{version}\0".encode())
+    digest.update(Path(cross_compiler.__file__).read_bytes() + shell("windows.c").encode())
+    for header in sorted(fmi_headers().glob("*.h")):
+        digest.update(header.read_bytes())
+    return digest.digest()
+
+
+def _read(kept: Path) -> bytes | None:
+    """Return a binary that was kept, ``None`` where there is none or it is damaged."""
+    try:
+        content = kept.read_bytes()
+    except OSError:
+        return None  # never compiled, or not readable: it is compiled now
+    digest, binary = content[:_DIGEST], content[_DIGEST:]
+    return binary if hashlib.sha256(binary).digest() == digest else None
+
+
+def _keep(kept: Path, binary: bytes) -> None:
+    try:
+        write_bytes(kept, hashlib.sha256(binary).digest() + binary)
+        every = sorted(kept.parent.iterdir(), key=lambda each: each.stat().st_mtime)
+        for old in every[:-MOST_KEPT]:
+            old.unlink(missing_ok=True)
+    except (ExportError, OSError):
+        return  # without a cache the next export takes longer, that is all
+
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _TOKEN = "{token-of-this-content}"
@@ -115,21 +205,7 @@ def fmu_texts(
 ) -> dict[str, bytes]:
     """Return everything in an FMU but the binaries.
 
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    version
-        ``"3.0"`` or ``"2.0"``.
-    step
-        Communication step of the default experiment in s.
-    authorship
-        Author, licence and date. The date has no part in the token.
-
-    Returns
-    -------
-    dict
-        Content by path within the FMU.
+    ``authorship``: author, licence and date. The date has no part in the token.
     """
     variables, about = layout(model), authorship or Authorship()
 
@@ -185,13 +261,7 @@ def _binaries(
 
 
 def universal_binary(parts: Mapping[str, bytes]) -> bytes:
-    """Return one macOS library for several processors, which FMI 2.0 has only one folder for.
-
-    Parameters
-    ----------
-    parts
-        Mach-O libraries by platform name.
-    """
+    """Return one macOS library for several processors, which FMI 2.0 has only one folder for."""
     # (processor type, subtype) as in <mach/machine.h>; the header is big-endian, slices start on 16 KiB.
     processors = {"x86_64-darwin": (0x01000007, 3), "aarch64-darwin": (0x0100000C, 0)}
     align = 14

@@ -8,9 +8,9 @@ import zlib
 from collections.abc import Sequence
 from html import escape
 
-from ...locations import version as own_version
+from ...foundation.locations import version as own_version
+from ...foundation.quantity import typeset_unit
 from ...model.origin import Origin
-from ...quantity import typeset_unit
 from ..files import filled
 from .authorship import Authorship
 from .fmu_variables import FmuLayout, FmuVariable
@@ -18,15 +18,7 @@ from .terminals import FLANGE, LOOP, Terminal, terminals
 
 
 def page(layout: FmuLayout, authorship: Authorship | None = None) -> str:
-    """Return ``documentation/index.html``: a table of all variables, readable without a network.
-
-    Parameters
-    ----------
-    layout
-        Variables of the FMU.
-    authorship
-        Author, licence and date.
-    """
+    """Return ``documentation/index.html``: a table of all variables, readable without a network."""
     model = layout.model
     kind = (
         "Continuous; integrated inside by Rodas4 with an exact Jacobian, inputs held over each step."
@@ -102,15 +94,7 @@ def _table_row(each: FmuVariable) -> str:
 
 
 def icon(name: str = "icon", size: int = 96) -> bytes:
-    """Return a PNG: the model as a spiral cam with its cable, or one of its terminals.
-
-    Parameters
-    ----------
-    name
-        ``"icon"`` for the model, or the picture of a terminal.
-    size
-        Width and height in pixels.
-    """
+    """Return a PNG: the model as a spiral cam with its cable, or one of its terminals."""
     pixel = {LOOP: _of_loop, FLANGE: _of_flange}.get(name, _of_model)
     axis = [(i + 0.5) / size * 2 - 1 for i in range(size)]
     rows = b"".join(b"\0" + bytes(v for x in axis for v in pixel(x, -y)) for y in axis)

@@ -6,35 +6,19 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
 from ...model.flat import Symbols, Variable
-from ..c.c_text import DOUBLE, comment, identifier, string
-from ..c.controller_code import check_discrete, header_text, source_text
-from ..c.controller_step import step_body
+from ..c.c_text import Real, comment, identifier, string
+from ..c.controller_code import check_discrete, header_text, source_text, step_body
 from ..c.instructions import named_indices, print_statements
-from ..c.structures import member_paths
-from ..c.table_lookup import indexed_tables, look_up, look_up_slopes, table_data
+from ..c.table_lookup import look_up, look_up_slopes
+from ..c.writer import CWriter
 from ..files import filled, shell
 from .fmu_variables import FmuLayout
 
 
 def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
-    """Return the sources by file name; the shell ``fmi2.c`` or ``fmi3.c`` is the only one to be compiled.
-
-    Parameters
-    ----------
-    layout
-        Variables of the FMU.
-    version
-        ``"2.0"`` or ``"3.0"``.
-    token
-        Instantiation token.
-
-    Raises
-    ------
-    ExportError
-        If the model cannot be written in C.
-    """
+    """Return the sources by file name; the shell ``fmi2.c`` or ``fmi3.c`` is the only one to be compiled."""
     model = layout.model
     main = main_source(version)
     texts = {name: shell(name) for name in (main, "instance.c", "exchange.c", "saved_state.c")}
@@ -50,22 +34,15 @@ def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
         }
     else:
         check_discrete(model)
-        name = identifier(model.name)
-        body = _discrete(layout, name)
-        texts[f"{name}.h"] = header_text(model, name, DOUBLE)
-        texts[f"{name}.c"] = source_text(model, name, DOUBLE)
+        c = CWriter(model, identifier(model.name))
+        body = _discrete(layout, c)
+        texts[f"{c.name}.h"], texts[f"{c.name}.c"] = header_text(c), source_text(c)
     texts["model.c"] = _head(layout, token) + body
     return texts
 
 
 def main_source(version: str) -> str:
-    """Return the name of the file to compile.
-
-    Parameters
-    ----------
-    version
-        ``"2.0"`` or ``"3.0"``.
-    """
+    """Return the name of the file to compile."""
     return "fmi2.c" if version == "2.0" else "fmi3.c"
 
 
@@ -97,7 +74,7 @@ def _head(layout: FmuLayout, token: str) -> str:
     }
     sizes = [f"#define MODEL_{size} {number}" for size, number in numbers.items()]
     if model.sample_time is not None:
-        sizes.append(f"#define MODEL_SAMPLE_TIME {DOUBLE.literal(model.sample_time)}")
+        sizes.append(f"#define MODEL_SAMPLE_TIME {Real.DOUBLE.literal(model.sample_time)}")
     values = {
         "name": comment(model.name),
         "description": comment(model.description),
@@ -109,8 +86,8 @@ def _head(layout: FmuLayout, token: str) -> str:
 
 
 def _row(v: Variable) -> str:
-    limits = f"{DOUBLE.bound(v.minimum)}, {DOUBLE.bound(v.maximum)}"
-    return f"{{{string(v.name)}, {DOUBLE.literal(v.start)}, {limits}}}"
+    limits = f"{Real.DOUBLE.bound(v.minimum)}, {Real.DOUBLE.bound(v.maximum)}"
+    return f"{{{string(v.name)}, {Real.DOUBLE.literal(v.start)}, {limits}}}"
 
 
 def _continuous(layout: FmuLayout) -> str:
@@ -128,7 +105,7 @@ def _continuous(layout: FmuLayout) -> str:
     tangents = [ca.jtimes(e, everything, seed) for e in moved]
     tangent_targets = [*targets, _cells("z", indicators.numel())]
     values = {
-        "nominal": ", ".join(DOUBLE.literal(abs(v.nominal) or 1.0) for v in model.states) or "1.0",
+        "nominal": ", ".join(Real.DOUBLE.literal(abs(v.nominal) or 1.0) for v in model.states) or "1.0",
         "rates": _statements(s, mode, [s.derivative], [_cells("f", n)]),
         "equations": _statements(s, mode, results, targets),
         "jacobian": _statements(s, mode, [jacobian, slope], [_table("jacobian", n, n), _cells("slope", n)]),
@@ -212,38 +189,31 @@ def _statements(
         groups.append(seed)
         texts.append(["dt"] + [f"d{cell}" for group in texts[1:-1] for cell in group])
     function = ca.Function("f", groups, [ca.densify(e) for e in results], {"cse": True})
-    return print_statements(function, texts, targets, real=DOUBLE)
+    return print_statements(function, texts, targets, real=Real.DOUBLE)
 
 
-def _discrete(layout: FmuLayout, name: str) -> str:
-    model = layout.model
-    x, u, p, y = (
-        list(member_paths(group).values())
-        for group in (model.states, model.inputs, model.parameters, model.outputs)
-    )
-    own = {each.variable.name for each in layout.outputs}
-    given = [path for path, v in zip(y, model.outputs, strict=True) if v.name in own]
-    lookups, signals, looked_up = _signals(layout)
-    _, known = step_body(model, name, DOUBLE)
-    directional, sloped = _directional(layout)
+def _discrete(layout: FmuLayout, c: CWriter) -> str:
+    given = {each.variable.name for each in layout.outputs}
+    outputs = [path for path, v in zip(c.outputs, c.model.outputs, strict=True) if v.name in given]
+    lookups, signals, looked_up = _signals(layout, c)
+    _, known = step_body(c)
+    directional, sloped = _directional(layout, c)
     looked_up |= sloped
-    missing = [t for t in indexed_tables(model) if t.columns(looked_up) and not t.columns(known)]
+    missing = [table for table in c.tables if table.columns(looked_up) and not table.columns(known)]
     values = {
-        "name": name,
-        "NAME": name.upper(),
-        "tables": [line for each in missing for line in (*table_data(each, DOUBLE), "")],
-        "parameters": [f"parameters.{path} = p[{i}];" for i, path in enumerate(p)],
-        "start": [f"memory->states.{path} = x[{i}];" for i, path in enumerate(x)],
-        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(u)],
-        "states": [f"x[{i}] = before.{path};" for i, path in enumerate(x)],
-        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(given)],
+        "tables": [line for table in missing for line in (*table.data(), "")],
+        "parameters": [f"parameters.{path} = p[{i}];" for i, path in enumerate(c.parameters)],
+        "start": [f"memory->states.{path} = x[{i}];" for i, path in enumerate(c.states)],
+        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(c.inputs)],
+        "states": [f"x[{i}] = before.{path};" for i, path in enumerate(c.states)],
+        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(outputs)],
         "signals": [*lookups, *signals],
         "directional": directional,
     }
-    return filled("fmu_discrete.c", values)
+    return c.filled("fmu_discrete.c", values)
 
 
-def _directional(layout: FmuLayout) -> tuple[list[str], set[int]]:
+def _directional(layout: FmuLayout, c: CWriter) -> tuple[list[str], set[int]]:
     """Return how what a sample shows changes in a direction, and the looked-up numbers used."""
     model = layout.model
     s = model.symbols()
@@ -252,12 +222,10 @@ def _directional(layout: FmuLayout) -> tuple[list[str], set[int]]:
         "u": (model.inputs, s.input),
         "p": (model.parameters, s.parameter),
     }
-    places = {"u": "memory->inputs", "p": "memory->parameters"}
     texts = {
-        letter: [f"{places[letter]}.{path}" for path in member_paths(group).values()]
-        if letter in places
-        else _cells(letter, len(group))
-        for letter, (group, _) in groups.items()
+        "x": _cells("x", len(model.states)),
+        "u": [f"memory->inputs.{path}" for path in c.inputs],
+        "p": [f"memory->parameters.{path}" for path in c.parameters],
     }
     count = s.table.numel()
     seeds = [ca.SX.sym(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
@@ -269,7 +237,7 @@ def _directional(layout: FmuLayout) -> tuple[list[str], set[int]]:
     given += [_cells(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
     given.append([f"dw{i}" for i in range(count)])
     targets = [_cells(name, e.numel()) for name, e in zip(("dy", "ds"), results, strict=True)]
-    statements = print_statements(function, given, targets, real=DOUBLE)
+    statements = print_statements(function, given, targets, real=Real.DOUBLE)
     sloped = named_indices(statements, "dw")
     used = named_indices(statements, "w") | sloped
     names = {v.name: (texts[letter][i], f"d{letter}[{i}]")
@@ -277,27 +245,24 @@ def _directional(layout: FmuLayout) -> tuple[list[str], set[int]]:
     arguments = {name: text for name, (text, _) in names.items()}
     columns = [names[table.argument][1] for table in model.tables for _ in table.columns]
     changes = [f"const double dw{i} = slope{i} * {columns[i]};" for i in sorted(sloped)]
-    slopes = look_up_slopes(model, DOUBLE, arguments, sloped)
-    return [*look_up(model, DOUBLE, arguments, used), *slopes, *changes, *statements], used
+    slopes = look_up_slopes(c.tables, arguments, sloped)
+    return [*look_up(c.tables, arguments, used), *slopes, *changes, *statements], used
 
 
-def _signals(layout: FmuLayout) -> tuple[list[str], list[str], set[int]]:
+def _signals(layout: FmuLayout, c: CWriter) -> tuple[list[str], list[str], set[int]]:
     """Return the look-ups and statements for the signals of a sample, and the looked-up numbers used."""
     model = layout.model
     s = model.symbols()
     _, signals = _own(layout, s)
     function = ca.Function("s", [s.state, s.input, s.parameter, s.table], [signals], {"cse": True})
     names = [
-        [f"{place}.{path}" for path in member_paths(group).values()]
-        for place, group in (
-            ("before", model.states),
-            ("memory->inputs", model.inputs),
-            ("memory->parameters", model.parameters),
-        )
+        [f"before.{path}" for path in c.states],
+        [f"memory->inputs.{path}" for path in c.inputs],
+        [f"memory->parameters.{path}" for path in c.parameters],
     ]
     width = [f"w{i}" for i in range(s.table.numel())]
-    statements = print_statements(function, [*names, width], [_cells("s", signals.numel())], real=DOUBLE)
+    statements = print_statements(function, [*names, width], [_cells("s", signals.numel())], real=Real.DOUBLE)
     used = named_indices(statements, "w")
     arguments = dict(zip((v.name for v in model.states), names[0], strict=True))
     arguments |= dict(zip((v.name for v in model.inputs), names[1], strict=True))
-    return look_up(model, DOUBLE, arguments, used), statements, used
+    return look_up(c.tables, arguments, used), statements, used

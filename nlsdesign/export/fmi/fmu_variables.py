@@ -2,7 +2,8 @@
 
 A value reference is an index into one array; the groups are in the order time, states, derivatives,
 inputs, parameters, outputs, signals, event indicators, modes, one extra, and behind them the status word.
-An output that is a state is one variable, as is a signal that is an output.
+An output that is a state is one variable, as is a signal that is an output. Each switch of a model that is
+located shows its mode and an event indicator.
 """
 
 from __future__ import annotations
@@ -14,15 +15,54 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ExportError
+from ...foundation.arrays import Array
+from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Variable
-from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
-from .event_variables import indicator_variables, mode_variables
+from ...model.switching import Switch
+from ..c.guarded_step import FIRST_INDEX_BIT, STATUS_BITS
 from .expression_walk import EVERYTHING, Interval, ranges
 from .terminals import with_flange_outputs
 from .typical_sizes import typical_sizes, with_sizes
+
+
+def located_switches(model: FlatModel) -> tuple[Switch, ...]:
+    """Return the switches whose changes an importer has to locate.
+
+    A model with corners only has none: an integrator gets across them, at the cost of shorter steps.
+    """
+    return model.switching.switches if model.switching is not None and model.switching.jumps else ()
+
+
+def indicator_variables(model: FlatModel) -> list[Variable]:
+    """Return an event indicator for each located switch."""
+    names = _names(located_switches(model))
+    return [
+        Variable(f"{name}.indicator", "1", f"Not negative as long as the mode of {name} lasts, in SI units")
+        for name in names
+    ]
+
+
+def mode_variables(model: FlatModel) -> list[Variable]:
+    """Return the mode of each located switch: −1, 0 or 1."""
+    switches = located_switches(model)
+    return [
+        Variable(f"{name}.mode", "1", f"Mode of {name}: {_words(switch)}", minimum=-1.0, maximum=1.0)
+        for name, switch in zip(_names(switches), switches, strict=True)
+    ]
+
+
+def _words(switch: Switch) -> str:
+    return ", ".join(f"{mode} {text}" for mode, text in sorted(switch.words) if mode in (-1, 0, 1))
+
+
+def _names(switches: Sequence[Switch]) -> list[str]:
+    """Return structured names; dry frictions on one motion are one switch and have both names."""
+    return [
+        "_and_".join([first, *(re.sub(r"[^\w]", "_", each) for each in more)])
+        for first, *more in (switch.name.split("+") for switch in switches)
+    ]
+
 
 RELATIVE_TOLERANCE = 1e-8
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
@@ -107,18 +147,7 @@ class FmuLayout:
 
 
 def layout(model: FlatModel) -> FmuLayout:
-    """Return the variables of the FMU of a model.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-
-    Raises
-    ------
-    ExportError
-        If a name is not allowed by FMI, or two different things have one name.
-    """
+    """Return the variables of the FMU of a model."""
     continuous = model.sample_time is None
     changing = "continuous" if continuous else "discrete"
     _check_names(model)
@@ -284,11 +313,11 @@ def _named_once(model: FlatModel) -> tuple[list[Variable], list[Variable]]:
     return kept["output"], kept["signal"]
 
 
-def _probes(model: FlatModel, points: int = 5) -> dict[str, NDArray[np.float64]]:
+def _probes(model: FlatModel, points: int = 5) -> dict[str, Array]:
     """Return states, inputs, outputs and signals at several points, to find equal ones."""
     generator = np.random.default_rng(1)
     parameters = model.start(model.parameters)
-    samples: dict[str, list[NDArray[np.float64]]] = {"state": [], "input": [], "output": [], "signal": []}
+    samples: dict[str, list[Array]] = {"state": [], "input": [], "output": [], "signal": []}
     for _ in range(points):
         x, u = (_around(group, generator) for group in (model.states, model.inputs))
         _, y, s, _ = model.equations(0.0, x, u, parameters, model.look_up(x.tolist(), u.tolist()))
@@ -297,7 +326,7 @@ def _probes(model: FlatModel, points: int = 5) -> dict[str, NDArray[np.float64]]
     return {kind: np.array(values).T for kind, values in samples.items()}
 
 
-def _around(group: Sequence[Variable], generator: np.random.Generator) -> NDArray[np.float64]:
+def _around(group: Sequence[Variable], generator: np.random.Generator) -> Array:
     values = [v.start + 0.3 * v.nominal * generator.uniform(-1, 1) for v in group]
     limits = [(v.minimum, v.maximum) for v in group]
     return np.array(

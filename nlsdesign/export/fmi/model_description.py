@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from xml.etree import ElementTree
 
-from ...locations import version as own_version
-from ...quantity import BASE, parse_unit
+from ...foundation.locations import version as own_version
+from ...foundation.quantity import BASE, parse_unit
 from ..c.c_text import identifier
 from .authorship import Authorship, described
 from .dependencies import FmiUnknown, ModelStructure, model_structure
@@ -29,18 +29,7 @@ def model_description(
 ) -> str:
     """Return ``modelDescription.xml``.
 
-    Parameters
-    ----------
-    layout
-        Variables of the FMU.
-    version
-        ``"2.0"`` or ``"3.0"``.
-    token
-        Instantiation token or GUID.
-    step
-        Communication step of the default experiment in s.
-    authorship
-        Author, licence and date; nothing but the licence of the shells by default.
+    ``authorship``: author, licence and date; nothing but the licence of the shells by default.
     """
     model, two = layout.model, version == "2.0"
     root = _element(
@@ -84,13 +73,7 @@ def model_description(
 
 
 def build_description(layout: FmuLayout) -> str:
-    """Return ``sources/buildDescription.xml`` of FMI 3.0.
-
-    Parameters
-    ----------
-    layout
-        Variables of the FMU.
-    """
+    """Return ``sources/buildDescription.xml`` of FMI 3.0."""
     root = _element(None, "fmiBuildDescription", fmiVersion="3.0")
     configuration = _element(root, "BuildConfiguration", modelIdentifier=identifier(layout.model.name))
     files = _element(configuration, "SourceFileSet", language="C99")
@@ -99,13 +82,7 @@ def build_description(layout: FmuLayout) -> str:
 
 
 def terminals_and_icons(layout: FmuLayout) -> str:
-    """Return ``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: icon and terminals with their places.
-
-    Parameters
-    ----------
-    layout
-        Variables of the FMU.
-    """
+    """Return ``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: icon and terminals with their places."""
     root = _element(None, "fmiTerminalsAndIcons", fmiVersion="3.0")
     picture = ElementTree.SubElement(root, "GraphicalRepresentation")
     corners = {"x1": -100.0, "y1": -100.0, "x2": 100.0, "y2": 100.0}
@@ -196,10 +173,7 @@ def _units(root: ElementTree.Element, layout: FmuLayout) -> None:
 def display_unit(unit: str) -> str | None:
     """Return the unit in which a value is shown, or ``None`` for its own.
 
-    Parameters
-    ----------
-    unit
-        SI unit; angles are shown in degrees.
+    ``unit``: SI unit; angles are shown in degrees.
     """
     return _SHOWN.get(parse_unit(unit).exponents)
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...errors import ValueRangeError
+from ...foundation.arrays import Array
+from ...foundation.errors import ValueRangeError
 from ...model.flat import FlatModel
 from ...simulation import simulate
 from ..c.guarded_step import GuardedModel
@@ -28,7 +28,6 @@ RELATIVE_TOLERANCE = 1e-6
 """Of a comparison, relative to the range of a variable; the FMUs keep it with room to spare."""
 
 _TOLERANCE = 1e-12  # of the simulation, so that its own error does not show
-Table = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +44,11 @@ class ReferenceResults:
         Results at the communication points, shape (n, results).
     """
 
-    time: Table
+    time: Array
     input_names: tuple[str, ...]
-    inputs: Table
+    inputs: Array
     result_names: tuple[str, ...]
-    results: Table
+    results: Array
 
 
 def reference_results(model: FlatModel, *, step: float | None = None) -> ReferenceResults:
@@ -58,19 +57,7 @@ def reference_results(model: FlatModel, *, step: float | None = None) -> Referen
     Each input swings by a quarter of its typical size about its start value, the first with two periods, the
     next with three and so on; the motion of a body that is moved from outside fits its rate.
 
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    step
-        Communication step in s; by default 1 ms, or the sample time, the only one for a discrete model.
-
-    Raises
-    ------
-    ValueRangeError
-        If the step is not positive, or not the sample time of a discrete model.
-    ConvergenceError
-        If the model cannot be simulated.
+    ``step``: communication step in s; by default 1 ms, or the sample time, the only one for a discrete model.
     """
     length = step if step is not None else (model.sample_time or 1e-3)
     if not (math.isfinite(length) and length > 0.0):
@@ -141,7 +128,7 @@ def write_reference(model: FlatModel, fmu: str | Path, *, step: float | None = N
     return tuple(texts)
 
 
-def _inputs(model: FlatModel, time: Table) -> Table:
+def _inputs(model: FlatModel, time: Array) -> Array:
     columns = {}
     for number, v in enumerate(model.inputs):
         turn = 2.0 * math.pi * (2 + number) * time / time[-1]
@@ -165,7 +152,7 @@ def _important(model: FlatModel) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))[:MOST_VARIABLES]
 
 
-def _continuous(model: FlatModel, time: Table, inputs: Table, names: Sequence[str]) -> Table:
+def _continuous(model: FlatModel, time: Array, inputs: Array, names: Sequence[str]) -> Array:
     drives = {v.name: inputs[:, i] for i, v in enumerate(model.inputs)}
     trace = simulate(model, time, inputs=drives, hold=True, tolerance=_TOLERANCE)
     states = np.array([trace[v.name] for v in model.states]).reshape(len(model.states), len(time)).T
@@ -180,7 +167,7 @@ def _continuous(model: FlatModel, time: Table, inputs: Table, names: Sequence[st
     return np.array(rows)
 
 
-def _sampled(model: FlatModel, inputs: Table, names: Sequence[str]) -> Table:
+def _sampled(model: FlatModel, inputs: Array, names: Sequence[str]) -> Array:
     """Return what is shown at communication points: the sample of the point before, at first the first."""
     running = GuardedModel(model)
     places = [[v.name for v in model.outputs].index(name) for name in names]
@@ -188,7 +175,7 @@ def _sampled(model: FlatModel, inputs: Table, names: Sequence[str]) -> Table:
     return np.array([samples[0], *samples], dtype=np.float64)[:, places]
 
 
-def _csv(time: Table, names: Sequence[str], values: Table) -> str:
+def _csv(time: Array, names: Sequence[str], values: Array) -> str:
     head = ",".join(f'"{name}"' for name in ("time", *names))
     rows = [",".join(repr(x) for x in row) for row in np.column_stack([time, values]).tolist()]
     return "\n".join([head, *rows]) + "\n"

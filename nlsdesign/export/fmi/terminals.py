@@ -24,17 +24,7 @@ _MODELICA = {
 
 @dataclass(frozen=True)
 class TerminalMember:
-    """One variable of a terminal.
-
-    Parameters
-    ----------
-    name
-        Within the terminal.
-    variable
-        Of the FMU.
-    kind
-        ``"signal"``, or ``"inflow"`` for what acts on the model from outside.
-    """
+    """One variable of a terminal."""
 
     name: str
     variable: str
@@ -43,21 +33,7 @@ class TerminalMember:
 
 @dataclass(frozen=True)
 class Terminal:
-    """Variables that are wired together.
-
-    Parameters
-    ----------
-    name, description
-        Of the terminal.
-    picture
-        :data:`LOOP` or :data:`FLANGE`.
-    rule
-        How members are matched, as FMI names it.
-    kind
-        What it can be attached to.
-    members
-        Its variables.
-    """
+    """Variables that are wired together."""
 
     name: str
     description: str
@@ -70,10 +46,7 @@ class Terminal:
 def flanges(model: FlatModel) -> tuple[Terminal, ...]:
     """Return the flanges of a plant: the bodies that a load acts on or that are moved from outside.
 
-    Parameters
-    ----------
-    model
-        Continuous; a sampled one has none.
+    ``model``: continuous; a sampled one has none.
     """
     return tuple(_flanges(model))
 
@@ -101,13 +74,7 @@ def _flange(name: str, domain: str, variables: tuple[str, str, str]) -> Terminal
 
 
 def terminals(model: FlatModel) -> tuple[Terminal, ...]:
-    """Return all terminals of the FMU of a model.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    """
+    """Return all terminals of the FMU of a model."""
     attached = flanges(model)
     taken = {member.variable for each in attached for member in each.members}
     outputs = [v.name for v in model.outputs if v.name not in taken]
@@ -131,13 +98,7 @@ def terminals(model: FlatModel) -> tuple[Terminal, ...]:
 
 
 def with_flange_outputs(model: FlatModel) -> FlatModel:
-    """Return a plant whose outputs include what its flanges give out: a local variable cannot be wired.
-
-    Parameters
-    ----------
-    model
-        Any.
-    """
+    """Return a plant whose outputs include what its flanges give out: a local variable cannot be wired."""
     known = {v.name for v in (*model.inputs, *model.outputs)}
     wanted = dict.fromkeys(m.variable for each in flanges(model) for m in each.members)
     missing = [name for name in wanted if name not in known]

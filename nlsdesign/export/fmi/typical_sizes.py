@@ -24,8 +24,8 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ...foundation.arrays import Array
 from ...model.flat import FlatModel, Variable
 from ...model.structure import SpringNames
 
@@ -33,13 +33,7 @@ Sizes = dict[str, float]
 
 
 def typical_sizes(model: FlatModel) -> Sizes:
-    """Return the typical size of each variable but the parameters, ``der(name)`` for derivatives, in SI.
-
-    Parameters
-    ----------
-    model
-        Continuous or discrete.
-    """
+    """Return the typical size of each variable but the parameters, ``der(name)`` for derivatives, in SI."""
     sizes = {v.name: size for v in (*model.states, *model.inputs) if (size := _stated(v))}
     if model.sample_time is None:
         _of_machine(model, sizes)
@@ -59,15 +53,7 @@ def typical_sizes(model: FlatModel) -> Sizes:
 
 
 def with_sizes(variables: Sequence[Variable], sizes: Mapping[str, float]) -> tuple[Variable, ...]:
-    """Return variables with these typical sizes.
-
-    Parameters
-    ----------
-    variables
-        Of the model.
-    sizes
-        By name.
-    """
+    """Return variables with these typical sizes."""
     return tuple(replace(v, nominal=sizes[v.name]) for v in variables)
 
 
@@ -136,7 +122,7 @@ def _inside(spring: SpringNames) -> list[str]:
     return names
 
 
-_Point = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Point = tuple[Array, Array]
 
 
 def _points(

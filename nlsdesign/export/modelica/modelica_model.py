@@ -1,22 +1,216 @@
-"""A continuous flat model as one Modelica file, for tools that read equations and not only FMUs."""
+"""A continuous flat model as one Modelica file, for tools that read equations and not only FMUs.
+
+In its equations values that are used more than once have a name.
+"""
 
 from __future__ import annotations
 
+import re
+import sys
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import casadi as ca
 
-from ...errors import ExportError
-from ...locations import version
+from ...foundation.errors import ExportError
+from ...foundation.locations import version
+from ...foundation.quantity import NOT_STATED, parse_unit
+from ...foundation.text_files import write_text
 from ...model import FlatModel, Variable
-from ...quantity import NOT_STATED
-from ...writing import write_text
+from ...model.graph import Instruction, read_graph
 from ..c.c_text import comment
 from ..c.provenance import origin_lines, stamped
-from .modelica_equations import ModelicaEquations, modelica_equations
-from .modelica_text import class_name, literal, modelica_unit, quoted_names, string
+from .modelica_terms import ATOM, SERIES, SIGNED, WRITTEN_TWICE, Term, kept, term
+
+LONGEST = 16
+"""Operations in one expression; a longer one gets a name of its own."""
+
+_RESULTS = ("derivative", "output", "signal")
+
+
+@dataclass
+class ModelicaEquations:
+    """Left and right sides, in the order of computation.
+
+    Parameters
+    ----------
+    definitions
+        Of variables: outputs, signals and common values, by their Modelica names.
+    derivatives
+        Of states, by their Modelica names.
+    common
+        Names of values that are used more than once and are nothing else.
+    """
+
+    definitions: dict[str, str] = field(default_factory=dict)
+    derivatives: dict[str, str] = field(default_factory=dict)
+    common: list[str] = field(default_factory=list)
+
+
+def modelica_equations(model: FlatModel, names: Mapping[str, str]) -> ModelicaEquations:
+    """Return the equations of a continuous model."""
+    steps, results, _ = read_graph(model.equations)
+    groups = (model.states, model.outputs, model.signals)
+    given = {v.name for group in (model.states, model.inputs, model.parameters) for v in group}
+    called: defaultdict[int, list[str]] = defaultdict(list)
+    for port, group in list(enumerate(groups))[1:]:
+        for index, variable in enumerate(group):
+            name = names[variable.name]
+            if variable.name not in given and name not in called[results[port, index]]:
+                called[results[port, index]].append(name)
+    wanted = {results[port, index] for port, group in enumerate(groups) for index in range(len(group))}
+    reader = _Reader(model, names, called, _uses(steps, wanted))
+    for number, step in enumerate(steps):
+        if reader.uses[number]:
+            reader.terms[number] = reader.read(number, step)
+    for index, state in enumerate(model.states):
+        reader.equations.derivatives[names[state.name]] = _right_side(reader.terms[results[0, index]])
+    return reader.equations
+
+
+def _uses(steps: Sequence[Instruction], wanted: set[int]) -> Counter[int]:
+    """Return how often the text of each value is needed; 0 for what only the residuals need."""
+    uses = Counter(wanted)
+    for number in range(len(steps) - 1, -1, -1):
+        if uses[number]:
+            weight = 2 if steps[number].operation in WRITTEN_TWICE else 1
+            for operand in steps[number].operands:
+                uses[operand] += weight
+    return uses
+
+
+def _right_side(value: Term) -> str:
+    number = value.as_number()
+    return f"noEvent({number.text})" if number.events else number.text
+
+
+@dataclass
+class _Reader:
+    """Runs through the instructions and turns each into Modelica."""
+
+    model: FlatModel
+    names: Mapping[str, str]
+    called: Mapping[int, list[str]]
+    uses: Counter[int]
+    equations: ModelicaEquations = field(default_factory=ModelicaEquations)
+    terms: dict[int, Term] = field(default_factory=dict)
+
+    def read(self, number: int, step: Instruction) -> Term:
+        """Return the value of an instruction as it is written where it is used."""
+        value = self._value(step)
+        names = list(self.called.get(number, []))
+        simple = value.size == 0
+        long = value.size > LONGEST or step.operation in SERIES
+        if not names and not simple and (self.uses[number] > 1 or long):
+            names = [f"v{len(self.equations.common) + 1}"]
+            self.equations.common += names
+        for name in names:
+            self.equations.definitions[name] = _right_side(value)
+            # The next name of the same value is defined by the first; constants stay as they are.
+            value = value if simple else kept(name, value)
+        return value
+
+    def _value(self, step: Instruction) -> Term:
+        if step.operation == ca.OP_CONST:
+            text = literal(step.extra)
+            return Term(text, SIGNED if text.startswith("-") else ATOM)
+        if step.operation == ca.OP_INPUT:
+            group = (self.model.states, self.model.inputs, self.model.parameters)
+            argument, element = step.extra
+            return Term("time" if argument == 0 else self.names[group[argument - 1][element].name])
+        return term(step.operation, [self.terms[i] for i in step.operands])
+
+
+_NOT_QUOTABLE = re.compile(r"[^A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~]")
+_KEYWORDS = frozenset(
+    keyword
+    for line in (
+        "algorithm and annotation block break class connect connector constant constrainedby der discrete",
+        "each else elseif elsewhen encapsulated end enumeration equation expandable extends external false",
+        "final flow for function if import impure in initial inner input loop model not operator or outer",
+        "output package parameter partial protected public pure record redeclare replaceable return stream",
+        "then true type when while within time",
+    )
+    for keyword in line.split()
+)
+
+
+def class_name(text: str) -> str:
+    """Return a plain Modelica identifier made from a name.
+
+    ``text``: any name; other characters become ``_``.
+    """
+    name = re.sub(r"[^A-Za-z0-9_]", "_", text) or "_"
+    if name[0].isdigit():
+        name = "_" + name
+    return name + "_" if name in _KEYWORDS else name
+
+
+def quoted_names(names: Iterable[str]) -> dict[str, str]:
+    """Return quoted Modelica identifiers, which may hold dots and brackets; different for different names.
+
+    Examples
+    --------
+    >>> quoted_names(["motor.angle"])
+    {'motor.angle': "'motor.angle'"}
+    """
+    quoted: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
+        plain = _NOT_QUOTABLE.sub("_", name)
+        number, other = 1, plain
+        while other in taken:
+            number, other = number + 1, f"{plain}_{number + 1}"
+        taken.add(other)
+        quoted[name] = f"'{other}'"
+    return quoted
+
+
+def literal(value: float) -> str:
+    """Return a number that reads back as the same number; an infinite one becomes the largest finite one."""
+    if value != value:
+        raise ExportError(
+            "the model", "contains the number NaN", next_step="correct the law or the start value behind it"
+        )
+    return repr(min(max(float(value), -sys.float_info.max), sys.float_info.max))
+
+
+def string(text: str) -> str:
+    """Return a Modelica string.
+
+    ``text``: any text; line breaks become spaces.
+    """
+    flat = " ".join(text.split())
+    # A last backslash is followed by a space, as not every tool sees that it is escaped itself.
+    flat += " " if flat.endswith("\\") else ""
+    return '"' + flat.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def modelica_unit(unit: str) -> str:
+    """Return a unit in the syntax of Modelica: dots for products, one slash, no sign of a power.
+
+    Examples
+    --------
+    >>> modelica_unit("N*m*s/rad"), modelica_unit("1/N/s"), modelica_unit("kg*m^2")
+    ('N.m.s/rad', '1/(N.s)', 'kg.m2')
+    """
+    parse_unit(unit)
+    above: list[str] = []
+    below: list[str] = []
+    place = above
+    for piece in re.split(r"([*·/])", unit.replace("Ω", "Ohm").replace(" ", "")):
+        if piece in ("*", "·", "/"):
+            place = below if piece == "/" else above
+        elif piece != "1":
+            place.append(piece.replace("^", ""))
+    if not below:
+        return ".".join(above) or "1"
+    denominator = ".".join(below)
+    return f"{'.'.join(above) or '1'}/{denominator if len(below) == 1 else f'({denominator})'}"
+
 
 _WIDTH = 110
 
@@ -61,18 +255,7 @@ def export_modelica(model: FlatModel, path: str | Path) -> Path:
 
 
 def modelica_text(model: FlatModel) -> str:
-    """Return a continuous model as Modelica text.
-
-    Parameters
-    ----------
-    model
-        Continuous and smooth.
-
-    Raises
-    ------
-    ExportError
-        If it is not, or uses an operation that Modelica does not have.
-    """
+    """Return a continuous model as Modelica text."""
     _refuse(model)
     groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
     names = quoted_names(v.name for group in groups for v in group)

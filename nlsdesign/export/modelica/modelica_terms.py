@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from ...errors import ExportError
+from ...foundation.errors import ExportError
+from ...model.graph import operation_name
 
 ATOM, POWER, PRODUCT, SUM, SIGNED, RELATION, AND, OR, CHOICE = range(8, -1, -1)
 """How strongly a text holds together; a sign is weaker than a sum, as ``a + -b`` is not allowed."""
@@ -44,13 +45,7 @@ class Term:
     number: str = ""
 
     def inside(self, least: int) -> str:
-        """Return the text, in brackets where it holds together less than is needed.
-
-        Parameters
-        ----------
-        least
-            Strength that is needed.
-        """
+        """Return the text, in brackets where it holds together less than is needed."""
         return self.text if self.strength >= least else f"({self.text})"
 
     def as_number(self) -> Term:
@@ -78,15 +73,7 @@ class Term:
 
 
 def kept(name: str, value: Term) -> Term:
-    """Return the term of a variable that holds a value, a truth value as 1 or 0.
-
-    Parameters
-    ----------
-    name
-        Of the variable.
-    value
-        That it holds.
-    """
+    """Return the term of a variable that holds a value, a truth value as 1 or 0."""
     if value.opposite is None:
         return Term(name)
     return Term(f"{name} > 0.5", RELATION, (f"{name} <= 0.5", RELATION), events=True, number=name)
@@ -99,7 +86,6 @@ _FUNCTIONS = {
     ca.OP_CEIL: "ceil", ca.OP_FMIN: "min", ca.OP_FMAX: "max", ca.OP_ATAN2: "atan2",
 }  # fmt: skip
 _WITH_EVENTS = frozenset([ca.OP_FLOOR, ca.OP_CEIL])
-_TWO_OPERANDS = frozenset([ca.OP_FMIN, ca.OP_FMAX, ca.OP_ATAN2])
 
 _SMALL = "0.01"
 # Near zero log(1 + x) and exp(x) - 1 lose digits; there the series is exact to 1e-17.
@@ -130,8 +116,6 @@ _ARITHMETIC: Mapping[int, Callable[..., tuple[str, int]]] = {
     ca.OP_LOG1P: _near_zero(_LOG_SERIES, "log(1.0 + {0})"),
     ca.OP_EXPM1: _near_zero(_EXP_SERIES, "exp({0}) - 1.0"),
 }
-_UNARY = frozenset([*_FUNCTIONS, ca.OP_ASSIGN, ca.OP_NEG, ca.OP_TWICE, ca.OP_INV, ca.OP_SQ, ca.OP_LOG1P,
-                    ca.OP_EXPM1, ca.OP_NOT]) - _TWO_OPERANDS  # fmt: skip
 
 # Real numbers are not compared for equality in equations of Modelica.
 _RELATIONS: Mapping[int, tuple[str, str]] = {
@@ -150,30 +134,16 @@ WRITTEN_TWICE = SERIES | {ca.OP_EQ, ca.OP_NE}
 
 
 def term(operation: int, operands: Sequence[Term]) -> Term:
-    """Return the text of an operation.
-
-    Parameters
-    ----------
-    operation
-        Code of CasADi.
-    operands
-        What it takes; CasADi names two also where there is one.
-
-    Raises
-    ------
-    ExportError
-        If Modelica has no such operation.
-    """
-    used = list(operands[:1] if operation in _UNARY else operands)
-    size = 1 + sum(each.size for each in used)
-    events = any(each.events for each in used) or operation in _WITH_EVENTS
+    """Return the text of an operation."""
+    size = 1 + sum(each.size for each in operands)
+    events = any(each.events for each in operands) or operation in _WITH_EVENTS
     if operation == ca.OP_NOT:
-        return replace(used[0].negated(), size=size)
+        return replace(operands[0].negated(), size=size)
     if operation in (ca.OP_AND, ca.OP_OR):
-        return replace(_joined(operation, used), size=size)
+        return replace(_joined(operation, operands), size=size)
     if operation == ca.OP_IF_ELSE_ZERO:
-        return _choice(used[0].as_truth(), used[1].as_number(), size)
-    numbers = [each.as_number() for each in used]
+        return _choice(operands[0].as_truth(), operands[1].as_number(), size)
+    numbers = [each.as_number() for each in operands]
     if operation in _RELATIONS:
         texts = [each.inside(SUM) for each in numbers]
         (yes, no), (strong, weak) = _RELATIONS[operation], _STRENGTHS[operation]
@@ -186,18 +156,12 @@ def term(operation: int, operands: Sequence[Term]) -> Term:
         )
     if operation not in _ARITHMETIC:
         raise ExportError(
-            f"the function '{_name(operation)}' in the equations",
+            f"the function '{operation_name(operation)}' in the equations",
             "has no counterpart in Modelica",
             next_step="export an FMU, which Modelica tools import: nlsdesign export fmu",
         )
     text, strength = _ARITHMETIC[operation](*numbers)
     return Term(text, strength, events=events or operation in SERIES, size=size)
-
-
-def _name(operation: int) -> str:
-    """Return what CasADi calls an operation."""
-    known = (name for name in vars(ca) if name.startswith("OP_") and getattr(ca, name) == operation)
-    return next(known, f"number {operation}").removeprefix("OP_").lower()
 
 
 def _joined(operation: int, operands: Sequence[Term]) -> Term:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from nlsdesign import Assembly, quantity, tie
-from nlsdesign.discrepancy.effects import Edit, Effect, Form, Unknown
-from nlsdesign.discrepancy.effects.places import turning_bodies
-from nlsdesign.discrepancy.effects.sizes import efforts_on
+from nlsdesign.bench.discrepancy.effects import Edit, Effect, Form, Unknown
+from nlsdesign.bench.discrepancy.effects.places import turning_bodies
+from nlsdesign.bench.discrepancy.effects.sizes import efforts_on
 
 from .laws import WireBundle
 

@@ -13,7 +13,7 @@ from nlsdesign.components.core.element import Scope
 from nlsdesign.components.core.part import parameter
 from nlsdesign.components.core.springs import Elastic
 from nlsdesign.components.materials.hyperelastic import Hyperelastic
-from nlsdesign.symbolic import Expression
+from nlsdesign.foundation.symbolic import Expression
 
 
 @dataclass(frozen=True, kw_only=True)

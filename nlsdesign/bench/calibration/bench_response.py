@@ -1,0 +1,275 @@
+"""What a machine on the bench should show while it follows a measured motion, with exact derivatives.
+
+The motion drives everything: inner states of the rubber follow from it, every measured effort is compared
+with the model's, and the drive is held to the balance of efforts on it. So it does not matter who moves the
+machine, and nothing has to be integrated twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError
+from ...model import FlatModel
+from ...model.roles import driven_body
+from ...model.structure import MovingBody
+from ...simulation import Prior
+from .bench_test import WEIGHT
+
+BALANCE = "balance of the drive"
+
+
+class BenchCourse(NamedTuple):
+    """What is known of a run at evenly spaced times, arrays of shape (n,).
+
+    Parameters
+    ----------
+    step
+        Time between samples in s.
+    motion, rate
+        Of the driven body.
+    command
+        What drives it, for instance a current.
+    weight
+        Torque of a hung weight, positive against positive motion.
+    """
+
+    step: float
+    motion: Array
+    rate: Array
+    command: Array
+    weight: Array
+
+
+class Shown(NamedTuple):
+    """What the machine should show at each sample.
+
+    Parameters
+    ----------
+    value
+        Acceleration of the drive at the measured command, its derivative with respect to the command, and the
+        channels; shape (2 + channels, n).
+    slope
+        Over the factors, shape (2 + channels, n, factors).
+    by_motion
+        Derivative with respect to the motion, shape (2 + channels, n).
+    """
+
+    value: Array
+    slope: Array
+    by_motion: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BenchResponse:
+    """Functions of a machine on the bench over factors: the logarithms of its numbers over their values.
+
+    Parameters
+    ----------
+    model
+        Of the bench.
+    channels
+        Measured efforts that are compared with the model.
+    balanced
+        Whether the command is measured, and compared with what the motion needs.
+    factors
+        Names of the numbers that vary; of those that share one factor the first stands for all. Three follow
+        for the instruments: zero of the motion, offset of the command, factor of the weight.
+    inner
+        Names of the states that the motion drives.
+    inertia
+        Which turns acceleration into effort, SI.
+    """
+
+    model: FlatModel
+    channels: tuple[str, ...]
+    balanced: bool
+    factors: tuple[str, ...]
+    inner: tuple[str, ...]
+    inertia: float
+    _rest: ca.Function
+    _step: ca.Function
+    _shown: ca.Function
+    _mapped: dict[int, tuple[ca.Function, ca.Function]] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> int:
+        """Number of factors, those of the instruments included."""
+        return len(self.factors) + 3
+
+    def along(self, course: BenchCourse, x: Array) -> Shown:
+        """Return what the machine shows along a course."""
+        n, size, columns = len(course.motion), len(self.inner), self.columns
+        data = np.vstack([course.motion, course.rate, course.command, course.weight])
+        if n not in self._mapped:
+            carried = self._step.mapaccum("run", n - 1) if n > 1 else self._step
+            self._mapped[n] = carried, self._shown.map(n)
+        run, shown = self._mapped[n]
+        states, sensitivities = np.zeros((size, n)), np.zeros((n, size, columns))
+        if size:
+            first = self._at_rest(data[:, 0], x)
+            everywhere = np.tile(x[:, None], (1, n - 1))
+            pace = np.full((1, n - 1), course.step)
+            rows = first[:, None]
+            if n > 1:
+                later = run(first, data[:, :-1], data[:, 1:], pace, everywhere).full()
+                rows = np.hstack([rows, later])
+            states = rows[:size]
+            sensitivities = rows[size:].T.reshape(n, columns, size).transpose(0, 2, 1)
+        results = shown(states, data, np.tile(x[:, None], (1, n)))
+        value, by_x, by_inner, by_motion = (r.full() for r in results)
+        count = 2 + len(self.channels)
+        slope = by_x.reshape(count, n, columns)
+        if size:
+            slope = slope + np.einsum("cns,nsk->cnk", by_inner.reshape(count, n, size), sensitivities)
+        return Shown(value, slope, by_motion)
+
+    def resting(self, motion: float, x: Array) -> Shown:
+        """Return what the machine shows at rest, as :meth:`along` does; shapes (2 + channels, 1)."""
+        still = np.zeros(1)
+        return self.along(BenchCourse(1.0, still + motion, still, still, still), x)
+
+    def _at_rest(self, data: Array, x: Array) -> Array:
+        """Return inner states and their slopes where the machine has rested; as declared if it never does."""
+        size, columns = len(self.inner), self.columns
+        z = np.array([self.model.variable(name).start for name in self.inner])
+        resting = np.array([data[0], 0.0, data[2], data[3]])
+        slope = np.zeros((size, columns))
+        for _ in range(20):
+            rate, by_z, by_x = (r.full() for r in self._rest(z, resting, x))
+            if not np.all(np.isfinite(by_z)) or np.linalg.cond(by_z) > 1e12:
+                break  # a state without a place of rest, such as a history, begins as declared
+            change = np.linalg.solve(by_z, rate.ravel())
+            z, slope = z - change, -np.linalg.solve(by_z, by_x)
+            if np.max(np.abs(change)) <= 1e-12 * (1.0 + np.max(np.abs(z))):
+                break
+        return np.concatenate([z, slope.T.ravel()])
+
+
+def bench_response(
+    model: FlatModel, prior: Prior, channels: Sequence[str], *, balanced: bool = True
+) -> BenchResponse:
+    """Return the functions of a machine on the bench."""
+    body = driven_body(model)
+    if body.prescribed or body.inertia is None or len(body.drives) > 1:
+        raise ArrangementError(
+            f"body '{body.name}'",
+            "has no single drive whose effort could be calibrated",
+            next_step="declare a motor with a current, or a torque, as its one input",
+        )
+    others = [b for b in model.bodies if b.name != body.name and not b.prescribed]
+    if others:
+        raise ArrangementError(f"body '{others[0].name}'", "moves too", next_step="clamp it")
+    given = _expressions(model, body, prior)
+    by_command = ca.jacobian(given.acceleration, given.data[2])
+    shown = [given.acceleration, by_command, *(given.signals[c] for c in channels)]
+    return BenchResponse(
+        model,
+        tuple(channels),
+        balanced,
+        given.factors,
+        given.inner,
+        _inertia(model, body.inertia),
+        *_functions(given, ca.vertcat(*shown)),
+    )
+
+
+class _Expressions(NamedTuple):
+    """Expressions of a machine on the bench."""
+
+    factors: tuple[str, ...]
+    inner: tuple[str, ...]
+    x: ca.SX
+    z: ca.SX
+    data: ca.SX
+    flow: ca.SX
+    acceleration: ca.SX
+    signals: dict[str, ca.SX]
+
+
+def shared_factors(prior: Prior) -> dict[str, tuple[str, ...]]:
+    """Return the numbers that share one factor, by the first of them."""
+    size = prior.deviations
+    result: dict[str, list[str]] = {}
+    for k, name in enumerate(prior.names):
+        for first in result:
+            j = prior.place(first)
+            alike = abs(size[j] - size[k]) < 1e-9 * size[j]
+            if alike and prior.covariance[j, k] > (1.0 - 1e-9) * size[j] * size[k]:
+                result[first].append(name)
+                break
+        else:
+            result[name] = [name]
+    return {first: tuple(names) for first, names in result.items()}
+
+
+def _expressions(model: FlatModel, body: MovingBody, prior: Prior) -> _Expressions:
+    named = [v.name for v in model.states]
+    inner = tuple(n for n in named if n not in (body.motion, body.rate))
+    shapes = shared_factors(prior)
+    wide = ca.SX.sym("x", len(shapes) + 3)
+    data, z = ca.SX.sym("data", 4), ca.SX.sym("z", len(inner))
+    held = {body.motion: data[0] + wide[-3], body.rate: data[1], **{n: z[i] for i, n in enumerate(inner)}}
+    drive = body.drives[0] if body.drives else ""
+    commanded = [data[2] + wide[-2] if v.name == drive else ca.SX(v.start) for v in model.inputs]
+    factor = {name: wide[k] for k, names in enumerate(shapes.values()) for name in names}
+    numbers = [
+        data[3] * (1.0 + wide[-1])
+        if v.name == f"{WEIGHT}.load"
+        else v.start * ca.exp(factor.get(v.name, ca.SX(0)))
+        for v in model.parameters
+    ]
+    arguments = [ca.vertcat(*[held[n] for n in named]), ca.vertcat(*commanded), ca.vertcat(*numbers)]
+    inserted = [ca.SX(0), *arguments, ca.SX(0, 1)]
+    rates, _, signals, _ = model.equations.call(inserted)
+    everything = ca.vertcat(rates, signals)
+    acts = np.array(ca.DM(ca.jacobian_sparsity(everything, wide), 1).full().any(axis=0)).ravel()
+    kept = [k for k in range(len(shapes)) if acts[k]]
+    x = ca.SX.sym("x", len(kept) + 3)
+    place = {k: i for i, k in enumerate([*kept, *range(len(shapes), len(shapes) + 3)])}
+    narrow = ca.vertcat(*[x[place[k]] if k in place else ca.SX(0) for k in range(len(shapes) + 3)])
+    rates, signals, state = (ca.substitute(each, wide, narrow) for each in (rates, signals, inserted[1]))
+    return _Expressions(
+        tuple(list(shapes)[k] for k in kept),
+        inner,
+        x,
+        z,
+        data,
+        ca.vertcat(*[rates[named.index(n)] for n in inner]),
+        rates[named.index(body.rate)],
+        {v.name: state[i] for i, v in enumerate(model.states)}
+        | {v.name: signals[i] for i, v in enumerate(model.signals)},
+    )
+
+
+def _functions(given: _Expressions, shown: ca.SX) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Return rates at rest with slopes, the step of inner states with slopes, and channels with slopes."""
+    x, z, data, flow = given.x, given.z, given.data, given.flow
+    rest = ca.Function("rest", [z, data, x], [flow, ca.jacobian(flow, z), ca.jacobian(flow, x)])
+    later, pace = ca.SX.sym("later", 4), ca.SX.sym("pace")
+    then = ca.substitute([flow], [data], [later])[0]
+    size = z.numel()
+    # Linearly implicit trapezoidal rule: fast relaxation at a slow sample rate stays stable.
+    matrix = ca.SX.eye(size) - 0.5 * pace * ca.jacobian(then, z)
+    after = z + ca.solve(matrix, 0.5 * pace * (flow + then)) if size else z
+    slope = ca.SX.sym("slope", size, x.numel())
+    carried = ca.jacobian(after, z) @ slope + ca.jacobian(after, x)
+    step = ca.Function(
+        "step",
+        [ca.vertcat(z, ca.vec(slope)), data, later, pace, x],
+        [ca.vertcat(after, ca.vec(carried))],
+    )
+    derivatives = [ca.jacobian(shown, x), ca.jacobian(shown, z), ca.jacobian(shown, data[0])]
+    return rest, step, ca.Function("shown", [z, data, x], [shown, *derivatives])
+
+
+def _inertia(model: FlatModel, name: str) -> float:
+    if name in model.values:
+        return model.values[name]
+    return float(model.evaluate(model.start(model.states).tolist())[name])

@@ -1,0 +1,431 @@
+"""The whole chain: refit, locate, name, add, refit, judge on records that no fit has seen, abstain.
+
+Each hypothesis is fitted to the same records in the same way; what decides is how well it predicts records
+that its numbers were not fitted to, in units of the noise, by one rule (``docs/decision.md``). Records with
+the role ``held_out`` take no part: they are read once, when the verdict stands, for the error it reports.
+
+To understand why an effect was named, read on in ``selection/search.py``, what is tried and in which order,
+and in ``selection/criteria.py``, which decides.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from ...components import Assembly
+from ...components.assembly.deck_writer import write_deck
+from ...foundation.errors import ConvergenceError, MeasurementError
+from ...foundation.text_files import make_folder, write_text
+from ...model import flatten
+from ...model.derived_deck import derived
+from ..identification.equation_error.evidence import Bench
+from ..identification.least_squares import Fit
+from ..identification.records.measurement import RecordSet
+from .effects import Candidate
+from .effects import catalogue as known_effects
+from .effects.effect import EffectFunction
+from .fitting import Key
+from .planning.experiment import Experiment, next_experiment
+from .reporting.advice import advice, more_excitation, where_they_differ
+from .reporting.named_effect import EffectEvidence
+from .reporting.refit import Refit, sourced
+from .reporting.remainder import Remainder, remainder_of
+from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
+from .screening.causality import lagging_forces
+from .screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
+from .screening.wrong_numbers import (
+    is_explained_by_numbers,
+    other_numbers,
+    out_of_reach,
+    sentence_of,
+    with_numbers_let_go,
+    wrong_numbers,
+)
+from .selection.comparison import Comparison
+from .selection.criteria import CALIBRATION, Criteria, is_complete
+from .selection.hypothesis import Hypothesis, excesses
+from .selection.measures import DECLARED, Excess, Excesses, Standing, standing_of
+from .selection.search import Outcome, search, with_what_has_no_name
+from .selection.trials import Step
+from .tearing import blocks_of
+
+_CRITERIA = Criteria()
+_RUNNERS_UP, _MOST_ALIASES = 6, 3
+"""So many of each are shown; a longer list is not read."""
+_FAR, _MOST_FAR = 2.0, 4
+"""Standard deviations of its spread from which a refitted number is called by its name, and how many are."""
+
+
+@dataclass(frozen=True)
+class _Decision:
+    """The verdict in one word, and what makes the records suspect in sentences."""
+
+    verdict: Literal["none", "named", "unknown", "undecidable", "data_suspect"]
+    findings: tuple[str, ...] = ()
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+
+
+def diagnose(
+    actuator: Assembly,
+    records: RecordSet,
+    *,
+    catalogue: Sequence[EffectFunction] | None = None,
+    criteria: Criteria = _CRITERIA,
+    progress: Callable[[str], None] = _silent,
+) -> Verdict:
+    """Find out what a declared model lacks.
+
+    Parameters
+    ----------
+    actuator
+        As declared; the spreads of its numbers say how far a refit may move them.
+    records
+        Bench records with their roles.
+    catalogue
+        Effects to try; functions from an assembly to candidates. By default all, with those of packages that
+        the present block is extended by.
+    criteria
+        Numbers of the decision rule.
+    progress
+        Told what is being tried.
+
+    Returns
+    -------
+    Verdict
+        With the refitted, augmented assembly; the same for the same records.
+
+    Raises
+    ------
+    MeasurementError
+        If the records do not fit the model, or nothing moves enough to say anything.
+    ConvergenceError
+        If the declared model cannot be refitted.
+    """
+    progress("refitting the declared model")
+    chosen_by = records.without_held_out()
+    bench = Bench(chosen_by, blocks_of(flatten(actuator), records.signals))
+    case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)
+    base = case.comparison.base(actuator)
+    effects = known_effects() if catalogue is None else catalogue
+    outcome, decision = _decided(case, base, effects, progress)
+    progress("reading the held-out records")
+    return _verdict(case, base, outcome, decision, records)
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """What a decision rests on: the declared assembly, the records that choose, and the rule."""
+
+    actuator: Assembly
+    bench: Bench
+    comparison: Comparison
+    criteria: Criteria
+
+    def excesses(self, hypothesis: Hypothesis) -> Excesses:
+        """Return the excess of each block on all samples."""
+        return excesses(hypothesis, self.bench, self.criteria)
+
+
+def _decided(
+    case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+) -> tuple[Outcome, _Decision]:
+    records = case.bench.records
+    findings = [
+        *records.findings,
+        *out_of_reach(case.actuator, records),
+        *scale_findings(case.comparison, base),
+    ]
+    findings = findings or drive_findings(case.actuator, case.comparison, base)
+    lagging = lagging_forces(case.actuator, records)
+    if findings or (lagging.findings and not lagging.testable):
+        findings += lagging.findings
+        return Outcome(base), _Decision("data_suspect", tuple(str(f) for f in findings))
+    outcome = _searched(case, base, catalogue, progress)
+    if lagging.findings and not any(step.chosen.newest.explains_lag for step in outcome.steps):
+        return outcome, _Decision("data_suspect", tuple(str(f) for f in lagging.findings))
+    return outcome, _decision(case, base, outcome)
+
+
+def _searched(
+    case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+) -> Outcome:
+    """Search for effects, and for declared numbers that the records contradict."""
+    free = with_numbers_let_go(case.comparison, base, case.criteria)
+    closing = free if free and is_complete(case.excesses(free)) else None
+    if closing and len(wrong_numbers(closing)) == 1:
+        return Outcome(closing, complete=True)  # no effect has fewer numbers
+    outcome = search(case.comparison, base, catalogue, case.criteria, progress)
+    if closing and len(wrong_numbers(closing)) < len(outcome.last.unknowns):
+        return replace(outcome, last=closing, steps=(), complete=True)
+    progress("letting go declared numbers at the end of their ranges")
+    fewer = _with_fewer_effects(case, outcome)
+    if fewer is not None or outcome.complete or free is None:
+        return fewer or outcome
+    again = search(case.comparison, free, catalogue, case.criteria, progress)
+    # Effects beside a wrong number are named only where nothing is left to be explained by something else.
+    if again.complete and wrong_numbers(again.last):
+        return again
+    numbers = len(wrong_numbers(free)) <= len(outcome.last.unknowns) or not outcome.steps
+    explains = is_explained_by_numbers(
+        case.criteria, *(case.excesses(each) for each in (base, outcome.last, free))
+    )
+    return replace(outcome, last=free, steps=()) if numbers and explains else outcome
+
+
+def _with_fewer_effects(case: _Case, outcome: Outcome) -> Outcome | None:
+    """Return the first of the effects beside wrong numbers, if these leave nothing and need fewer numbers."""
+    for count, step in enumerate(outcome.steps, 1):
+        present = outcome.last if count == len(outcome.steps) else case.comparison.polished(step.chosen)
+        free = with_numbers_let_go(case.comparison, present, case.criteria)
+        if free is None or not is_complete(case.excesses(free)):
+            continue
+        if not outcome.complete or len(wrong_numbers(free)) < len(outcome.last.unknowns) - len(free.unknowns):
+            return replace(outcome, last=free, steps=outcome.steps[:count], complete=True)
+    return None
+
+
+def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
+    """Return what is missing, unless other numbers of the rig explain the records better."""
+    verdict: Literal["none", "named", "unknown", "undecidable"]
+    wrong = sentence_of(outcome.last)
+    if wrong and outcome.steps:
+        return _Decision("named", (wrong,))
+    if wrong and 2 * len(wrong_numbers(outcome.last)) < len(base.values):
+        return _Decision("data_suspect", (wrong,))
+    if wrong:
+        other = other_numbers(case.comparison, base, base, case.criteria)
+        return _Decision("data_suspect", (other.words if other.decides else wrong,))
+    if not any(e.open for e in case.excesses(base).values()):
+        verdict = "none"
+    else:
+        undecided = any(each.undecided for each in outcome.tried)
+        verdict = "named" if outcome.steps else "undecidable" if undecided else "unknown"
+    better = outcome.last if verdict == "named" else base
+    other = other_numbers(case.comparison, base, better, case.criteria)
+    return _Decision("data_suspect" if other.decides else verdict, (other.words,) if other.words else ())
+
+
+def _verdict(
+    case: _Case, base: Hypothesis, outcome: Outcome, decision: _Decision, records: RecordSet
+) -> Verdict:
+    verdict = decision.verdict
+    base = base.as_written()
+    better = outcome.last if verdict == "named" or outcome.last.released else base
+    steps = outcome.steps if verdict == "named" else ()
+    # No record is proposed for the values of a table that has no name.
+    known = tuple(better.as_written().fits.values())
+    if verdict in ("named", "unknown", "undecidable"):
+        better = with_what_has_no_name(case.comparison, better, case.criteria)
+    better = better.as_written()
+    before, after = case.excesses(base), case.excesses(better)
+    worst = _furthest([n for n in before if n != DECLARED], before)
+    unpredictable = [k for k in case.bench.floors if k in better.unpredictable]
+    # From here on, nothing is chosen any more.
+    every = Comparison(case.bench.with_records(records), case.comparison.sizes)
+    experiment = _experiment(case, base, outcome, decision)
+    return Verdict(
+        verdict,
+        tuple(_named(better, step, place, complete=is_complete(after)) for place, step in enumerate(steps)),
+        ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
+        + tuple(_not_predicted(key) for key in unpredictable)
+        + decision.findings,
+        gaps_of(base, better, every),
+        worst,
+        _runners_up(outcome, steps),
+        derived(sourced(better), case.actuator, "diagnosed"),
+        sourced(base),
+        course_of(base, better, every, worst),
+        tuple(text for fit in known for text in fit.unidentified()),
+        shapes_of(base, better, every, worst),
+        tuple(better.fits.values()),
+        _remainder(case.comparison, better, after) if verdict not in ("none", "data_suspect") else None,
+        (
+            *_next_steps(case.comparison, steps, known),
+            *((experiment.words(),) if experiment else ()),
+        ),
+        outcome.skipped,
+        complete=is_complete(after),
+        criteria=case.criteria,
+        remarks=tuple(dict.fromkeys(str(r) for r in (*records.remarks, *every.bench.records.remarks))),
+        unnamed=tuple(_unnamed(better, each) for each in better.added[len(steps) :]),
+        experiment=experiment,
+    )
+
+
+def _experiment(case: _Case, base: Hypothesis, outcome: Outcome, decision: _Decision) -> Experiment | None:
+    """Return the record that would tell apart what these records do not."""
+    rivals: tuple[Hypothesis, ...] = ()
+    if decision.verdict == "named":
+        unsure = next((step for step in outcome.steps if step.equals), None)
+        rivals = (unsure.chosen, *unsure.equals[:_MOST_ALIASES]) if unsure else ()
+    elif decision.verdict == "undecidable":
+        fitted = [each.hypothesis for each in outcome.tried if each.undecided]
+        rivals = (*fitted[:_MOST_ALIASES], *((base,) if len(fitted) < 2 else ()))
+    try:
+        return next_experiment(rivals, case.bench)
+    except (ConvergenceError, MeasurementError):
+        return None  # a record that cannot be commanded or predicted is none to propose
+
+
+def _furthest(names: Sequence[str], excesses: Excesses) -> str:
+    """Return the block that is furthest from its noise floor."""
+    return max(names, key=lambda name: excesses[name].mean_square)
+
+
+def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[Any, ...], ...]:
+    """Return what was tried first: identifier, share that it explains alone, and why it is not named."""
+    named = {step.effect for step in steps}
+    first = sorted(outcome.tried, key=lambda each: each.candidate.effect not in named)[:_RUNNERS_UP]
+    return tuple(
+        (each.candidate.effect, each.share, *(("; ".join(each.objections),) if each.objections else ()))
+        for each in sorted(first, key=lambda each: -each.share)
+    )
+
+
+def _remainder(comparison: Comparison, better: Hypothesis, after: Excesses) -> Remainder | None:
+    """Return what is left in the block that is furthest from its noise floor, if any is open."""
+    left = [n for n, e in after.items() if n != DECLARED and e.open]
+    if not left:
+        return None
+    worst, bench = _furthest(left, after), comparison.bench
+    judged = [j for j in comparison.judged(better) if j.block.name == worst]
+    return remainder_of(judged, bench.records, [s for s in bench.records.signals if bench.noise.rounded[s]])
+
+
+def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fit]) -> tuple[str, ...]:
+    """Return what to measure to tell apart what these records cannot."""
+    sentences: list[str] = []
+    for step in steps:
+        judged = comparison.judged(step.chosen) if step.equals else ()
+        differ = {
+            h.newest.effect: where_they_differ(judged, comparison.judged(h))
+            for h in step.equals[:_MOST_ALIASES]
+        }
+        sentences += advice(step.effect, differ)
+    return (*sentences, *more_excitation(fits))
+
+
+def _strained(before: Excess, after: Excess, better: Hypothesis) -> str:
+    scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
+    far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
+    which = f": {', '.join(f'{n} {abs(scores[n]):.1f} {_side(scores[n])}' for n in far)}" if far else ""
+    return (
+        f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
+        f"{after.fit:.1f} after{which}"
+    )
+
+
+def _side(score: float) -> str:
+    return "above" if score > 0.0 else "below"
+
+
+def _not_predicted(key: Key) -> str:
+    block, record = key
+    return (
+        f"{block}: record '{record}', the quickest, is not predicted: there a body that flies freely between "
+        "contacts may go another way. The effect is judged by the other records."
+    )
+
+
+def _numbers(last: Hypothesis, candidate: Candidate) -> dict[str, tuple[float, str, float]]:
+    own = {u.name for u in candidate.unknowns}
+    return {
+        p.name: (last.values[p.name], p.unit, fit.standard_error(p.name))
+        for fit in last.fits.values()
+        for p in fit.parameters
+        if p.name in own
+    }
+
+
+def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
+    return NamedEffect(
+        candidate.effect,
+        candidate.location,
+        _numbers(last, candidate),
+        (),
+        math.nan,
+        candidate.signature,
+        candidate.source,
+    )
+
+
+def _named(last: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
+    # Later edits may have put the same number under a longer name: the last hypothesis knows.
+    candidate = last.added[place]
+    return NamedEffect(
+        candidate.effect,
+        candidate.location,
+        _numbers(last, candidate),
+        tuple(h.newest.effect for h in step.equals),
+        step.share,
+        candidate.signature,
+        candidate.source,
+        probability=CALIBRATION.probability(step.distance, complete=complete) / (1 + len(step.equals)),
+        evidence=_evidence(step, standing_of(candidate.unknowns, last.fits.values())),
+    )
+
+
+def _evidence(step: Step, standing: Standing) -> EffectEvidence:
+    # Half the gain in effective squares of the noise is the gain in predictive log density.
+    deciding = [n.name for n in standing.numbers if n.decides]
+    worst = min(step.gains, key=lambda record: step.gains[record], default="")
+    return EffectEvidence(
+        0.5 * step.gain.value,
+        0.5 * step.gain.error,
+        deciding[0] if deciding else "",
+        standing.exclusion if deciding else math.nan,
+        worst,
+        0.5 * step.gains[worst] if worst else math.nan,
+        next_leaves=math.exp(step.distance),
+    )
+
+
+class _Written(Protocol):
+    """What is written as a JSON file beside the deck it ends with."""
+
+    @property
+    def actuator(self) -> Assembly: ...
+
+    def to_dict(self, model: str) -> Mapping[str, Any]: ...
+
+
+def write_verdict(verdict: Verdict, folder: Path) -> list[Path]:
+    """Write ``verdict.json`` and the deck of the better model, ``model.toml``.
+
+    Parameters
+    ----------
+    verdict
+        Of a diagnosis.
+    folder
+        Is made where it does not exist.
+    """
+    return _write(verdict, folder, "verdict.json")
+
+
+def write_refit(refit: Refit, folder: Path) -> list[Path]:
+    """Write ``fit.json`` and the deck with the fitted numbers, ``model.toml``.
+
+    Parameters
+    ----------
+    refit
+        Of the declared numbers.
+    folder
+        Is made where it does not exist.
+    """
+    return _write(refit, folder, "fit.json")
+
+
+def _write(result: _Written, folder: Path, name: str) -> list[Path]:
+    deck, file = folder / "model.toml", folder / name
+    make_folder(folder)
+    write_deck(result.actuator, deck)
+    write_text(file, json.dumps(result.to_dict(str(deck)), indent=2, ensure_ascii=False) + "\n")
+    return [file, deck]

@@ -1,0 +1,281 @@
+"""Effects of the drivetrain beside friction: ripple, backlash, a shaft that twists, a constant force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ....components import (
+    ROTATION,
+    Assembly,
+    Backlash,
+    ConstantLoad,
+    Dashpot,
+    GravityLoad,
+    HorizontalTorque,
+    Inertia,
+    Inertial,
+    Rounded,
+    Spring,
+    Tie,
+    TorqueRipple,
+    parallel,
+    tie,
+)
+from ....components.mechanics.bodies import Free
+from ....foundation.quantity import Quantity
+from ..fitting import Continuation, Plain
+from .effect import Edit, Effect, Form, Unknown, free_name, number, wrapped
+from .friction import tied
+from .places import (
+    domain_of,
+    restoring_ties,
+    sliding_bodies,
+    turning_bodies,
+    turns_per_turn,
+    wrapping,
+)
+from .sizes import QUICKEST, efforts_on
+
+_ORDERS = (*range(1, 37), *range(38, 121, 2))
+"""Periods per turn where fits begin; a start between two of them is reached from either."""
+_OF_A_MOTOR = (1, 2, 6, 7, 12, 14, 21, 24, 28, 42)
+"""Periods per turn of a motor: of its pole pairs, slots and what they have in common."""
+_SHARE_BEHIND = 0.2
+"""Part of an inertia that is put behind a shaft at first."""
+
+
+def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
+    law = TorqueRipple(sine=number(0.0, "N*m"), cosine=number(0.0, "N*m"), order=number(1.0, "1"))
+    edited, part = tied(assembly, "ripple", body, law)
+    torque = efforts_on(body)
+    shafts = (turns for turns in turns_per_turn(assembly, body) if turns != 1.0)
+    orders = sorted({float(n) for n in _ORDERS} | {turns * n for turns in shafts for n in _OF_A_MOTOR})
+    unknowns = (
+        Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, torque),
+        Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, torque),
+        Unknown(f"{part}.order", tuple(orders), 0.5 * orders[0], max(150.0, 1.2 * orders[-1]), null=None),
+    )
+    yield Edit(edited, unknowns)
+
+
+def _drivers(assembly: Assembly, name: str) -> list[str]:
+    """Return the bodies that turn freely at the ends of a tie, in the order in which it names them."""
+    part = assembly[name]
+    ends = part.between if isinstance(part, Tie) else ()
+    return [end for end in ends if isinstance(assembly[end], Free) and domain_of(assembly, end) == ROTATION]
+
+
+def _driven_springs(assembly: Assembly) -> list[str]:
+    return [name for name in restoring_ties(assembly) if _drivers(assembly, name)]
+
+
+def _without_shaft(assembly: Assembly) -> list[str]:
+    """Return the turning bodies that no spring ties to another body with a motion of its own."""
+    coupled = set()
+    for name in restoring_ties(assembly):
+        ends = _drivers(assembly, name)
+        coupled |= set(ends) if len(ends) > 1 else set()
+    return [body for body in turning_bodies(assembly) if body not in coupled]
+
+
+def _rigidly_driven_springs(assembly: Assembly) -> list[str]:
+    bodies = _without_shaft(assembly)
+    return [name for name in _driven_springs(assembly) if _drivers(assembly, name)[0] in bodies]
+
+
+def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Put part of the inertia behind backlash.
+
+    Where the body's inertia is declared as a whole, a tenth of it is put behind at first, and its spread
+    allows for any share up to a third.
+    """
+    driver = _drivers(assembly, name)[0]
+    whole = assembly.quantities()[f"{driver}.inertia"]
+    own = _reduced(whole, 0.9, 0.15)
+    gap = number(0.01, "rad")
+    behind = Inertial(inertia=number(0.1 * whole.number, "kg*m^2"))
+    inertial = wrapping(Backlash, gap=gap, contact=behind)
+    edited = wrapped(assembly, name, "behind_backlash", inertial).with_values({f"{driver}.inertia": own})
+    unknowns = (
+        Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),
+        Unknown(f"{name}.inertia", (0.1 * whole.number,), 1e-3 * whole.number, whole.number, null=None),
+    )
+    # In slow motion the inertia behind the backlash hardly shows.
+    rounded = Rounded(width=number(5e-4, "rad"))
+    massless = wrapped(assembly, name, "behind_backlash", wrapping(Backlash, gap=gap, contact=rounded))
+    yield Edit(edited, unknowns, {"strategy": Continuation(through=massless)})
+
+
+def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
+    domain = domain_of(assembly, body)
+    load = ConstantLoad(load=number(0.0, domain.effort_unit), domain=domain)
+    edited, part = tied(assembly, "offset", body, load)
+    yield Edit(edited, (Unknown(f"{part}.load", (0.0,), -2.0, 2.0, efforts_on(body)),))
+
+
+def _gravity(assembly: Assembly, body: str) -> Iterator[Edit]:
+    weight = HorizontalTorque(horizontal_torque=number(0.01, "N*m"))
+    load = GravityLoad(weight=weight, hanging_angle=number(0.0, "rad"))
+    edited, part = tied(assembly, "weight", body, load)
+    unknowns = (
+        # A torque of either sign with two directions begins near any; the bounds overlap.
+        Unknown(f"{part}.horizontal_torque", (0.1,), -3.0, 3.0, efforts_on(body)),
+        Unknown(f"{part}.hanging_angle", (0.0, math.pi / 2.0), -5.0, 5.0, null=None),
+    )
+    yield Edit(edited, unknowns)
+
+
+def _reduced(whole: Quantity, share: float, spread: float) -> Quantity:
+    """Return what is left of an inertia of which a part is put elsewhere, with at least a spread."""
+    return replace(whole.with_value(share * whole.number, whole.source), spread=max(whole.spread, spread))
+
+
+def _shaft(
+    assembly: Assembly, behind: str, frequencies: tuple[float, ...]
+) -> tuple[Assembly, str, tuple[Unknown, ...]]:
+    """Return the assembly with a second inertia behind a shaft that twists, its name, and what is open.
+
+    Fits begin at natural frequencies that are given as multiples of that of the quickest motion.
+    """
+    name = f"{behind}.inertia"
+    inertia = assembly.quantities()[name]
+    second = _SHARE_BEHIND * inertia.number
+    body = free_name(assembly, "second_inertia")
+    edited = assembly.with_part(body, Inertia(inertia=number(second, "kg*m^2")))
+    shaft = free_name(edited, "shaft")
+    twist = parallel(
+        stiffness=Spring(stiffness=number(1.0, "N*m/rad")),
+        loss=Dashpot(damping=number(1e-3, "N*m*s/rad"), domain=ROTATION),
+    )
+    edited = edited.with_part(shaft, tie(twist, behind, body))
+    left = _reduced(inertia, 1.0 - _SHARE_BEHIND, 0.3)
+    edited = edited.with_values({name: left})
+    unknowns = (
+        Unknown(f"{body}.inertia", (second,), 1e-3 * second, 5.0 * second, null=None),
+        Unknown(
+            f"{shaft}.stiffness.stiffness",
+            tuple(second * omega**2 for omega in frequencies),
+            second * 0.1,
+            second * 1e4,
+            f"1 / {QUICKEST} / {QUICKEST}",
+            null=math.inf,
+        ),
+        Unknown(
+            f"{shaft}.loss.damping",
+            (0.2 * second,),
+            1e-5 * second,
+            50.0 * second,
+            f"1 / {QUICKEST}",
+            null=None,
+        ),
+    )
+    return edited, body, unknowns
+
+
+def _absorber(assembly: Assembly, body: str) -> Iterator[Edit]:
+    """Let a part of the inertia hang on a shaft; what acts on the body goes on acting on it."""
+    edited, _, unknowns = _shaft(assembly, body, (3.0, 8.0))
+    yield Edit(edited, unknowns)
+
+
+def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Put a shaft between a body and its load: the spring pulls at the second inertia from now on."""
+    part, driver = assembly[name], _drivers(assembly, name)[0]
+    assert isinstance(part, Tie)
+    edited, body, unknowns = _shaft(assembly, driver, (4.0,))
+    ends = tuple(body if end == driver else end for end in part.between)
+    yield Edit(
+        edited.with_part(name, replace(part, between=ends)), unknowns, {"strategy": Plain(takes_long=True)}
+    )
+
+
+torque_ripple = Effect(
+    "torque_ripple",
+    "A torque locked to the angle of a freely turning body, such as cogging; there may be several orders.",
+    50,
+    (
+        Form(
+            turning_bodies,
+            _ripple,
+            "a torque that repeats over the angle, the same forward and backward, at any speed",
+            "Hanselman 2003",
+        ),
+    ),
+)
+backlash = Effect(
+    "backlash",
+    "Backlash between a freely turning body and a spring tied to it, part of the inertia behind it.",
+    60,
+    (
+        Form(
+            _driven_springs,
+            _backlash,
+            "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
+            "Nordin and Gutman 2002",
+            "backlash",
+        ),
+    ),
+)
+drivetrain_resonance = Effect(
+    "drivetrain_resonance",
+    "A second inertia behind a shaft that twists, between a body and its load or beside it.",
+    175,
+    (
+        Form(
+            _rigidly_driven_springs,
+            _two_masses,
+            "an oscillation of its own frequency after each jolt, between drive and load",
+            "Hooke 1678; Leonhard 2001 (drives with an elastic shaft)",
+        ),
+        Form(
+            _without_shaft,
+            _absorber,
+            "an oscillation of its own frequency after each jolt of the drive",
+            "Hooke 1678; Leonhard 2001 (drives with an elastic shaft)",
+        ),
+    ),
+)
+constant_force = Effect(
+    "constant_force",
+    "A force that never changes on a freely sliding body: an offset of the drive, a weight.",
+    260,
+    (
+        Form(
+            sliding_bodies,
+            _constant,
+            "a force that is the same forward and backward, at any speed and place",
+            "Janot et al. 2019",
+            "constant load",
+        ),
+    ),
+)
+constant_torque = Effect(
+    "constant_torque",
+    "A torque that never changes on a freely turning body: an offset of the drive, a preloaded seal.",
+    75,
+    (
+        Form(
+            turning_bodies,
+            _constant,
+            "a torque that is the same forward and backward, at any speed and angle",
+            "Janot et al. 2019",
+            "constant load",
+        ),
+    ),
+)
+gravity_load = Effect(
+    "gravity_load",
+    "The weight of an arm on a body that turns in a vertical plane.",
+    77,
+    (
+        Form(
+            turning_bodies,
+            _gravity,
+            "a torque as the sine of the angle, once per turn, forward and backward alike",
+            "Newton 1687",
+            "gravity",
+        ),
+    ),
+)

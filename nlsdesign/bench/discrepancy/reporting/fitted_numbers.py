@@ -1,0 +1,102 @@
+"""Numbers after a fit: how well they are known, how far each has moved, and what their source says now."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ....components.assembly.named_parts import Assembly
+from ....foundation.quantity import to_resolution
+from ....model.derived_deck import named_by_content
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter
+from ..effects.effect import SOURCE
+
+
+class FittedNumber(NamedTuple):
+    """One refitted number.
+
+    Parameters
+    ----------
+    name, unit
+        Full name and SI unit.
+    declared, fitted, standard_error
+        In SI.
+    strain
+        How far it went, in declared ranges (spreads): 1 is the edge of what was declared, 2 where the fit
+        stops.
+    spread
+        Declared spread, one-sided and relative: 0.15 means ± 15 %.
+    """
+
+    name: str
+    unit: str
+    declared: float
+    fitted: float
+    standard_error: float
+    strain: float
+    spread: float = 0.0
+
+
+def fitted_numbers(fits: Sequence[Fit]) -> tuple[FittedNumber, ...]:
+    """Return the refitted numbers of which something was declared, in the order of the fits."""
+    return tuple(_number(fit, p) for fit in fits for p in fit.parameters if math.isfinite(p.sigma))
+
+
+def _number(fit: Fit, parameter: Parameter) -> FittedNumber:
+    value = fit.values[parameter.name]
+    moved = parameter.inward(value) - parameter.inward(parameter.centre)
+    # The prior of a range of half width w has the standard deviation w/√3.
+    width = math.sqrt(3.0) * parameter.sigma
+    error = fit.standard_error(parameter.name)
+    return FittedNumber(
+        parameter.name,
+        parameter.unit,
+        parameter.centre,
+        to_resolution(value, error),
+        error,
+        moved / width,
+        math.expm1(width) if parameter.scale == "log" else width,
+    )
+
+
+_SHOWN = 3
+_DECLARED = "; declared: "
+
+
+def with_records_named(assembly: Assembly, folder: str, names: Sequence[str], *, day: str) -> Assembly:
+    """Return a copy whose fitted numbers name in their source the records that they were fitted to.
+
+    Parameters
+    ----------
+    assembly
+        With numbers that a fit or a diagnosis has marked as fitted.
+    folder
+        Of the records.
+    names
+        Of the records that were fitted to.
+    day
+        Of the fit, ISO 8601.
+
+    Examples
+    --------
+    A number that was fitted in March and again in April is then, for instance, from
+    ``fitted to bench records sine_2Hz, hold in bench/april, 2026-04-20; declared: data sheet``.
+    """
+    shown = ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
+    sourced = {
+        name: number.with_value(number.value, _source(number.source, f"{shown} in {folder}, {day}"))
+        for name, number in assembly.quantities().items()
+        if number.source == SOURCE or number.source.startswith(f"{SOURCE};")
+    }
+    # Sources are a part of the content that names a derived deck.
+    return named_by_content(assembly.with_values(sourced))
+
+
+def _source(before: str, records: str) -> str:
+    rest = before.removeprefix(SOURCE)
+    if rest.startswith(_DECLARED):
+        # Of a number that was fitted before, what was declared at first says more than a chain of fits.
+        rest = _DECLARED + rest.split(_DECLARED)[-1]
+    return f"{SOURCE} {records}{rest}"

@@ -1,0 +1,131 @@
+"""A hypothesis about what is missing: an assembly with effects, fitted to records; what it leaves over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from ....components.assembly.named_parts import Assembly
+from ....foundation.quantity import to_resolution
+from ...identification.equation_error.evidence import Bench
+from ...identification.least_squares import Fit
+from ..effects.effect import Candidate, Unknown
+from ..fitting import Key, Tally, like_the_others
+from .criteria import Criteria
+from .measures import DECLARED, Excess
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """An assembly fitted to the records.
+
+    Parameters
+    ----------
+    assembly
+        With declared numbers, and the effects added so far.
+    added
+        The effects, in the order in which they were added.
+    values
+        Fitted numbers by name.
+    fits
+        One for each group of blocks that share parameters, by the names of the blocks.
+    tallies
+        What is left over by block and record; empty where nothing was fitted yet.
+    coarse
+        Whether it was fitted to thinned records only.
+    has_free_flight
+        Whether a body flies freely in it between contacts: one contact at the wrong moment, and the
+        prediction stays wrong for a while, however right the effect.
+    unpredictable
+        Blocks and records that such a body makes unpredictable; they count as the others do.
+    released
+        Declared numbers of which nothing is taken as known, because the records contradict their spread.
+    """
+
+    assembly: Assembly
+    added: tuple[Candidate, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
+    fits: Mapping[tuple[str, ...], Fit] = field(default_factory=dict)
+    tallies: Mapping[Key, Tally] = field(default_factory=dict)
+    coarse: bool = False
+    has_free_flight: bool = False
+    unpredictable: frozenset[Key] = frozenset()
+    released: frozenset[str] = frozenset()
+
+    @property
+    def newest(self) -> Candidate:
+        """The effect that was added last."""
+        return self.added[-1]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Identifiers of the effects."""
+        return tuple(c.effect for c in self.added)
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Numbers that the effects brought along."""
+        return tuple(u for c in self.added for u in c.unknowns)
+
+    @property
+    def prior(self) -> float:
+        """Sum of squared departures from declared numbers, in standard deviations of their spread."""
+        return float(sum(z**2 for f in self.fits.values() for z in f.prior_z_scores().values()))
+
+    @property
+    def expected_prior(self) -> float:
+        """What noise alone makes of that sum, if the rig is the declared one."""
+        return math.fsum(f.expected_prior_squares() for f in self.fits.values())
+
+    @property
+    def fitted(self) -> Assembly:
+        """The assembly with the fitted numbers."""
+        return self.assembly.with_values(self.values)
+
+    def as_written(self) -> Hypothesis:
+        """Return the hypothesis with each number rounded to a thousandth of its standard error.
+
+        So the deck that is written predicts what the verdict shows, on every processor.
+        """
+        errors = {p.name: fit.standard_error(p.name) for fit in self.fits.values() for p in fit.parameters}
+        return replace(self, values={n: to_resolution(v, errors.get(n, 0.0)) for n, v in self.values.items()})
+
+    def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
+        """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do."""
+        return replace(self, tallies=like_the_others(tallies, self.unpredictable))
+
+
+def excesses(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> dict[str, Excess]:
+    """Return the excess of each block, and of the declared numbers."""
+    names = dict.fromkeys(block for block, _ in hypothesis.tallies)
+    result = {name: _block_excess(hypothesis, bench, name, criteria) for name in names}
+    prior, count = hypothesis.prior, sum(len(f.prior_z_scores()) for f in hypothesis.fits.values())
+    # What scatters the residuals of an open block is not noise, and excuses no number.
+    closed = not any(each.open for each in result.values())
+    expected = hypothesis.expected_prior if closed else float(count)
+    typical, beyond = math.sqrt(prior / max(count, 1)), criteria.is_beyond_prior(prior, expected)
+    result[DECLARED] = Excess(
+        DECLARED, "1", 1.0, typical, typical, prior, count, float(max(count, 1)), beyond
+    )
+    return result
+
+
+def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Criteria) -> Excess:
+    tallies = {record: t for (b, record), t in hypothesis.tallies.items() if b == block}
+    rows = sum(t.rows for t in tallies.values())
+    effective = sum(t.effective_size for t in tallies.values())
+    fitted, predicted = sum(t.squares for t in tallies.values()), sum(t.predicted for t in tallies.values())
+    floor = bench.typical_floor(block)
+    return Excess(
+        block,
+        bench.units[block],
+        floor,
+        floor * math.sqrt(fitted / max(rows, 1)),
+        floor * math.sqrt(predicted / max(rows, 1)),
+        predicted,
+        rows,
+        effective,
+        criteria.is_beyond_noise(predicted / max(rows, 1), effective, bench.known_from(block)),
+        {record: t.segments or (t.squares,) for record, t in tallies.items()},
+    )

@@ -1,0 +1,230 @@
+"""What the rule compares: excess of blocks, gain in prediction, and what fitted numbers say of an effect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from ....foundation.arrays import Array
+from ...identification.least_squares import Fit
+from ...identification.parameters import Parameter, box
+from ..effects.effect import Unknown
+
+DECLARED = "declared numbers"
+"""Name of the block that stands for the declared numbers: refitted numbers should lie in their ranges."""
+
+
+@dataclass(frozen=True)
+class Excess:
+    """How far a block is from its noise floor.
+
+    Parameters
+    ----------
+    block
+        Name of the block, or :data:`DECLARED`.
+    unit
+        Of the residual.
+    floor
+        Noise floor, root mean square over the records, in the unit.
+    fit, predicted
+        Root mean square of the residual in the unit: as fitted, and with numbers from the other records.
+    chi2
+        Sum of squares of the latter in units of the floor.
+    rows, effective
+        EffectNumber of residuals, and of independent ones they are equivalent to.
+    open
+        Whether that is more than noise.
+    pieces
+        The sum of squares by record, for each piece of the record in time.
+    """
+
+    block: str
+    unit: str
+    floor: float
+    fit: float
+    predicted: float
+    chi2: float
+    rows: int
+    effective: float
+    open: bool
+    pieces: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def excess(self) -> float:
+        """Sum of squares beyond the floor."""
+        return max(0.0, self.chi2 - self.rows)
+
+    @property
+    def mean_square(self) -> float:
+        """Mean square in units of the floor."""
+        return self.chi2 / max(self.rows, 1)
+
+    @property
+    def colour(self) -> float:
+        """EffectNumber of residuals for each independent one."""
+        return max(1.0, self.rows / max(self.effective, 1.0))
+
+
+Excesses = Mapping[str, Excess]
+"""By name of the block."""
+
+
+class EffectNumber(NamedTuple):
+    """A fitted number of an effect.
+
+    Parameters
+    ----------
+    name
+        Full name.
+    distance
+        Departure from the value without effect, on a scale where that is finite; zero for a number that only
+        shapes the effect.
+    decides
+        Whether the effect vanishes with it.
+    error
+        Standard error on the fitted scale.
+    at_bound
+        Whether it stands at a bound of its search.
+    """
+
+    name: str
+    distance: float
+    decides: bool
+    error: float
+    at_bound: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What the fitted numbers of an effect say about its existence.
+
+    Parameters
+    ----------
+    numbers
+        Of the effect.
+    covariance
+        Of the numbers that decide, on the scale of their distance, shape (deciding, deciding).
+    """
+
+    numbers: tuple[EffectNumber, ...] = ()
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def exclusion(self) -> float:
+        """Standard errors by which "no effect" is excluded: of one normal number that is as improbable."""
+        distances = np.array([n.distance for n in self.numbers if n.decides])
+        if not len(distances):
+            return math.inf
+        statistic = float(distances @ np.linalg.solve(self.covariance, distances))
+        if len(distances) == 1 or statistic > 100.0:
+            return math.sqrt(max(statistic - len(distances) + 1.0, 0.0))
+        return float(norm.isf(0.5 * chi2.sf(statistic, len(distances))))
+
+
+def total_excess(excesses: Excesses) -> float:
+    """Return the sum of squares beyond the floor over all blocks."""
+    return sum(each.excess for each in excesses.values())
+
+
+def explained(before: Excesses, after: Excesses) -> dict[str, float]:
+    """Return the explained share of each open block's excess, as predicted."""
+    return {
+        name: 1.0 - after[name].excess / one.excess
+        for name, one in before.items()
+        if one.open and one.excess > 0
+    }
+
+
+class Gain(NamedTuple):
+    """Gain in prediction, in effective squares of the noise.
+
+    Parameters
+    ----------
+    value, error
+        Over all pieces of all records, and its standard error from their scatter.
+    rest
+        The same without the piece that gains most.
+    """
+
+    value: float
+    error: float
+    rest: float
+
+
+def gain(before: Excesses, after: Excesses) -> Gain:
+    """Return by how much predictions gain from one hypothesis to another, over all blocks."""
+    differences = np.concatenate(
+        [
+            np.subtract(pieces, after[name].pieces[record]) / max(one.colour, after[name].colour)
+            for name, one in before.items()
+            for record, pieces in one.pieces.items()
+        ]
+        or [np.zeros(0)]
+    )
+    count = len(differences)
+    scatter = float(np.sum((differences - differences.mean()) ** 2)) if count else 0.0
+    total, most = float(differences.sum()), float(differences.max()) if count else 0.0
+    return Gain(total, math.sqrt(scatter * count / max(count - 1, 1)), total - most)
+
+
+def gains_by_record(before: Excesses, after: Excesses) -> dict[str, float]:
+    """Return by how much the prediction of each record gains, in effective squares of the noise."""
+    gains: dict[str, float] = {}
+    for name, one in before.items():
+        for record, pieces in one.pieces.items():
+            gained = sum(pieces) - sum(after[name].pieces[record])
+            gains[record] = gains.get(record, 0.0) + gained / max(one.colour, after[name].colour)
+    return gains
+
+
+_CLOSE = 0.005
+"""Share of the range of a search within which a number stands at its bound."""
+
+
+def standing_of(unknowns: Sequence[Unknown], fits: Iterable[Fit]) -> Standing:
+    """Return distance from "no effect", errors and covariance of the numbers that an effect has brought."""
+    known = {u.name: u for u in unknowns}
+    for fit in fits:
+        places = [k for k, p in enumerate(fit.parameters) if p.name in known]
+        if places:
+            return _standing(known, fit, places)
+    return Standing()
+
+
+def _standing(known: dict[str, Unknown], fit: Fit, places: Sequence[int]) -> Standing:
+    low, high, _ = box(fit.parameters)
+    numbers, slopes, deciding = [], [], []
+    for k in places:
+        parameter = fit.parameters[k]
+        value, null = fit.values[parameter.name], known[parameter.name].null
+        distance, slope = _distance(parameter, value, null)
+        at = parameter.inward(value)
+        reach = _CLOSE * (high[k] - low[k]) if math.isfinite(low[k]) else 0.0
+        numbers.append(
+            EffectNumber(
+                parameter.name,
+                distance,
+                null is not None,
+                math.sqrt(fit.covariance[k, k]),
+                bool(at - low[k] <= reach or high[k] - at <= reach),
+            )
+        )
+        if null is not None:
+            deciding.append(k)
+            slopes.append(slope)
+    return Standing(tuple(numbers), fit.covariance[np.ix_(deciding, deciding)] * np.outer(slopes, slopes))
+
+
+def _distance(parameter: Parameter, value: float, null: float | None) -> tuple[float, float]:
+    """Return the departure from no effect, and its derivative with respect to the fitted number."""
+    if null is None:
+        return 0.0, 0.0
+    slope = parameter.slope(value)
+    if math.isinf(null):
+        return 1.0 / value, -slope / value**2
+    return value - null, slope

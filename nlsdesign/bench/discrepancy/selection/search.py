@@ -1,0 +1,378 @@
+"""The search for what is missing: effects are added while a block stays open, dropped when superfluous.
+
+What is tried, and in which order; :mod:`.trials` fits it, :mod:`.criteria` decides. What was added is looked
+at again: can it be dropped, is a richer form of it better, is a simpler one as good? Last comes what has no
+name: a smooth, passive table in place of an effect, if it predicts what it has not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from ....foundation.errors import ConvergenceError
+from ..effects.effect import Candidate, EffectFunction
+from ..effects.unnamed_tables import unnamed_part
+from .comparison import Comparison
+from .criteria import Change, Criteria, is_complete, lacking
+from .hypothesis import Hypothesis, excesses
+from .measures import explained, gain, gains_by_record, standing_of, total_excess
+from .trials import Skipped, Step, Trials, Tried, account, rival_of
+
+
+@dataclass(frozen=True, eq=False)
+class Revision:
+    """Builds steps anew from where they began, and keeps what the rule prefers."""
+
+    trials: Trials
+    start: Hypothesis
+    _fewer: dict[tuple[Step, ...], list[Step]] = field(default_factory=dict, repr=False)
+
+    def weighed(self, steps: list[Step]) -> list[Step]:
+        """Return the steps with what prediction gains by each effect beside all others that are named.
+
+        A step says what it gained when it was added. What was added later may have taken most of that over.
+        """
+        if len(steps) < 2:
+            return steps
+        every = self.trials.excesses_of(steps[-1].chosen)
+        weighed = list[Step]()
+        for place, step in enumerate(steps):
+            fewer = self._without(steps, place)
+            if fewer:
+                without = self.trials.excesses_of(fewer[-1].chosen)
+                step = replace(step, gain=gain(without, every), gains=gains_by_record(without, every))
+            weighed.append(step)
+        return weighed
+
+    def _without(self, steps: Sequence[Step], place: int) -> list[Step]:
+        """Return the steps anew without one of them; nothing if one of the others no longer fits."""
+        kept = tuple(step for k, step in enumerate(steps) if k != place)
+        if place == len(steps) - 1:
+            return list(kept)
+        if kept not in self._fewer:
+            self._fewer[kept] = self.rebuilt(kept)
+        return list(self._fewer[kept])
+
+    def backward(self, steps: list[Step]) -> list[Step]:
+        """Drop the effects that later ones have made superfluous, the first added first."""
+        place = 0
+        while len(steps) > 1 and place < len(steps) - 1:
+            self.trials.progress(f"trying without {steps[place].effect}")
+            fewer = self._without(steps, place)
+            if fewer and self._is_superfluous(fewer, steps):
+                steps = self.enriched(fewer)
+            else:
+                place += 1
+        return steps
+
+    def enriched(self, steps: list[Step]) -> list[Step]:
+        """Put a richer form of an effect in its place where it leaves much less.
+
+        A form of the same effect with more numbers is one too. Beside effects that were not named yet the
+        simpler form may have done.
+        """
+        if len(steps) < 2 or is_complete(self.trials.excesses_of(steps[-1].chosen)):
+            return steps
+
+        def is_better(richer: list[Step], now: list[Step]) -> bool:
+            words = objections_of_all(self.trials.criteria, richer[-1].chosen)
+            return not any(words) and not self._is_superfluous(now, richer)
+
+        return self._exchanged(steps, _is_richer, is_better)
+
+    def simplified(self, steps: list[Step]) -> list[Step]:
+        """Put a simpler form of an effect in its place where that predicts about as well.
+
+        Before the other effects were named, the richer form may have stood for a part of them.
+        """
+        if len(steps) < 2:
+            return steps
+        return self._exchanged(
+            steps,
+            lambda candidate, named: (
+                candidate.effect in named.simpler and candidate.location == named.location
+            ),
+            self._is_superfluous,
+        )
+
+    def _exchanged(
+        self,
+        steps: list[Step],
+        fits: Callable[[Candidate, Candidate], bool],
+        is_better: Callable[[list[Step], list[Step]], bool],
+    ) -> list[Step]:
+        """Try what fits in the place of each step, and keep it where it is better."""
+        for place in range(len(steps)):
+            before = steps[place - 1].chosen if place else self.start
+            for candidate in self.trials.candidates(before):
+                if fits(candidate, steps[place].chosen.newest):
+                    self.trials.progress(f"trying {candidate.effect} in place of {steps[place].effect}")
+                    other = self.rebuilt(steps, {place: candidate})
+                    if other and is_better(other, steps):
+                        steps = other
+        return steps
+
+    def _is_superfluous(self, without: list[Step], with_it: list[Step]) -> bool:
+        after = (self.trials.excesses_of(each[-1].chosen) for each in (without, with_it))
+        return Change(self.trials.criteria, *after).is_superfluous()
+
+    def rebuilt(self, steps: Sequence[Step], changed: Mapping[int, Candidate] | None = None) -> list[Step]:
+        """Return the steps anew, some perhaps changed; nothing if one of them no longer fits."""
+        present, rebuilt = self.start, list[Step]()
+        for place, step in enumerate(steps):
+            candidate = same_again(self.trials, present, (changed or {}).get(place, step.chosen.newest))
+            if candidate is None:
+                return []
+            try:
+                later = self.trials.comparison.with_effect(present, candidate)
+            except ConvergenceError:
+                return []  # who asks keeps its steps, or names nothing
+            if later is None:
+                return []
+            rival = rival_of(later, self.trials.excesses_of(later))
+            made = self.trials.made(self.trials.excesses_of(present), rival, step.block)
+            rebuilt.append(replace(made, distance=step.distance, equals=step.equals))
+            present = later
+        return rebuilt
+
+
+def same_again(trials: Trials, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
+    """Return the same form of an effect at the same kind of place of another assembly."""
+    same = [
+        c for c in trials.candidates(hypothesis) if c.effect == wanted.effect and _kinds(c) == _kinds(wanted)
+    ]
+    ends = [c for c in same if c.location.split(".")[-1] == wanted.location.split(".")[-1]]
+    return next(iter(ends or same), None)
+
+
+def objections_of_all(criteria: Criteria, last: Hypothesis) -> list[list[str]]:
+    """Return what the numbers of each effect have against it, all effects together."""
+    return [
+        criteria.objections_of_numbers(standing_of(each.unknowns, last.fits.values())) for each in last.added
+    ]
+
+
+def _kinds(candidate: Candidate) -> list[str]:
+    """Return what the numbers of a candidate are, wherever it stands: forms of one effect differ in that."""
+    return [unknown.name.rpartition(".")[2] for unknown in candidate.unknowns]
+
+
+def _is_richer(candidate: Candidate, named: Candidate) -> bool:
+    """Tell whether a candidate is a richer form of what is named, at its place."""
+    more = candidate.effect == named.effect and len(candidate.unknowns) > len(named.unknowns)
+    return (more or named.effect in candidate.simpler) and candidate.location == named.location
+
+
+_MOST_EFFECTS_IN_FREE_FLIGHT = 2
+"""Effects that are looked for where a body flies freely: a third takes minutes, and rests on less."""
+_LEADERS, _PARTNERS = 2, 6
+"""Where no effect may be named alone, each of so many of the best is tried together with others among so many
+of the best; these pairs take about as long as the catalogue did."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What the search ended with.
+
+    Parameters
+    ----------
+    last
+        Hypothesis with everything that may be named, fitted to all samples.
+    steps
+        One for each effect.
+    tried
+        What was tried first, the best first.
+    complete
+        Whether nothing is left beyond the noise.
+    skipped
+        What could not be compared, and why.
+    """
+
+    last: Hypothesis
+    steps: tuple[Step, ...] = ()
+    tried: tuple[Tried, ...] = ()
+    complete: bool = False
+    skipped: tuple[Skipped, ...] = ()
+
+
+def search(
+    comparison: Comparison,
+    base: Hypothesis,
+    catalogue: Sequence[EffectFunction],
+    criteria: Criteria,
+    progress: Callable[[str], None],
+) -> Outcome:
+    """Add effects to a hypothesis while a block stays open and one may be named."""
+    return _Search(Trials(comparison, catalogue, criteria, progress)).outcome(base)
+
+
+@dataclass(eq=False)
+class _Search:
+    """The order in which effects are added, dropped and exchanged."""
+
+    trials: Trials
+    tried: tuple[Tried, ...] = ()
+
+    def outcome(self, base: Hypothesis) -> Outcome:
+        start = self.trials.comparison.coarsely(base)
+        revision = Revision(self.trials, start)
+        # The order matters. What is dropped need not be simplified, and a simpler form can only be judged
+        # beside the effects that stay. Only then is it known what all of them leave, and whether a block
+        # with much left may have a name at all. Fits to all samples are the dearest, so they come after
+        # that. What each effect gains is asked of the final set, because dropping any other one changes it.
+        steps = revision.simplified(revision.backward(self._forward(start)))
+        steps = self._explaining(start, steps)
+        last = self._fitted_to_all(start, steps)
+        skipped = tuple(dict.fromkeys(self.trials.skipped))
+        if last is None:
+            return Outcome(base, (), self.tried, is_complete(self.trials.on_all(start)), skipped)
+        steps = revision.weighed(steps)
+        done = self.trials.excesses_of(last)
+        return Outcome(last, tuple(steps), self.tried, is_complete(done), skipped)
+
+    def _fitted_to_all(self, start: Hypothesis, steps: list[Step]) -> Hypothesis | None:
+        """Return the last hypothesis fitted to all samples, without effects whose numbers fail there."""
+        while steps:
+            self.trials.progress("fitting what was named to all samples")
+            last = self.trials.comparison.polished(steps[-1].chosen)
+            words = objections_of_all(self.trials.criteria, last)
+            if not any(words):
+                return last
+            for step, why in zip(steps, words, strict=True):
+                reason = f"on all samples {'; '.join(why)}"
+                added = step.chosen.newest
+                self.trials.skipped += [Skipped(added.effect, added.location, (), reason)] if why else []
+            kept = [step for step, why in zip(steps, words, strict=True) if not why]
+            steps[:] = Revision(self.trials, start).rebuilt(kept)
+        return None
+
+    def _explaining(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
+        """Drop the effects of blocks that stay unexplained: there they stand for something else.
+
+        Unless they stand out from all other names: then there is something else beside them.
+        """
+        if not steps:
+            return []
+        first, last = (self.trials.excesses_of(each) for each in (start, steps[-1].chosen))
+        left = Change(self.trials.criteria, first, last).unexplained()
+        kept = [s for s in steps if s.block not in left or self.trials.criteria.is_outstanding(s.distance)]
+        if len(kept) == len(steps):
+            return steps
+        shares, least = explained(first, last), self.trials.criteria.closed_share
+        why = {
+            (step.chosen.newest.effect, step.chosen.newest.location): (
+                f"all that was found leaves more of '{step.block}' than a name may: it explains "
+                f"{100.0 * shares[step.block]:.0f} % of the excess, less than {100.0 * least:.0f} %"
+            )
+            for step in steps
+            if step not in kept
+        }
+        self.tried = tuple(_with_objection(each, why) for each in self.tried)
+        return Revision(self.trials, start).rebuilt(kept)
+
+    def _forward(self, start: Hypothesis) -> list[Step]:
+        """Return the effects that may be named, one after the other."""
+        present, steps = start, list[Step]()
+        while len(steps) < self._most_effects(present):
+            open_blocks = self._lacking(start, present)
+            if not open_blocks:
+                break
+            tried: list[Hypothesis] = []
+            step = None
+            for block in open_blocks:
+                # Effects elsewhere wait for their turn: most blocks have an effect of their own.
+                far = self._is_far_from_closed(start, present, block)
+                tried += self.trials.tried_on(present, block, tried, far=far)
+                # What acts on several blocks was fitted when the first of them was looked at.
+                step = self.trials.step(present, tried, block)
+                if step is not None:
+                    break
+            self.tried = self.tried or account(self.trials, present, tried)
+            further = [step] if step else []
+            room = self._most_effects(present) - len(steps)
+            if room > 1 and not further and self._is_far_from_closed(start, present, open_blocks[0]):
+                further = self._pair(tried, present, open_blocks[0])
+            if not further:
+                break
+            # A richer form of what is named comes before one more name.
+            steps = Revision(self.trials, start).enriched(steps + further)
+            present = steps[-1].chosen
+        return steps
+
+    def _is_far_from_closed(self, start: Hypothesis, present: Hypothesis, block: str) -> bool:
+        """Tell whether what is left is worth a long search.
+
+        Beside an effect that was named, what little is left over is the inexactness of its form.
+        """
+        first, now = (self.trials.excesses_of(each)[block] for each in (start, present))
+        return not present.added or self.trials.criteria.is_far_from_closed(first, now)
+
+    def _most_effects(self, present: Hypothesis) -> int:
+        most = int(self.trials.criteria.most_effects)
+        return min(most, _MOST_EFFECTS_IN_FREE_FLIGHT) if present.has_free_flight else most
+
+    def _lacking(self, start: Hypothesis, present: Hypothesis) -> list[str]:
+        """Return the blocks in which all samples ask for a further effect."""
+        now = self.trials.on_all(present)
+        blocks = lacking(now)
+        if present.has_free_flight:
+            # Predictions are never exact there, and every further fit takes long.
+            shares = explained(self.trials.on_all(start), now)
+            blocks = [b for b in blocks if shares.get(b, 0.0) < self.trials.criteria.closed_share]
+        return blocks
+
+    def _pair(self, tried: Sequence[Hypothesis], present: Hypothesis, block: str) -> list[Step]:
+        """Return two effects that help together where none helps alone."""
+        best = self._best_of_each(tried)[:_PARTNERS]
+        tasks = [
+            (one, again)
+            for place, one in enumerate(best[:_LEADERS])
+            for other in best[place + 1 :]
+            if (again := same_again(self.trials, one, other.newest)) is not None
+        ]
+        before = self.trials.excesses_of(present)
+        fitted = {h: self.trials.excesses_of(h) for h in self.trials.fits(tasks)}
+        step = self.trials.sound(present, before, fitted, block)
+        if step is None:
+            return []
+        alone = next(h for h in best if h.newest.effect == step.chosen.added[-2].effect)
+        return [self.trials.made(before, rival_of(alone, self.trials.excesses_of(alone)), block), step]
+
+    def _best_of_each(self, tried: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return the best form and place of each effect, the best effect first."""
+        best: dict[str, Hypothesis] = {}
+        for each in sorted(tried, key=lambda h: total_excess(self.trials.excesses_of(h))):
+            best.setdefault(each.newest.effect, each)
+        return list(best.values())
+
+
+def _with_objection(tried: Tried, why: Mapping[tuple[str, str], str]) -> Tried:
+    """Return what was tried with the reason why its effect was dropped again, if it was."""
+    reason = why.get((tried.candidate.effect, tried.candidate.location))
+    return replace(tried, objections=(reason,)) if reason and not tried.objections else tried
+
+
+def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criteria: Criteria) -> Hypothesis:
+    """Return a hypothesis with a table for what each open block leaves over, where one predicts it.
+
+    The clauses are those of an effect that ask for prediction; no share is asked for, since nothing is named.
+    """
+    present = hypothesis
+    for block in lacking(excesses(hypothesis, comparison.bench, criteria)):
+        before = excesses(present, comparison.bench, criteria)
+        fit = next((f for names, f in present.fits.items() if block in names), None)
+        candidate = unnamed_part(present.assembly, fit, comparison.bench, block) if fit else None
+        if candidate is None:
+            continue
+        try:
+            tried = comparison.with_effect(present, candidate)
+        except ConvergenceError:
+            continue  # the block stays open, and the verdict says so as its remainder
+        if tried is None:
+            continue
+        after = excesses(tried, comparison.bench, criteria)
+        change = Change(criteria, before, after)
+        if change.is_more_than_noise and not change.records_made_worse():
+            present = tried
+    return present

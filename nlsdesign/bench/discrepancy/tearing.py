@@ -1,0 +1,545 @@
+"""A model cut at its measured signals into blocks that measurements alone drive; no effect is known here.
+
+A balance, inertia times acceleration less all efforts, can be made small by making all its factors small. An
+error of something that was measured cannot. So a balance is written as the error of a measured signal, times
+the *declared* effort per unit of that signal, a constant that no hypothesis can change:
+
+1. Where the drive is measured: the error of the drive. With e(u) what a drive of u gives at standstill and b
+   the balance, the model asks for the drive u + b/e'(u), to first order: its inverse along the tangent at the
+   measured point. So the error is b/e'(u). A drive that saturates gives less and asks for more: the flatter
+   it is, the larger its error. Where a drive is held at its limit there is no tangent; the straight line
+   from zero to the measured point stands for it. Where e is proportional to u the tangent is that in motion,
+   and the inverse exact: a gear with losses passes on another share of the drive in each direction.
+2. Where another effort on the body is measured: the balance as it is, for its reading enters there.
+3. Where motion alone is measured: the error of the acceleration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...foundation.arrays import Array
+from ...foundation.errors import MeasurementError
+from ...foundation.quantity import same_dimension
+from ...foundation.symbolic import Expression, depends
+from ...model import FlatModel, Variable
+from ...model.flat import Symbols
+from ...model.readings import ReadingNames, reading_of
+from ...model.structure import MovingBody, top_part
+from ...model.transform import cut, named, without_idle_states
+from ..identification.equation_error.block import Block, Drive
+
+MOTION, RATE, ACCELERATION = 0, 1, 2
+"""How often the motion of a body is derived to give what is measured."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured signal and what it stands for.
+
+    Parameters
+    ----------
+    reading
+        What it shows, through which sensors.
+    shown
+        Name of the variable that follows from it: a state or input, or the signal that is shown.
+    body
+        The body whose motion that is, ``None`` if it is none.
+    order
+        Of a motion: 0 for the motion itself, 1 for the rate, 2 for the acceleration.
+    """
+
+    reading: ReadingNames
+    shown: str
+    body: MovingBody | None = None
+    order: int = MOTION
+
+    @property
+    def signal(self) -> str:
+        """Name of what was measured."""
+        return self.reading.signal
+
+
+def measured_signals(model: FlatModel, signals: Sequence[str]) -> list[Measured]:
+    """Return what each measured signal stands for."""
+    return [_measured(model, signal) for signal in signals]
+
+
+def _measured(model: FlatModel, signal: str) -> Measured:
+    reading = reading_of(model.readings, signal)
+    shown = _variable_behind(model, reading.measured)
+    for body in model.bodies:
+        orders = (body.motion, body.rate, body.acceleration)
+        if shown in orders:
+            return Measured(reading, shown, body, orders.index(shown))
+    return Measured(reading, shown)
+
+
+def _variable_behind(model: FlatModel, name: str) -> str:
+    """Return the state or input that a signal follows from through a fixed ratio: an angle behind a gear."""
+    s = model.symbols()
+    known = {v.name: (v, s.signal[i]) for i, v in enumerate(model.signals)}
+    if name not in known:
+        return name
+    variable, value = known[name]
+    moving = [(v, s.state[i]) for i, v in enumerate(model.states)]
+    moving += [(v, s.input[i]) for i, v in enumerate(model.inputs)]
+    inside = [(v, symbol) for v, symbol in moving if depends(value, symbol)]
+    if len(inside) != 1 or not same_dimension(inside[0][0].unit, variable.unit):
+        return name
+    behind, symbol = inside[0]
+    everything = ca.vertcat(s.state, s.input, s.time)
+    return name if depends(ca.jacobian(value, symbol), everything) else behind.name
+
+
+def behind_ratio(measured: Measured, value: Expression, known: Mapping[str, Expression]) -> Expression:
+    """Return the variable that a measured value stands for, where a fixed ratio lies between."""
+    name = measured.reading.measured
+    if measured.shown == name:
+        return value
+    seen, symbol = known[name], known[measured.shown]
+    offset = ca.substitute(seen, symbol, ca.SX(0))
+    return (value - offset) / ca.jacobian(seen, symbol)
+
+
+_NEAR_ZERO = 1e-9
+"""Drive, in SI, below which the slope at zero stands for the straight line to the measured point."""
+_INSIDE = 0.999
+"""Share of the measured drive at which the tangent is taken."""
+_LEAST_SLOPE = 0.1
+"""Of that line, the least slope that is taken for a tangent: no error counts more than ten times."""
+
+
+class BalanceTerms(NamedTuple):
+    """A balance and what stands in it.
+
+    Parameters
+    ----------
+    balance
+        Inertia times acceleration less all efforts.
+    derivative, state
+        Of the states left in the block, columns.
+    readings
+        Symbols of all measured signals and their derivatives.
+    parameter, declared
+        Symbols and numbers.
+    """
+
+    balance: Expression
+    derivative: Expression
+    state: Expression
+    readings: Expression
+    parameter: Expression
+    declared: Array
+
+
+def scaled_balance(
+    terms: BalanceTerms, *, drives: Sequence[Expression], efforts: Sequence[Expression], inertia: Expression
+) -> tuple[Expression, float]:
+    """Return a balance in the scale of what was measured, and the declared effort per unit of that.
+
+    ``drives``: readings of what may drive the body; the first one that does is taken.
+    """
+    for reading in drives:
+        given = _effort_at_standstill(terms, reading)
+        slope = ca.substitute(ca.jacobian(given, reading), reading, ca.SX(0))
+        declared = _declared(terms, slope)
+        if declared == 0.0 or not np.isfinite(declared):
+            continue
+        tangent = ca.jacobian(given, reading)
+        if not depends(tangent, reading):
+            direct = depends(terms.balance, reading) and not _states_behind(terms, reading)
+            in_motion = -ca.jacobian(terms.balance, reading) if direct else slope
+            return terms.balance * (declared / in_motion), declared
+        tiny = _NEAR_ZERO**2
+        line = (given * reading + tiny * slope) / (reading * reading + tiny)
+        # A record of what a limit lets through stands on the limit itself: the slope is that just below it.
+        inside = ca.substitute(tangent, reading, _INSIDE * reading)
+        share = ca.fmax(inside / slope, _LEAST_SLOPE * line / slope)
+        share = ca.if_else(inside == 0, line / slope, share)
+        return terms.balance * (declared / (slope * share)), declared
+    if any(depends(terms.balance, reading) for reading in efforts):
+        return terms.balance, 1.0
+    declared = _declared(terms, inertia)
+    return terms.balance * (declared / inertia), declared
+
+
+def _effort_at_standstill(terms: BalanceTerms, reading: Expression) -> Expression:
+    """Return the effort that a constant drive gives in the end, while nothing moves.
+
+    States between the drive and its effort, of a delay or a winding, are taken where they rest.
+    """
+    behind = _states_behind(terms, reading)
+    others = [symbol for symbol in ca.vertsplit(terms.readings) if symbol.name() != reading.name()]
+    rest = ca.vertcat(*others, *[terms.state[i] for i in range(terms.state.numel()) if i not in behind])
+    still = [terms.balance, ca.vertcat(ca.SX(0, 1), *[terms.derivative[i] for i in behind])]
+    balance, rate = ca.substitute(still, [rest], [ca.SX.zeros(rest.shape)])
+    if behind:
+        inner = ca.vertcat(*[terms.state[i] for i in behind])
+        nowhere = ca.SX.zeros(inner.shape)
+        slope = ca.substitute(ca.jacobian(rate, inner), inner, nowhere)
+        start = ca.substitute(rate, inner, nowhere)
+        if bool(_singular(terms, ca.substitute(slope, reading, ca.SX(0)))):
+            return ca.SX(0)
+        balance = ca.substitute(balance, inner, -ca.solve(slope, start))
+    return ca.substitute(balance, reading, ca.SX(0)) - balance
+
+
+def _states_behind(terms: BalanceTerms, reading: Expression) -> list[int]:
+    """Return the states that a drive reaches."""
+    reached: list[int] = []
+    frontier: list[Expression] = [reading]
+    while frontier:
+        symbol = frontier.pop()
+        for i in range(terms.state.numel()):
+            if i not in reached and depends(terms.derivative[i], symbol):
+                reached.append(i)
+                frontier.append(terms.state[i])
+    return sorted(reached)
+
+
+def _declared(terms: BalanceTerms, value: Expression) -> float:
+    """Return a number that depends on parameters alone at their declared values."""
+    return float(ca.Function("declared", [terms.parameter], [value])(terms.declared))
+
+
+def _singular(terms: BalanceTerms, matrix: Expression) -> bool:
+    values = ca.Function("slope", [terms.parameter], [ca.densify(matrix)])(terms.declared).full()
+    return not np.all(np.isfinite(values)) or np.linalg.matrix_rank(values) < len(values)
+
+
+def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
+    """Cut a model at measured signals.
+
+    Every measured force or torque gives a block that predicts it from what else is measured; so does the
+    command of a controller, a current behind a measured voltage, and a motion that is measured twice. Every
+    body that moves freely and whose motion or rate is measured gives a block that balances the efforts on
+    it, with measured efforts in place of those that the model would predict. A block that would need a
+    command that is not measured is left out.
+
+    ``signals``: full names of measured signals; readings of sensors stand for what these read.
+    """
+    used = _sorted(model, measured_signals(model, signals))
+    drives, efforts = used.drives, used.efforts
+    opened = cut(model, [e.shown for e in efforts], keep=True) if efforts else model
+    acting = _acting(model, drives, efforts)
+    fed = cut(model, [e.shown for e in acting], keep=True) if acting else model
+    blocks = [_reading_block(fed, target, [*drives, *acting]) for target in (*efforts, *used.targets)]
+    blocks += [
+        _balance_block(opened, lead, used.accelerations.get(lead.body.name), [*drives, *efforts])
+        for lead in drives
+        if lead.body and not lead.body.prescribed
+    ]
+    unknown = _unknown_commands(model, used)
+    sound = _uniquely_named([block for block in blocks if _says_something(block, unknown)])
+    if not sound:
+        raise MeasurementError(
+            "records",
+            "measure no motion that drives the model, or nothing to compare it with",
+            next_step=_what_to_measure(model, drives, unknown, signals),
+        )
+    return sound
+
+
+class _Sorted(NamedTuple):
+    """Measured signals by what they are used for.
+
+    Parameters
+    ----------
+    drives
+        Motions, rates, commands and other inputs, inner states: they replace these variables.
+    efforts
+        Signals where the model is cut: predicted, and acting in place of the predicted ones elsewhere.
+    targets
+        Predicted only: what is measured twice, and what does not show a value.
+    accelerations
+        Measured accelerations by name of the body whose motion or rate is measured too.
+    """
+
+    drives: list[Measured]
+    efforts: list[Measured]
+    targets: list[Measured]
+    accelerations: dict[str, Measured]
+
+
+def _sorted(model: FlatModel, measured: Sequence[Measured]) -> _Sorted:
+    result = _Sorted([], [], [], {})
+    inputs, states = {v.name for v in model.inputs}, {v.name for v in model.states}
+    plain = sorted(measured, key=lambda m: m.order)  # the motion leads its rate
+    for each in plain:
+        names = {d.shown for d in (*result.drives, *result.efforts)}
+        body = each.body
+        led = body is not None and {body.motion, body.rate} & names
+        if not each.reading.shows_value or each.shown in names:
+            result.targets.append(each)
+        elif body is None and each.shown not in inputs | states:
+            result.efforts.append(each)
+        elif body is None:
+            result.drives.append(each)
+            result.targets.extend([each] if each.shown in states else [])
+        elif body.prescribed:
+            _check_place(model, body, each, names)
+            result.drives.append(each)
+        elif each.order == ACCELERATION and led and body.name not in result.accelerations:
+            result.accelerations[body.name] = each
+        elif each.order == ACCELERATION or led:
+            result.targets.append(each)
+        else:
+            result.drives.append(each)
+    return result
+
+
+def _check_place(model: FlatModel, body: MovingBody, each: Measured, names: Collection[str]) -> None:
+    """Refuse the rate of a prescribed motion without the motion, where efforts depend on the place."""
+    s = model.symbols()
+    place = [v.name for v in model.inputs].index(body.motion)
+    if each.order == RATE and body.motion not in names and depends(s.derivative, s.input[place]):
+        raise MeasurementError(
+            f"signal '{each.signal}'",
+            f"says how fast '{body.name}' moves, not where it is, and efforts depend on that",
+            next_step=f"measure '{body.motion}'",
+        )
+
+
+def _unknown_commands(model: FlatModel, measured: _Sorted) -> list[str]:
+    """Return the inputs that command a drive and are not measured: they need not have been zero."""
+    known = {m.shown for m in measured.drives}
+    inputs = {v.name for v in model.inputs}
+    wanted = (name for body in model.bodies for name in (*body.commands, *body.goals))
+    return [name for name in wanted if name in inputs - known]
+
+
+def _says_something(block: Block, unknown: Collection[str]) -> bool:
+    """Tell whether a block depends on something measured, and on no command that is not known."""
+    s, names = block.model.symbols(), [v.name for v in block.model.inputs]
+    together = ca.vertcat(s.output, s.derivative)
+    driving = [s.input[i] for i, name in enumerate(names) if name in block.drives]
+    hidden = [s.input[i] for i, name in enumerate(names) if name in unknown]
+    return any(depends(together, symbol) for symbol in driving) and not any(
+        depends(together, symbol) for symbol in hidden
+    )
+
+
+def _uniquely_named(blocks: Sequence[Block]) -> list[Block]:
+    """Return the blocks, those that predict a signal named after it where their part has several blocks."""
+    names = [block.name for block in blocks]
+    return [
+        replace(block, name=block.target) if block.target and names.count(block.name) > 1 else block
+        for block in blocks
+    ]
+
+
+def _what_to_measure(
+    model: FlatModel, drives: Sequence[Measured], unknown: Collection[str], signals: Sequence[str]
+) -> str:
+    free = [body for body in model.bodies if not body.prescribed]
+    led = {m.body.name for m in drives if m.body}
+    commands = [f"'{n}' (zeros where a winding is open)" for b in free if b.name in led for n in b.commands]
+    motions = [f"'{body.motion}' or '{body.rate}'" for body in free if body.name not in led]
+    wanted = [each for each in commands if unknown] + motions
+    example = wanted[0] if wanted else "an angle and a force"
+    return f"measure for instance {example}; measured are: {', '.join(signals)}"
+
+
+def _acting(model: FlatModel, drives: Sequence[Measured], efforts: Sequence[Measured]) -> list[Measured]:
+    """Return the measured efforts that may act on bodies inside a block that predicts one.
+
+    Where a measured effort acts on a body whose motion is not measured, and nothing else holds it, the body
+    would integrate the errors of the measurement; there the model's own effort acts.
+    """
+    acting, s = list(efforts), model.symbols()
+    states = [v.name for v in model.states]
+    led = {m.body.name for m in drives if m.body}
+    for body in model.bodies:
+        if body.prescribed or body.name in led or not acting:
+            continue
+        motion, rate = states.index(body.motion), states.index(body.rate)
+        fed = cut(model, [e.shown for e in acting], keep=True)
+        inside = fed.symbols()
+        closed = depends(s.derivative[rate], s.state[motion])
+        if closed and not depends(inside.derivative[rate], inside.state[motion]):
+            places = {v.name: inside.input[i] for i, v in enumerate(fed.inputs)}
+            acting = [e for e in acting if not depends(inside.derivative[rate], places[e.shown])]
+    return acting
+
+
+class _Result(NamedTuple):
+    """What a block gives out, and as what."""
+
+    part: str
+    variable: Variable
+    value: Expression
+    target: str | None
+    moving: str | None
+
+
+def _reading_block(model: FlatModel, target: Measured, given: Sequence[Measured]) -> Block:
+    """Return the block that predicts a measured signal."""
+    # Where an effort acts back on a body inside, the measured one acts; what is predicted does not.
+    s, inputs = model.symbols(), [v.name for v in model.inputs]
+    states = {v.name for v in model.states}
+    own_state = target.shown in states and target.body is None
+    given = [m for m in given if not (own_state and m.shown == target.shown)]
+    led = {name for each in given for name in _given(each)}
+    own = ca.vertcat(*[s.derivative[i] for i, v in enumerate(model.states) if v.name not in led])
+    torn = {v.name for v in model.signals} & set(inputs)
+    used = [m for m in given if m.shown not in torn or depends(own, s.input[inputs.index(m.shown)])]
+    signal = target.signal
+    values = named(model, s) | {v.name: s.signal[i] for i, v in enumerate(model.signals)}
+    tearing = _Tearing(model, s, used, signal)
+    part = top_part(target.shown)
+    return tearing.block(_Result(part, model.variable(signal), values[signal], signal, None))
+
+
+def _given(measured: Measured) -> tuple[str, ...]:
+    """Return the names of the variables that follow from a measured one."""
+    if measured.body and measured.order == MOTION:
+        return measured.shown, measured.body.rate
+    return (measured.shown,)
+
+
+def _balance_block(
+    model: FlatModel, lead: Measured, accelerated: Measured | None, given: Sequence[Measured]
+) -> Block:
+    """Return the block that balances the efforts on a body: inertia times acceleration less all of them."""
+    body = lead.body
+    assert body is not None
+    output = f"{body.name}.unbalanced"
+    s = model.symbols()
+    tearing = _Tearing(model, s, given, output)
+    inertia = named(model, s)[str(body.inertia)]
+    efforts = inertia * s.derivative[[v.name for v in model.states].index(body.rate)]
+    seen = tearing.inferred(accelerated, 0) if accelerated else tearing.inferred(lead, 2 - lead.order)
+    balance = inertia * seen - efforts
+    variable = Variable(output, body.domain.effort_unit, f"sum of all efforts on {body.name}")
+    moving = lead.signal if lead.order == RATE else f"{lead.signal}.rate"
+    return tearing.block(_Result(body.name, variable, balance, None, moving), body)
+
+
+class _Tearing:
+    """A model in which the measured variables are replaced by what their readings say of them."""
+
+    def __init__(self, model: FlatModel, s: Symbols, given: Sequence[Measured], output: str) -> None:
+        self._model, self._s, self._given, self._output = model, s, given, output
+        self._known = named(model, s)
+        self._drives: dict[str, Drive] = {}
+        self._inputs: dict[str, tuple[Variable, Expression]] = {}
+        self._replaced = dict(self._replacements())
+
+    def _reading(self, measured: Measured, order: int) -> Expression:
+        """Return the symbol of a reading or of one of its derivatives."""
+        signal = measured.reading.signal
+        # The same reading may be predicted and drive a body inside.
+        label = signal + ("", ".rate", ".acceleration")[order]
+        label += ".measured" if label == self._output else ""
+        if label not in self._inputs:
+            self._drives[label] = Drive(signal, order, measured.reading.delays, measured.reading.stretches)
+            self._inputs[label] = Variable(label, "", f"measured {signal}"), ca.SX.sym(label)
+        return self._inputs[label][1]
+
+    def inferred(self, measured: Measured, order: int) -> Expression:
+        """Return what the sensors must have seen, or its derivative of that order."""
+        seen = measured.reading.inferred(self._reading(measured, 0), self._known)
+        value = behind_ratio(measured, seen, self._known)
+        if order == 0:
+            return value
+        # A reading is a static function of what it reads, so rates follow by its slope.
+        return ca.jacobian(value, self._reading(measured, 0)) * self._reading(measured, order)
+
+    def _replacements(self) -> Iterator[tuple[str, Expression]]:
+        """Yield the variables of the model that follow from readings, with what they follow as."""
+        model, measured = self._model, {m.shown for m in self._given}
+        variables = {v.name for v in model.states + model.inputs}
+        for each in self._given:
+            yield each.shown, self.inferred(each, 0)
+            if each.body and each.order == MOTION and each.body.rate in variables - measured:
+                yield each.body.rate, self.inferred(each, 1)
+
+    def block(self, result: _Result, body: MovingBody | None = None) -> Block:
+        """Return the block of a result."""
+        model, s = self._model, self._s
+        kept = [i for i, v in enumerate(model.states) if v.name not in self._replaced]
+        # Where the model is cut, a signal and an input have one name: what is not fed by a reading is unused.
+        given = {*self._replaced, *(v.name for v in model.signals)}
+        resting = [i for i, v in enumerate(model.inputs) if v.name not in given]
+        # Signals with a stated range stay, so that a prediction can say where it is left.
+        bounded = [i for i, v in enumerate(model.signals) if v.bounded]
+        derivative, value, signal = self._in_readings(
+            [_column(s.derivative, kept), result.value, _column(s.signal, bounded)]
+        )
+        value, per_drive = self._scaled(value, derivative, kept, body)
+        driven = ca.vertcat(*[symbol for _, symbol in self._inputs.values()])
+        columns = [
+            s.time,
+            _column(s.state, kept),
+            ca.vertcat(driven, _column(s.input, resting)),
+            s.parameter,
+            s.table,
+        ]
+        rows = [ca.densify(derivative), value, signal, ca.SX(0, 1)]
+        torn = replace(
+            model,
+            equations=ca.Function("equations", [ca.SX(c) for c in columns], rows),
+            states=tuple(model.states[i] for i in kept),
+            signals=tuple(model.signals[i] for i in bounded),
+            outputs=(result.variable,),
+            inputs=(*[v for v, _ in self._inputs.values()], *[model.inputs[i] for i in resting]),
+        )
+        return Block(
+            name=result.part,
+            model=without_idle_states(torn, [result.variable.name]),
+            drives=self._drives,
+            output=result.variable.name,
+            target=result.target,
+            moving=result.moving,
+            effort_per_drive=per_drive,
+        )
+
+    def _in_readings(self, rows: list[Expression]) -> list[Expression]:
+        """Return expressions with the readings in place of the variables that they show."""
+        model, s = self._model, self._s
+        names = [v.name for v in (*model.states, *model.inputs)]
+        # An effort that was cut is an input and goes on as a signal: the input is what is replaced.
+        symbols = dict(zip(names, ca.vertsplit(ca.vertcat(s.state, s.input)), strict=True))
+        shown = ca.vertcat(*[symbols[name] for name in self._replaced])
+        replaced: list[Expression] = ca.substitute(rows, [shown], [ca.vertcat(*self._replaced.values())])
+        return replaced
+
+    def _scaled(
+        self, value: Expression, derivative: Expression, kept: Sequence[int], body: MovingBody | None
+    ) -> tuple[Expression, float]:
+        """Return a balance in the scale of what was measured, and the declared effort per unit of that."""
+        if body is None:
+            return value, 1.0
+        model, s = self._model, self._s
+        inputs = {v.name for v in model.inputs}
+        own = [m for m in self._given if m.shown in inputs and top_part(m.shown) in (body.name, *body.geared)]
+        commands = [m for m in own if m.shown not in body.goals]
+        # What a command has become, such as a current in a winding, before a load from outside: that may
+        # have been zero all the time, and then a balance in its scale could be made small.
+        became = {v.name for v in model.signals}
+        first = sorted(commands, key=lambda m: (m.shown not in body.commands, m.shown not in became))
+        readings = [symbol for _, symbol in self._inputs.values()]
+        efforts = [self._reading(m, 0) for m in self._given if not m.body and m.shown in inputs]
+        return scaled_balance(
+            BalanceTerms(
+                value,
+                derivative,
+                _column(s.state, kept),
+                ca.vertcat(*readings),
+                s.parameter,
+                model.start(model.parameters),
+            ),
+            drives=[self._reading(m, 0) for m in first],
+            efforts=efforts,
+            inertia=self._known[str(body.inertia)],
+        )
+
+
+def _column(rows: Expression, places: Sequence[int]) -> Expression:
+    return ca.SX(ca.vertcat(ca.SX(0, 1), *[rows[i] for i in places]))

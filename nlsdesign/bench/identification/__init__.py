@@ -1,0 +1,44 @@
+"""Measured records, their noise, and fits of a model's numbers to them.
+
+``records`` reads files; ``equation_error`` drives pieces of a model with what was measured; ``least_squares``
+fits their numbers, and ``multiple_shooting`` those of a whole simulation. ``discrepancy``, ``calibration``
+and the rooms above may import it. It never changes the structure of a model.
+"""
+
+from .least_squares import Huber, Loss, Squares
+from .multiple_shooting import (
+    Prediction,
+    SimulatedFit,
+    coloured_sigma,
+    fit_by_simulation,
+    predict_in_windows,
+)
+from .parameters import Parameter, declared_parameter, free_parameter
+from .records.measurement import ColumnMap, Record, RecordSet, load_record, load_records
+from .residuals import Agreement, agreement, noise_of, rmse
+from .simulation_error import Shots, Weights
+
+__all__ = [
+    "Agreement",
+    "ColumnMap",
+    "Huber",
+    "Loss",
+    "Parameter",
+    "Prediction",
+    "Record",
+    "RecordSet",
+    "Shots",
+    "SimulatedFit",
+    "Squares",
+    "Weights",
+    "agreement",
+    "coloured_sigma",
+    "declared_parameter",
+    "fit_by_simulation",
+    "free_parameter",
+    "load_record",
+    "load_records",
+    "noise_of",
+    "predict_in_windows",
+    "rmse",
+]

@@ -1,0 +1,152 @@
+"""How well fitted numbers are known: what the residuals scatter, not what the noise was taken to be.
+
+Residuals are coloured by filters, noise and what a model lacks. They are therefore grouped into segments of
+the records, longer than the residuals remember, and the gradients of the segments tell how far the numbers
+scatter (Liang and Zeger 1986), each as it would be if its segment had not been fitted (Bell and McCaffrey
+2002): H⁻¹·(Σ g·gᵀ + P)·H⁻¹, with the information H = JᵀJ + P, the part P of the priors in it, and for each
+segment s the gradient g = (1 − Hₛ·H⁻¹)⁻¹·Jₛᵀ·r.
+Nothing is taken as better known than residuals of that size and colour allow where they are independent of
+the slopes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...foundation.arrays import Array
+from .residuals import autocorrelation
+
+_SEGMENTS = 60
+"""Segments of all records together that are aimed at: enough for a variance to a fifth."""
+_LEAST_ROWS = 8
+_LEAST_INFORMATION = 1e-6
+"""Information on the fitted scale that is taken for granted, so that a covariance is never infinite."""
+_LEAST_STRENGTH = 1e-13
+"""Smallest eigenvalue of a correlation matrix that is more than rounding."""
+_OWN_SHARE = 0.98
+"""Share of the information that a segment may have on its own before it is left in: without it nothing would
+be known."""
+
+
+class Piece(NamedTuple):
+    """Residuals of one block on one record.
+
+    Parameters
+    ----------
+    block
+        Its name.
+    record
+        Its name.
+    time
+        Of each row, in s from the begin of the record, shape (n,).
+    residual, slope
+        Shapes (n,) and (n, parameters).
+    """
+
+    block: str
+    record: str
+    time: Array
+    residual: Array
+    slope: Array
+
+
+def robust_covariance(rows: Sequence[Piece], prior: Array) -> Array:
+    """Return the covariance of fitted numbers.
+
+    ``prior``: slopes of the residuals of the priors, shape (priors, parameters).
+    """
+    information = sum((r.slope.T @ r.slope for r in rows), start=prior.T @ prior)
+    # In the axes and units in which the information is one.
+    root = _half(inverse_information(information))
+    scatter = root @ (prior.T @ prior) @ root
+    for slope, residual in _segments(rows):
+        scaled = slope @ root
+        strength, axes = np.linalg.eigh(scaled.T @ scaled)
+        freed = (axes.T @ (scaled.T @ residual)) / (1.0 - np.minimum(strength, _OWN_SHARE))
+        gradient = axes @ freed
+        scatter += np.outer(gradient, gradient)
+    return _at_least(root @ scatter @ root, independent_covariance(rows, prior))
+
+
+def independent_covariance(rows: Sequence[Piece], prior: Array) -> Array:
+    """Return the covariance if residuals are coloured noise that has nothing to do with the slopes."""
+    information = prior.T @ prior
+    for block in dict.fromkeys(r.block for r in rows):
+        own = [r for r in rows if r.block == block]
+        count = sum(len(r.residual) for r in own)
+        squares = sum(float(r.residual @ r.residual) for r in own)
+        slopes = sum((r.slope.T @ r.slope for r in own), start=np.zeros_like(information))
+        freedom = max(count - int(np.linalg.matrix_rank(slopes)), 1)
+        size = max(squares / freedom, 1e-12)
+        information = information + slopes / (size * _colour([r.residual for r in own]))
+    return inverse_information(information)
+
+
+def _colour(residuals: Sequence[Array]) -> float:
+    """Return by how much coloured residuals say less of a mean than independent ones: 1 + 2Σρₖ."""
+    count = sum(len(r) for r in residuals)
+    longest = max(len(r) for r in residuals)
+    if longest < _LEAST_ROWS:
+        return 1.0
+    lags = min(200, longest - 1)
+    rho = np.zeros(lags)
+    for each in residuals:
+        own = autocorrelation(each, min(lags, len(each) - 1))[1:] if len(each) > 1 else np.zeros(0)
+        rho[: len(own)] += len(each) / count * own
+    quiet = np.flatnonzero(rho < 2.0 / math.sqrt(count))
+    return max(1.0, 1.0 + 2.0 * float(np.sum(rho[: quiet[0]] if len(quiet) else rho)))
+
+
+def _segments(rows: Sequence[Piece]) -> list[tuple[Array, Array]]:
+    """Return slopes and residuals of each segment, all blocks of a record together."""
+    spans: dict[str, float] = {}
+    for each in rows:
+        if len(each.time):
+            spans[each.record] = max(spans.get(each.record, 0.0), float(each.time[-1]))
+    length = sum(spans.values()) / _SEGMENTS
+    parts: dict[tuple[str, int], tuple[list[Array], list[Array]]] = {}
+    for each in rows:
+        count = max(1, round(spans.get(each.record, 0.0) / length)) if length > 0.0 else 1
+        place = np.minimum(count * each.time / max(spans.get(each.record, 0.0), 1e-300), count - 1)
+        place = place.astype(int)
+        for k in np.unique(place):
+            slopes, residuals = parts.setdefault((each.record, int(k)), ([], []))
+            slopes.append(each.slope[place == k])
+            residuals.append(each.residual[place == k])
+    return [(np.vstack(s), np.concatenate(r)) for s, r in parts.values()]
+
+
+def inverse_information(information: Array) -> Array:
+    """Return the covariance that information gives, if residuals are white noise of unit size.
+
+    ``information``: shape (parameters, parameters).
+    """
+    # What the records leave open altogether gets a large variance, not an infinite one.
+    strength, axes = np.linalg.eigh(information)
+    result: Array = np.asarray((axes / np.maximum(strength, _LEAST_INFORMATION)) @ axes.T, dtype=np.float64)
+    return result
+
+
+def _half(matrix: Array) -> Array:
+    """Return the symmetric root of a symmetric matrix."""
+    strength, axes = np.linalg.eigh(matrix)
+    result: Array = (axes * np.sqrt(np.maximum(strength, 0.0))) @ axes.T
+    return result
+
+
+def _at_least(covariance: Array, least: Array) -> Array:
+    """Return a covariance that in no direction is smaller than another."""
+    # In the units of the numbers themselves, in which rounding leaves no direction negative.
+    size = np.sqrt(np.diag(least))
+    strength, axes = np.linalg.eigh(least / np.outer(size, size))
+    deviation = np.sqrt(np.maximum(strength, _LEAST_STRENGTH))
+    lower, upper = size[:, None] * axes * deviation, (axes / deviation).T / size
+    inside = upper @ covariance @ upper.T
+    strength, axes = np.linalg.eigh(0.5 * (inside + inside.T))
+    whole = lower @ axes
+    result: Array = (whole * np.maximum(strength, 1.0)) @ whole.T
+    return result

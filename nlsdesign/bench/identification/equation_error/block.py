@@ -1,0 +1,114 @@
+"""A piece of a model that is driven by measured signals and has a residual of its own.
+
+A signal may come late: the block then reads it ahead, by a number that may be fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ....foundation.arrays import Array
+from ....foundation.errors import MeasurementError
+from ....model import FlatModel
+
+
+class Drive(NamedTuple):
+    """How an input of a block follows from a record.
+
+    Parameters
+    ----------
+    signal
+        Full name of the measured signal.
+    order
+        0 for its value, 1 for its rate, 2 for the derivative of that.
+    late_by
+        Names of the parameters whose sum says by how much the signal comes late.
+    stretched_by
+        Names of the parameters whose sum says by how much per time it becomes late.
+    """
+
+    signal: str
+    order: int = 0
+    late_by: tuple[str, ...] = ()
+    stretched_by: tuple[str, ...] = ()
+
+    @property
+    def shifted_by(self) -> tuple[str, ...]:
+        """Names of all parameters that shift the signal in time."""
+        return self.late_by + self.stretched_by
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A model whose inputs are measured, and what its output must equal.
+
+    Parameters
+    ----------
+    name
+        Where it is, for instance ``"spring"``.
+    model
+        All inputs that are not driven rest at their start value.
+    drives
+        By name of the input.
+    output
+        Name of the model's only output.
+    target
+        Full name of the measured signal that the output must equal; ``None`` if it must vanish.
+    moving
+        Name of the input that must be well away from zero for the block to say anything (dry friction at
+        rest can be anything); ``None`` if there is no such input.
+    effort_per_drive
+        Constant factor in the output, where that is the error of a measured signal shown as an effort.
+    """
+
+    name: str
+    model: FlatModel
+    drives: Mapping[str, Drive]
+    output: str
+    target: str | None
+    moving: str | None = None
+    effort_per_drive: float = 1.0
+
+    def scaled_to(self, effort_per_drive: float) -> Block:
+        """Return the block with another constant factor in its output."""
+        if effort_per_drive == self.effort_per_drive:
+            return self
+        s, model = self.model.symbols(), self.model
+        columns = [s.time, s.state, s.input, s.parameter, s.table]
+        output = s.output * (effort_per_drive / self.effort_per_drive)
+        equations = ca.Function("equations", columns, [s.derivative, output, s.signal, s.residual])
+        return replace(self, model=replace(model, equations=equations), effort_per_drive=effort_per_drive)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the residual."""
+        return self.model.outputs[0].unit
+
+
+def advanced(time: Array, signal: Array, delay: Array) -> tuple[Array, Array]:
+    """Return a signal read later by linear interpolation, and the slope of the line it is read from."""
+    slopes = np.append(np.diff(signal) / np.diff(time), 0.0)
+    place = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
+    return np.interp(time + delay, time, signal), slopes[place]
+
+
+def late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
+    """Return the drives that a free parameter shifts in time."""
+    return [d for d in block.drives.values() if set(d.shifted_by) & set(free)]
+
+
+def free_delay(drive: Drive, free: Sequence[str]) -> str:
+    """Return the one delay of a signal that is free; of several, records show the sum alone."""
+    names = [name for name in drive.shifted_by if name in free]
+    if len(names) > 1:
+        raise MeasurementError(
+            f"signal '{drive.signal}'",
+            f"is delayed by {' and by '.join(names)}, both free, which cannot be told apart",
+            next_step="let one of them free, and give the other a number without a spread",
+        )
+    return names[0]

@@ -1,0 +1,461 @@
+"""The response of a block to a record, with exact derivatives with respect to parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ....foundation.arrays import Array, Mask
+from ....foundation.errors import ConvergenceError, unknown_name
+from ....foundation.symbolic import Expression, depends
+from ..filters import derivative, smoothed, without_rounding
+from ..records.measurement import Record
+from .batch import ChainFunction, ColumnFunction, PointFunction
+from .block import Block, advanced, free_delay, late_drives
+from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, placed, rosenbrock_step, stages_of
+
+_PROBES = 50
+"""Samples at which it is looked how fast a block is."""
+
+
+class Response(NamedTuple):
+    """Output over time, shape (n,), and its derivatives, shape (n, parameters)."""
+
+    output: Array
+    slope: Array
+
+
+class Samples(NamedTuple):
+    """What a record gives to a block, worked out once.
+
+    Parameters
+    ----------
+    at
+        Everything that neither states nor free parameters enter, at the samples.
+    begin, end
+        The same at both ends of each step, with rates of the straight line in between.
+    step
+        Time between samples in s.
+    """
+
+    at: Array
+    begin: Array
+    end: Array
+    step: float
+
+
+class _Walk(NamedTuple):
+    """Functions of a step: tables over the parameters, and the step itself.
+
+    ``near`` holds the states of the stages that take their derivative from the start of the record; ``stiff``
+    tells whether there are short implicit steps, ``mean`` whether the mean output over these is taken.
+    """
+
+    tables: PointFunction
+    step: ChainFunction
+    near: list[list[int]]
+    stiff: bool
+    mean: bool
+    instructions: int
+
+
+class _Equations(NamedTuple):
+    """A block's expressions: f(x, v, p), y(x, v, p), and v as functions of inputs and their rates.
+
+    Everything that neither state nor free parameter enters is worked out once per record: that is v.
+    """
+
+    state: Expression
+    digested: Expression
+    parameter: Expression
+    now: Expression
+    derivative: Expression
+    output: Expression
+    digest: ca.Function
+
+
+class DrivenBlock:
+    """A block made ready for evaluation with some of its parameters free.
+
+    Parameters
+    ----------
+    block
+        Model, drives and output.
+    free
+        Names of the parameters with respect to which derivatives are taken; those on which the output does
+        not depend are left out, see :attr:`free`.
+    records
+        Every record to which the block will be fitted: together, in whatever order, they decide which states
+        move faster than the samples and take short implicit steps. Without records none do.
+    values
+        Free parameters by name at which that is decided; those of the model by default.
+    span
+        Time in s over which rates of measured signals are taken; between neighbours by default.
+    straightened
+        Names of inputs whose noise the output rectifies: it is evaluated where they are smoothed over the
+        span, and what is smoothed away counts with the slope of the output there.
+    """
+
+    def __init__(
+        self,
+        block: Block,
+        free: Sequence[str],
+        *,
+        records: Sequence[Record],
+        values: Mapping[str, float] | None = None,
+        span: float = 0.0,
+        straightened: Collection[str] = (),
+    ) -> None:
+        self.block = block
+        self._span = span
+        self.free = free_in(block, free)
+        self._fixed = block.model.values
+        self._straightened = _places(block, straightened)
+        e = _equations(block, self.free, self._straightened)
+        self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
+        self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
+        self._output = ColumnFunction(_output_function(e))
+        self._equations = e
+        self._sloped = _sloped(block)
+        self._walk: _Walk | None = None
+        if self._size:
+            self._stages = stages_of(e.derivative, e.state, e.digested)
+            arguments = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
+            slope = ca.jacobian(e.derivative, e.state)
+            slope = ca.densify(slope)
+            self._rate = PointFunction(ca.Function("rate", arguments, [ca.densify(e.derivative), slope]))
+            self._steepness = ColumnFunction(ca.Function("steepness", arguments, [ca.vec(slope)]))
+            self._walk = self._made_walk(records, {**self._fixed, **(values or {})})
+
+    def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
+        """Return the inputs of the block from a record.
+
+        ``values``: free parameters by name; a late signal is advanced by what stands there.
+        """
+        inputs, rates = self._inputs(record, values, smooth=self.stiff)
+        at = self._digest(inputs.shape[1], [inputs, rates])
+        corners = self._corners(inputs, record.step)
+        if corners is None:
+            return Samples(at, at[:, :-1], at[:, 1:], record.step)
+        count = inputs.shape[1] - 1
+        begin, end = (
+            self._digest(count, [corners[0], rates[:, :-1]]),
+            self._digest(count, [corners[1], rates[:, 1:]]),
+        )
+        return Samples(at, begin, end, record.step)
+
+    def _inputs(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> tuple[Array, Array]:
+        """Return the inputs of the model, and the slopes by which late ones change with their delay.
+
+        Where the model rectifies the noise of an input, that is smoothed, and what was taken away stands in
+        the place of the slope.
+        """
+        model, n = self.block.model, len(record.trace)
+        inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
+        rates = np.zeros_like(inputs)
+        for i, variable in enumerate(model.inputs):
+            drive = self.block.drives.get(variable.name)
+            if drive is None:
+                continue
+            signal = record.trace[drive.signal]
+            now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
+            delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
+            if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
+                signal = without_rounding(signal, record.step, self._span)
+            inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
+            if i in self._straightened:
+                even = smoothed(signal, record.step, order=drive.order, span=self._span)
+                inputs[i], rates[i] = even, inputs[i] - even
+            if drive.shifted_by:
+                inputs[i], rates[i] = advanced(record.trace.time, inputs[i], delay)
+            if set(drive.stretched_by) & set(self._late):
+                rates[i] = rates[i] * since  # what a change of the rate shifts grows with time
+        return inputs, rates
+
+    @property
+    def needs_new_samples(self) -> bool:
+        """Whether the samples depend on free parameters, that is, whether a free delay advances a signal."""
+        return bool(self._late)
+
+    @property
+    def stiff(self) -> bool:
+        """Whether some states move faster than the samples of some record, as contact does."""
+        return self._walk is not None and self._walk.stiff
+
+    @property
+    def instructions(self) -> int:
+        """How many operations one step with all its derivatives takes."""
+        return self._walk.instructions if self._walk is not None else 0
+
+    def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
+        """Return the output and its derivatives."""
+        p = np.array([values[name] for name in (*self.free, *self._late)])
+        n = given.at.shape[1]
+        states, mean = (np.zeros((0, n)), None) if self._walk is None else self._states(self._walk, given, p)
+        result = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
+        if not np.all(np.isfinite(result)):
+            raise ConvergenceError(
+                f"block '{self.block.name}'",
+                "its response is not finite",
+                next_step="narrow the bounds of the parameters",
+            )
+        return Response(result[0], result[1:].T)
+
+    def _states(self, walk: _Walk, given: Samples, p: Array) -> tuple[Array, Array | None]:
+        """Return states and sensitivities, and the mean output over each step where the walk takes it."""
+        (n, size), begin, end = (given.at.shape[1], self._size), given.begin, given.end
+        rest, many = self._rest(begin[:, 0], p), size * (1 + len(self.free))
+        start = np.zeros(many + (1 + len(self.free) if walk.mean else 0))
+        start[:size] = rest
+        slope = self._rate(rest, begin.mean(axis=1), p)[1]
+        near = [slope[np.ix_(g, g)].ravel(order="F") for g in walk.near]
+        tables = walk.tables(p, given.step)[0].ravel(order="F")
+        constant = np.concatenate([p, tables, *near, [given.step]])
+        path = np.column_stack([start, walk.step(n - 1, [start, begin, end, constant])])
+        return path[:many], path[many:] if walk.mean else None
+
+    def _made_walk(self, records: Sequence[Record], values: Mapping[str, float]) -> _Walk:
+        """Return the functions of a step, with short implicit steps for what is faster than a sample."""
+        p = np.array([values[name] for name in (*self.free, *self._late)])
+        stretches = np.zeros(len(self._stages))
+        for record in records:
+            stretches = np.maximum(stretches, self._stretches(record, values, p))
+        stiff = [
+            not stage.linear and bool(size > STIFF)
+            for stage, size in zip(self._stages, stretches, strict=True)
+        ]
+        # What jumps within a step is not seen at its ends; a balance of efforts counts the impulse.
+        mean = any(stiff) and self.block.target is None
+        tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
+        rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
+        near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
+        return _Walk(
+            PointFunction(tables), ChainFunction(step), near, any(stiff), mean, step.n_instructions()
+        )
+
+    def _stretches(self, record: Record, values: Mapping[str, float], p: Array) -> Array:
+        """Return for each stage the largest norm of its derivative along a record, times the step."""
+        inputs, rates = self._inputs(record, values, smooth=False)
+        corners = self._corners(inputs, record.step)
+        left = (inputs if corners is None else corners[0])[:, : inputs.shape[1] - 1]
+        every = slice(None, None, max(1, left.shape[1] // _PROBES))
+        left, late = left[:, every], rates[:, : inputs.shape[1] - 1][:, every]
+        probes = self._digest(left.shape[1], [left, late])
+        rest, n = self._rest(probes[:, 0], p), self._size
+        slopes = self._steepness(left.shape[1], [rest, probes, p]).T.reshape(-1, n, n)
+        # Where there is no derivative there is no response either, and a fit is told so.
+        slopes = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+        inside = [slopes[:, g.states][:, :, g.states] for g in self._stages]
+        return record.step * np.array([np.linalg.norm(m, 2, axis=(1, 2)).max(initial=0.0) for m in inside])
+
+    def _corners(self, inputs: Array, step: float) -> tuple[Array, Array] | None:
+        """Return the inputs at both ends of every step, with rates of the line in between.
+
+        Nothing is returned where no state is driven by a rate: then they are the inputs at the samples.
+        """
+        names, drives = [v.name for v in self.block.model.inputs], self.block.drives
+        if not self._sloped:
+            return None
+        left, right = inputs[:, :-1].copy(), inputs[:, 1:].copy()
+        for i in self._sloped:
+            signal = drives[names[i]].signal
+            value = names.index(next(n for n, d in drives.items() if d.signal == signal and d.order == 0))
+            left[i] = right[i] = np.diff(inputs[value]) / step
+        return left, right
+
+    def _rest(self, begin: Array, p: Array) -> Array:
+        """Return the state in which the block rests at the first sample: bench records start at rest."""
+        x = self.block.model.start(self.block.model.states)
+        for _ in range(3):
+            rate, slope = self._rate(x, begin, p)
+            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
+                raise ConvergenceError(
+                    f"block '{self.block.name}'", "has no state of rest at the first sample"
+                )
+            x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+        return x
+
+
+def _sloped(block: Block) -> list[int]:
+    """Return which inputs are rates of signals; none where no state is driven by one."""
+    s, drives = block.model.symbols(), block.drives
+    names = [v.name for v in block.model.inputs]
+    sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
+    moved = s.state.numel() and depends(s.derivative, ca.vertcat(*[s.input[i] for i in sloped]))
+    return sloped if moved else []
+
+
+def _places(block: Block, inputs: Collection[str]) -> list[int]:
+    """Return the places of some inputs, without those that come late: their slopes say how late."""
+    drives = block.drives
+    kept = {name for name in inputs if name in drives and not drives[name].shifted_by}
+    return [i for i, v in enumerate(block.model.inputs) if v.name in kept]
+
+
+def _is_motion(block: Block, signal: str) -> bool:
+    """Tell whether the rate of a signal drives the block too."""
+    return any(d.signal == signal and d.order == 1 for d in block.drives.values())
+
+
+def _centred(mean: Array) -> Array:
+    """Return means over the steps, of which the first column is void, as values at the samples."""
+    steps = mean[:, 1:]
+    result: Array = 0.5 * (
+        np.concatenate([steps[:, :1], steps], axis=1) + np.concatenate([steps, steps[:, -1:]], axis=1)
+    )
+    return result
+
+
+def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
+    """Return the parameters that the output depends on, directly, through the states, or as a delay."""
+    s = block.model.symbols()
+    names = [v.name for v in block.model.parameters]
+    for name in free:
+        if name not in names:
+            raise unknown_name("parameter", name, names)
+    together = ca.vertcat(s.output, s.derivative) if s.state.numel() else s.output
+    late = {name for d in block.drives.values() for name in d.shifted_by}
+    return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))
+
+
+def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -> _Equations:
+    model, s = block.model, block.model.symbols()
+    names = [v.name for v in model.parameters]
+    place = [names.index(n) for n in free]
+    rest = [i for i in range(len(names)) if i not in place]
+    p = ca.SX(ca.vertcat(*[s.parameter[i] for i in place]))
+    rates = ca.SX.sym("rate", s.input.shape)
+    late = late_drives(block, free)
+    now = ca.SX.sym("now", len(late))
+    together = ca.vertcat(s.derivative, s.output) if s.state.numel() else s.output
+    fixed = ca.vertcat(*[s.parameter[i] for i in rest])
+    together = ca.substitute(together, fixed, ca.DM(model.start(model.parameters)[rest]))
+    for i, variable in enumerate(model.inputs):
+        drive = block.drives.get(variable.name)
+        if drive in late:
+            # The samples were advanced by the present delay; its derivative is that of the signal.
+            k = late.index(drive)
+            shift = (p[list(free).index(free_delay(drive, free))] - now[k]) * rates[i]
+            together = ca.substitute(together, s.input[i], s.input[i] + shift)
+    if straightened:
+        n = s.state.numel()
+        seen = ca.vertcat(*[s.input[i] for i in straightened])
+        left = ca.vertcat(*[rates[i] for i in straightened])
+        straight = together[n:] + ca.jtimes(together[n:], seen, left)
+        whole = ca.substitute(together[:n], seen, seen + left) if n else ca.SX(0, 1)
+        together = ca.vertcat(whole, straight)
+    given = ca.vertcat(s.input, rates)
+    core, symbols, parts = ca.extract_parametric(ca.cse(together), given)
+    core = ca.cse(core)
+    # Inputs that stand alone, as a factor of a parameter, are not extracted: they pass as they are.
+    bare = [given[i] for i in range(given.numel()) if depends(core, given[i])]
+    aliases = [ca.SX.sym(f"bare_{k}") for k in range(len(bare))]
+    core = ca.substitute(core, ca.vertcat(*bare), ca.vertcat(*aliases)) if bare else core
+    symbols, parts = [*symbols, *aliases], [*parts, *bare]
+    digest = ca.Function(
+        "digest", [s.input, rates], [ca.densify(ca.vertcat(*parts)) if parts else ca.SX(0, 1)]
+    )
+    n = s.state.numel()
+    digested = ca.SX(ca.vertcat(*symbols)) if symbols else ca.SX(0, 1)
+    return _Equations(s.state, digested, p, now, core[:n], core[n:], digest)
+
+
+def _sensitivities(e: _Equations) -> tuple[Expression, Expression]:
+    """Return symbols of the states' derivatives with respect to parameters, and x and those as one column.
+
+    Where a parameter acts on a state neither itself nor through other states, there is no symbol but a
+    structural zero: most states depend on few of the parameters.
+    """
+    slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
+    acting = ca.Sparsity(e.state.numel(), e.parameter.numel())
+    if slope.numel():
+        reach = np.eye(e.state.numel(), dtype=bool) | _pattern(e.derivative, e.state)
+        for _ in range(e.state.numel().bit_length()):
+            reach = reach @ reach
+        acts = reach @ _pattern(e.derivative, e.parameter)
+        acting = ca.sparsify(ca.DM(acts.astype(float))).sparsity()
+    return ca.project(slope, acting), ca.vertcat(e.state, ca.vec(slope))
+
+
+def _pattern(value: Expression, of: Expression) -> Mask:
+    """Return which items of a column contain which symbols, shape (items, symbols)."""
+    return np.asarray(ca.DM(ca.jacobian_sparsity(value, of), 1.0).full() > 0.0)
+
+
+def _output_function(e: _Equations) -> ca.Function:
+    slope, everything = _sensitivities(e)
+    total = ca.jacobian(e.output, e.parameter) + ca.jacobian(e.output, e.state) @ slope
+    column = ca.cse(ca.densify(ca.vertcat(e.output, ca.vec(total))))
+    return ca.Function("output", [everything, e.digested, ca.vertcat(e.parameter, e.now)], [column])
+
+
+def _walk_functions(
+    e: _Equations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
+) -> tuple[ca.Function, ca.Function]:
+    """Return the tables of the exact steps over the parameters, and one step of states and sensitivities.
+
+    With ``mean`` the step gives out the mean of the output over a stiff stage's short steps as well.
+    """
+    h, free = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now)
+    tables, symbols, matrices, outputs = [], [], [], []
+    guess: list[Expression] = []
+    guessed: list[Expression] = []
+    new = ca.SX(e.state)
+    right = ca.SX.sym("right", e.digested.shape)
+    for stage, fast in zip(stages, stiff, strict=True):
+        inner = ca.SX(ca.vertcat(*[e.state[i] for i in stage.states]))
+        rate = ca.SX(ca.vertcat(*[e.derivative[i] for i in stage.states]))
+        n, ends = inner.numel(), (ca.vertcat(e.state, e.digested), ca.vertcat(new, right))
+        at = placed(rate, (e.state, e.digested), stage.states)
+        if stage.linear:
+            table = ca.SX.sym("table", n, 3 * n)
+            tables.append(ca.vec(ca.densify(exact_step(ca.jacobian(rate, inner), h))))
+            symbols.append(ca.vec(table))
+            zero = ca.SX.zeros(n)
+            later = table @ ca.vertcat(inner, at(zero, ends[0]), at(zero, ends[1]))
+        elif fast:
+            short_steps = implicit_steps(at, inner, ends, h)
+            later, guess, guessed = (
+                short_steps.states[-1],
+                guess + short_steps.guess,
+                guessed + short_steps.guessed,
+            )
+            seen, count = placed(e.output, (e.state, e.digested), stage.states), len(short_steps.states)
+            corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
+            outputs += [seen(x, v) / count for x, v in zip(short_steps.states, corners, strict=True)]
+        else:
+            w = None if is_short(rate) else ca.SX.sym("w", n, n)
+            matrices += [] if w is None else [w]
+            later = rosenbrock_step(at, inner, ends, w, h)
+        for k, i in enumerate(stage.states):
+            new[i] = later[k]
+    table, symbol = _column(tables), _column(symbols)
+    dependence = ca.jacobian(table, e.parameter)
+    prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
+    slope, everything = _sensitivities(e)
+    along = ca.SX.sym("along", table.numel(), e.parameter.numel())
+    of = ca.vertcat(e.state, e.parameter, symbol)
+    directions = ca.vertcat(slope, ca.SX.eye(e.parameter.numel()), ca.project(along, dependence.sparsity()))
+
+    def with_slope(value: Expression) -> Expression:
+        return ca.SX(ca.vertcat(value, ca.vec(ca.jtimes(value, of, directions))))
+
+    column = with_slope(new)
+    if mean:
+        column = ca.vertcat(column, with_slope(sum(outputs, start=ca.SX(0))))
+        everything = ca.vertcat(everything, ca.SX.sym("before", 1 + e.parameter.numel()))
+    if guess:
+        # Backwards: each symbol stands for an expression of those before it.
+        for name, value in zip(reversed(guess), reversed(guessed), strict=True):
+            column = ca.substitute(column, name, value)
+    constant = ca.vertcat(free, symbol, ca.vec(along), _column([ca.vec(w) for w in matrices]), h)
+    return prepare, ca.Function(
+        "step", [everything, e.digested, right, constant], [ca.cse(ca.densify(column))]
+    )
+
+
+def _column(items: Sequence[Expression]) -> Expression:
+    return ca.SX(ca.vertcat(*items)) if items else ca.SX(0, 1)

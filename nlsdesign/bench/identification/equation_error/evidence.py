@@ -1,0 +1,196 @@
+"""What a record says about a block: residuals in units of their own noise floor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from ....foundation.arrays import Array
+from ....simulation import Trace
+from ..filters import every
+from ..records.measurement import Record, RecordSet, in_canonical_order
+from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
+from .block import Block
+from .block_noise import BlockNoise, Filters, noise_of_blocks
+from .block_response import DrivenBlock, Samples
+from .noise import Noise as Noise
+from .noise import estimate_noise as estimate_noise
+
+_COARSE_SHARE, _COARSEST = 0.04, 12
+"""The coarse look skips samples while no motion changes by more than this share of its range."""
+
+
+def _on_clock(floor: BlockNoise, width: float, times: int) -> BlockNoise:
+    """Return the same rows with the same noise floor, made of several samples in the place of one."""
+    if times == 1:
+        return floor
+    count = len(floor.raw_sigma)
+    raw = np.interp(np.arange((count - 1) * times + 1) / times, np.arange(count), floor.raw_sigma)
+    return replace(floor, filter=refined_filter(floor.filter, width, times), raw_sigma=raw)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """A record seen by a block with free parameters."""
+
+    driven: DrivenBlock
+    record: Record
+    floor: BlockNoise
+    samples: Samples
+
+    def residual(self, values: Mapping[str, float]) -> tuple[Array, Array]:
+        """Return measured minus predicted over the noise floor, and its derivatives."""
+        samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
+        response = self.driven.respond(samples, values)
+        target = self.driven.block.target
+        error = (self.record.trace[target] if target else 0.0) - response.output
+        sigma = self.floor.sigma
+        return (self.floor.filter @ error) / sigma, -(self.floor.filter @ response.slope) / sigma[:, None]
+
+    def predicted(self, values: Mapping[str, float]) -> Array:
+        """Return the unfiltered output over the record."""
+        samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
+        return self.driven.respond(samples, values).output
+
+
+class Bench:
+    """The records as every hypothesis sees them: same order, same filter, same rows, same noise floor.
+
+    Parameters
+    ----------
+    records
+        All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
+    blocks
+        Of the declared model; they fix rows and noise floor.
+    noise
+        Of the measured signals, where it is known from other records of the same bench.
+    filters
+        By name of the block, where they were chosen for other records of the same bench.
+    clock
+        Time in s between samples at which the blocks show what they do, where that is known from other
+        records of the same bench.
+    """
+
+    def __init__(
+        self,
+        records: RecordSet,
+        blocks: Sequence[Block],
+        *,
+        noise: Noise | None = None,
+        filters: Mapping[str, Filters] | None = None,
+        clock: float | None = None,
+    ) -> None:
+        self._blocks = tuple(blocks)
+        self.records = in_canonical_order(records)
+        self.given_order = {record.name: place for place, record in enumerate(records.records)}
+        self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
+        self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
+        self.units = {block.name: block.unit for block in blocks}
+        self._scales = {block.name: block.effort_per_drive for block in blocks}
+        self._thin: dict[tuple[str, str, bool], tuple[Record, BlockNoise]] = {}
+        if clock is None:
+            clock = resolving_step(_block_records(self, blocks))
+        self.clock = clock
+        for (block_name, record_name), floor in self.floors.items():
+            record = next(r for r in self.records.records if r.name == record_name)
+            width = self.filters[block_name].width / record.step
+            self.floors[block_name, record_name] = _on_clock(floor, width, times_on(record, clock))
+        self.records = on_clock(self.records, clock)
+
+    def with_records(self, records: RecordSet) -> Bench:
+        """Return other records of the same bench as they are seen with the same noise and filters."""
+        return Bench(records, self._blocks, noise=self.noise, filters=self.filters, clock=self.clock)
+
+    def driven(
+        self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
+    ) -> DrivenBlock:
+        """Return a block ready for evaluation on these records.
+
+        ``block``, ``free``, ``values``: as for :class:`~.block_response.DrivenBlock`. The records that fits
+        may see decide what is stiff; if there are none, as where a finished model is only looked at, all do.
+        """
+        filters = self.filters.get(block.name)
+        span, straightened = (filters.span, filters.straightened) if filters else (0.0, ())
+        records = self.records.of("fit") or self.records.records
+        block = block.scaled_to(self._scales.get(block.name, block.effort_per_drive))
+        return DrivenBlock(block, free, records=records, values=values, span=span, straightened=straightened)
+
+    def evidence(
+        self,
+        driven: DrivenBlock,
+        records: Sequence[Record],
+        values: Mapping[str, float],
+        *,
+        coarse: bool = False,
+    ) -> list[Evidence]:
+        """Return what records say about a block.
+
+        ``coarse``: whether blocks with a target are simulated on every k-th sample alone and compared
+        unfiltered: a quick look, less sharp by the square root of the number of samples left out. Blocks that
+        are faster than a sample are simulated on all.
+        """
+        name, thin = driven.block.name, coarse and driven.block.target is not None
+        result = []
+        for record in records:
+            if (name, record.name) in self.floors:
+                seen, floor = record, self.floors[name, record.name]
+                if thin:
+                    seen, floor = self._thinned(name, record, whole=driven.stiff)
+                result.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
+        return result
+
+    def typical_floor(self, block: str) -> float:
+        """Return the noise floor of a block over all records, root mean square, in its unit."""
+        rows = np.concatenate([f.sigma for (name, _), f in self.floors.items() if name == block])
+        return float(np.sqrt(np.mean(rows**2)))
+
+    def known_from(self, block: str) -> float:
+        """Return the effective squares of noise from which the floor of a block is known."""
+        # One estimate of the noise serves all records, so more of them make it no better.
+        doubt = float(np.mean([1.0 / f.known for (name, _), f in self.floors.items() if name == block]))
+        return 1.0 / doubt if doubt else math.inf
+
+    def _thinned(self, block: str, record: Record, *, whole: bool) -> tuple[Record, BlockNoise]:
+        """Return every k-th sample unfiltered; with ``whole`` all are simulated and the same are compared."""
+        key = block, record.name, whole
+        if key not in self._thin:
+            k = self._skip(record)
+            trace = record.trace
+            counted = np.flatnonzero(~record.masked_in(trace.signals)[::k])
+            raw = self.floors[block, record.name].raw_sigma[::k][counted]
+            one = every(len(trace), k)
+            masked = record.masked
+            if not whole:
+                trace = Trace(
+                    trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
+                )
+                one = every(len(trace), 1)
+                masked = {n: m[::k] for n, m in masked.items()}
+            self._thin[key] = replace(record, trace=trace, masked=masked), BlockNoise(one[counted], raw, raw)
+        return self._thin[key]
+
+    def _skip(self, record: Record) -> int:
+        moving = [s for s in self.records.signals if self.noise.rounded[s]] or list(self.records.signals)
+        allowed = _COARSEST
+        for signal in moving:
+            span = max(float(np.ptp(r.trace[signal])) for r in self.records.records)
+            fastest = float(np.max(np.abs(np.gradient(gaussian_filter1d(record.trace[signal], 2.0)))))
+            allowed = min(allowed, int(_COARSE_SHARE * span / max(fastest, 1e-300)))
+        return max(1, allowed)
+
+
+def _block_records(bench: Bench, blocks: Sequence[Block]) -> list[BlockRecord]:
+    """Return how blocks read the records that may decide on filters."""
+    result = []
+    for block in blocks:
+        driven = bench.driven(block, [])
+        for record in bench.records.deciding:
+            floor = bench.floors.get((block.name, record.name))
+            if floor is not None:
+                width = bench.filters[block.name].width
+                result.append(BlockRecord(driven, record, width, floor.filter, floor.sigma))
+    return result

@@ -1,0 +1,202 @@
+"""What a finished design is as files: deck, numbers, pictures, drawings for the workshop."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...components.assembly.deck_writer import write_deck
+from ...foundation.errors import NlsError
+from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.text_files import discard, make_folder, write_text
+from ..drawing.cam_drawing import write_drawings
+from ..drawing.cam_part import CamPart
+from ..drawing.machined_cam import MachinedCam
+from ..optimisation.result import CamDesign
+from .job_file import DesignJob
+from .machined import machined_cam
+
+DESIGN_FILES = (
+    "report.html",
+    *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
+    *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
+)
+"""Names of all files that a design can have, its report among them, which is written above."""
+
+
+class PicturesOfDesign(Protocol):
+    """What draws a design, handed in from above: :class:`nlsdesign.figures.DesignPictures`."""
+
+    def of_design(self, design: CamDesign, folder: Path) -> list[Path]:
+        """Write the pictures of a design, and return their files."""
+
+    def of_part(self, design: CamDesign, part: CamPart, folder: Path) -> list[Path]:
+        """Write the page for the workshop, and return its files."""
+
+
+@dataclass(frozen=True)
+class WrittenDesign:
+    """The files of a design.
+
+    Parameters
+    ----------
+    files
+        In the order in which they were written.
+    remarks
+        What a designer should know before a part is made.
+    """
+
+    files: tuple[Path, ...]
+    remarks: tuple[str, ...]
+
+
+def write_design(
+    design: CamDesign,
+    folder: Path | str,
+    *,
+    job: DesignJob | None = None,
+    pictures: PicturesOfDesign | None = None,
+) -> WrittenDesign:
+    """Write a finished design into a folder; files of an earlier design there are removed.
+
+    That is the deck (``model.toml``), the numbers (``design.json``), the pictures, and for a design that
+    meets its target the drawings of the part: of the contour alone where no part can be made of it.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    folder
+        Is made where it does not exist.
+    job
+        What was asked for; its table ``[drawing]`` gives the sizes of the part.
+    pictures
+        What draws it, :class:`nlsdesign.figures.DesignPictures`; without it there are no pictures.
+
+    Returns
+    -------
+    WrittenDesign
+        Files and remarks.
+
+    Raises
+    ------
+    NlsError
+        If a file cannot be written.
+    """
+    folder = Path(folder)
+    make_folder(folder)
+    for name in DESIGN_FILES:
+        # What an earlier run has left here belongs to another design.
+        discard(folder / name)
+    model, numbers = folder / "model.toml", folder / "design.json"
+    write_deck(design.actuator, model)
+    # How many iterations it took depends on the processor, the design does not.
+    rows = [row for row in design.rows() if row[0] not in ("solver", "starts")]
+    content = {**design_summary(design), "rows": rows}
+    write_text(numbers, json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n")
+    files = [model, numbers, *(pictures.of_design(design, folder) if pictures else ())]
+    remarks = list(trim_remarks(design))
+    if not design.met:
+        return WrittenDesign(tuple(files), tuple(remarks))
+    try:
+        machined = machined_cam(design, job)
+        part = machined.part(design.contour)
+    except NlsError as error:
+        # The contour is worth having even where hub, channel and cable do not fit it yet.
+        remarks.append(f"no machined part, only the line of the cable's centre: {error}")
+        files += write_drawings(folder, design.contour, note=f"design {design.fingerprint}")
+    else:
+        remarks += part_remarks(design, machined, part)
+        files += write_part(design, machined, folder, pictures=pictures)
+    return WrittenDesign(tuple(files), tuple(remarks))
+
+
+def write_part(
+    design: CamDesign, machined: MachinedCam, folder: Path, *, pictures: PicturesOfDesign | None = None
+) -> list[Path]:
+    """Write the drawings of the part that is made of a design, and the page for the workshop.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    machined
+        Sizes of the part.
+    folder
+        Is made where it does not exist.
+    pictures
+        What draws the page; without it there is none.
+
+    Returns
+    -------
+    list of Path
+        Their files.
+
+    Raises
+    ------
+    NlsError
+        If the part cannot be made of the contour.
+    """
+    note = f"design {design.fingerprint}"
+    files = write_drawings(folder, design.contour, machined=machined, note=note)
+    return [*files, *(pictures.of_part(design, machined.part(design.contour), folder) if pictures else ())]
+
+
+def design_summary(design: CamDesign) -> dict[str, Any]:
+    """Return the result of a design in numbers that JSON can hold, rounded to what they are good for.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    """
+    spread = {}
+    if design.tolerance is not None:
+        spread = {f"{100 * q.share:g} %": _rounded(q.value) for q in design.tolerance.quantiles}
+    return {
+        "met": design.met,
+        "torque_error_rms": _rounded(design.rms),
+        "miss": None if design.miss is None else str(design.miss),
+        "advice": [] if design.miss is None else list(design.miss.advice),
+        "values": {name: quantity.value for name, quantity in design.values.items()},
+        "active_limits": list(design.active_limits),
+        "largest_cable_force": _rounded(float(design.curves.forces.max())),
+        "energy": _rounded(design.curves.energy),
+        "rms_error_over_spreads": spread,
+    }
+
+
+def _rounded(value: float) -> float:
+    """Return a number with six digits, which are the same on every processor."""
+    return float(f"{value:.6g}")
+
+
+def trim_remarks(design: CamDesign) -> Iterator[str]:
+    """Yield where made springs have to be set beyond a limit that holds for the nominal one."""
+    for trim in design.tolerance.trims[:1] if design.tolerance is not None else ():
+        low, high = trim.needed
+        for state in design.limits:
+            if state.of == trim.name and (high > state.bound if state.upper else low < state.bound):
+                factor = parse_unit(state.unit).factor
+                needed = with_unit(f"{low / factor:.4g} to {high / factor:.4g}", state.unit)
+                bound = with_unit(f"{state.bound / factor:.4g}", state.unit)
+                yield (
+                    f"{state.limit} holds for the nominal spring: to trim 95 % of the made ones, {trim.name} "
+                    f"is set from {needed}, beyond {bound} -> leave it that travel, or narrow the spreads"
+                )
+
+
+def part_remarks(design: CamDesign, machined: MachinedCam, part: CamPart) -> Iterator[str]:
+    """Yield how far a made part reaches, and that nothing holds it where neither hub nor bolts are named."""
+    reach = max(float(np.hypot(*outline.polygon().T).max()) for outline in part.outlines)
+    yield (
+        f"the made part reaches {1e3 * reach:.4g} mm from its axis, the contour "
+        f"{1e3 * float(design.contour.radii.max()):.4g} mm: run-out and corners come on top"
+    )
+    if machined.hub_bore is None and machined.bolts is None:
+        yield "nothing holds the part yet: name hub_bore, bolts or cable_end under [drawing]"

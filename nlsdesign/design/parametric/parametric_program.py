@@ -1,0 +1,312 @@
+"""One nonlinear program for all questions of one structure, solved from where the last one ended.
+
+A question changes numbers only: the derivatives stand, and the interior point method begins beside the last
+solution, with its multipliers. Where no design keeps all limits, the same program with a slack for each says
+which of them contradict each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...foundation.arrays import Array
+from ..optimisation.limit_kinds import limit_kinds
+from ..optimisation.program import PROVED_INFEASIBLE
+from ..optimisation.starts import start_values, starts
+from .cam_question import CamQuestion
+from .program_rows import ProgramRows
+
+SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+"""States of the solver that count as solved."""
+MOST_ITERATIONS = 120
+"""Iterations at most of a search from a start."""
+_COMMON: dict[str, Any] = {
+    "print_time": False,
+    "error_on_fail": False,
+    "show_eval_warnings": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.tol": 1e-9,
+    "ipopt.acceptable_tol": 1e-7,
+    "ipopt.honor_original_bounds": "yes",
+    "ipopt.mumps_permuting_scaling": 0,
+    "ipopt.mumps_scaling": 0,
+}
+_NONE: Array = np.zeros(0)
+
+
+class SearchPoint(NamedTuple):
+    """Where a search begins or ended: unknowns and, where they are known, multipliers of one program."""
+
+    unknowns: Array
+    of_bounds: Array = _NONE
+    of_rows: Array = _NONE
+
+
+@dataclass(frozen=True, eq=False)
+class SearchOutcome:
+    """What a search came to.
+
+    Parameters
+    ----------
+    state
+        ``"solved"``, ``"infeasible"`` or ``"not solved"``.
+    words
+        Of the solver, or what is in conflict.
+    point
+        Where it is solved.
+    cost
+        Sum of the goals.
+    conflicts
+        Names of the limits that contradict each other.
+    room
+        What each row of a limit gave where all limits count as kept: rounding leaves a limit that binds at a
+        held contour beyond its number by some parts in a thousand million.
+    """
+
+    state: str
+    words: str
+    point: SearchPoint | None = None
+    cost: float = math.inf
+    conflicts: tuple[str, ...] = ()
+    room: Array | float = 0.0
+
+
+def interior_point(name: str, program: dict[str, Any], *, iterations: int, **options: Any) -> ca.Function:
+    """Return the solver of a program."""
+    settings = {f"ipopt.{key}": value for key, value in options.items()}
+    return ca.nlpsol(name, "ipopt", program, {**_COMMON, **settings, "ipopt.max_iter": iterations})
+
+
+class ProgramOutputs:
+    """What follows from the unknowns of one program."""
+
+    def __init__(self, rows: ProgramRows) -> None:
+        self._rows = rows
+
+    def columns(self, unknowns: Array, question: CamQuestion) -> dict[str, Array]:
+        """Return curves, sums and values of the limits by name."""
+        names, function = self._columns
+        columns = function(unknowns, self._rows.numbers_of(question))
+        return {name: np.array(c, dtype=float).ravel() for name, c in zip(names, columns, strict=True)}
+
+    def chosen_values(self, unknowns: Array) -> dict[str, float]:
+        """Return sizes and variables of the contour in SI by name."""
+        values = np.array(self._in_si(unknowns)).ravel()
+        return {v.name: float(value) for v, value in zip(self._rows.chosen, values, strict=True)}
+
+    def scaled_values(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return values in SI as this program scales them, those that it knows."""
+        return {v.name: self._rows.scaled(v, values[v.name]) for v in self._rows.chosen if v.name in values}
+
+    @cached_property
+    def _in_si(self) -> ca.Function:
+        values = ca.vertcat(*[v.value for v in self._rows.chosen])
+        return ca.Function("chosen", [self._rows.problem.vector], [values])
+
+    @cached_property
+    def _columns(self) -> tuple[tuple[str, ...], ca.Function]:
+        """Names, and the function of unknowns and numbers of the target that gives their values."""
+        problem, target = self._rows.problem, self._rows.target
+        design, contour = problem.design, problem.contour
+        wanted = [target.torque_law(design.angles[i]) for i in range(design.angles.shape[0])]
+        columns = {
+            "angle": design.angles, "direction": design.directions, "lever_arm": design.lever_arms,
+            "radius": design.radii, "radius_of_curvature": design.radii_of_curvature,
+            "torque": design.torques, "wanted": ca.vertcat(*wanted), "stiffness": design.tangent_stiffness,
+            "extension": design.extensions, "force": design.forces,
+            "strains": ca.vertcat(*design.strains.values()),
+            "stresses": ca.vertcat(*design.stresses.values()),
+            "mean_square": design.mean_square_error, "volume": design.rubber_volume,
+            "sizes": ca.vertcat(*[v.value for v in problem.scalars]),
+            "first_slope": ca.SX(0) if contour is None else contour.first_slope.value,
+            **{f"bound {i}": bound.expression for i, bound in enumerate(self._rows.shown_bounds)},
+        }  # fmt: skip
+        given, values = [problem.vector, target.symbols], [ca.SX(each) for each in columns.values()]
+        return tuple(columns), ca.Function("outputs", given, values)
+
+
+_INVOLVED = 1e-3
+"""Price from which a limit counts as part of a conflict, as in the whole design."""
+_KEPT = 1e-6
+"""Relative give below which a limit counts as kept."""
+
+
+class SoftenedProgram:
+    """The program of one structure with limits that give."""
+
+    def __init__(self, rows: ProgramRows) -> None:
+        self._rows = rows
+
+    def conflict(self, question: CamQuestion, begin: Array) -> SearchOutcome:
+        """Find out whether any cam keeps all limits, and which are in conflict where none does."""
+        rows = self._rows
+        count = len(rows.bounds)
+        if not count:
+            return SearchOutcome("not solved", "the solver found no design, and there is no limit to widen")
+        low, high = rows.ranges_of(question)
+        rows_low, rows_high = rows.limits_of(question)
+        # A give counts relative to the limit as it is now, not as it was when the program was made.
+        price = rows.scales / np.array([abs(value) or 1.0 for value in rows.values_of(question)[:count]])
+        answer = self._softened(
+            x0=np.concatenate([begin, np.full(count, 0.1)]),
+            p=np.concatenate([rows.numbers_of(question), price]),
+            lbx=np.concatenate([low, np.zeros(count)]), ubx=np.concatenate([high, np.full(count, 1e3)]),
+            lbg=rows_low, ubg=rows_high,
+        )  # fmt: skip
+        point, status = np.array(answer["x"]).ravel(), str(self._softened.stats()["return_status"])
+        if status not in SOLVED or not np.all(np.isfinite(point)):
+            return SearchOutcome("not solved", f"the solver stopped with '{status}'")
+        gives = point[len(point) - count :]
+        if float(gives @ price) <= _KEPT * count:
+            return SearchOutcome("solved", "", SearchPoint(point[:-count]), room=gives)
+        sizes = [row.expression.shape[0] for row in rows.problem.structure]
+        sizes += [bound.expression.shape[0] for bound in rows.bounds]
+        groups = np.split(np.abs(np.array(answer["lam_g"]).ravel()), np.cumsum(sizes)[:-1])
+        limits = groups[len(rows.problem.structure) :]
+        involved = [i for i, each in enumerate(limits) if np.max(each, initial=0.0) > _INVOLVED * price[i]]
+        return SearchOutcome(
+            "infeasible", self._words(question, involved, gives),
+            conflicts=tuple(dict.fromkeys(rows.bounds[i].limit for i in involved)),
+        )  # fmt: skip
+
+    @cached_property
+    def _softened(self) -> ca.Function:
+        return interior_point("softened", self.program, iterations=MOST_ITERATIONS)
+
+    @cached_property
+    def program(self) -> dict[str, ca.SX]:
+        """The program with a slack for each limit; their sum, relative to the limits, is made small."""
+        problem, bounds = self._rows.problem, self._rows.bounds
+        slacks, prices = ca.SX.sym("slack", len(bounds)), ca.SX.sym("price", len(bounds))
+        rows = [row.expression for row in problem.structure]
+        for i, row in enumerate(self._rows.limit_rows):
+            rows.append(row + (-slacks[i] if bounds[i].upper else slacks[i]))
+        return {
+            "x": ca.vertcat(problem.vector, slacks),
+            "f": ca.dot(slacks, prices),
+            "g": ca.vertcat(*rows),
+            "p": ca.vertcat(self._rows.target.symbols, prices),
+        }
+
+    def _words(self, question: CamQuestion, involved: Sequence[int], gives: Array) -> str:
+        bounds = self._rows.bounds
+        kinds = [limit_kinds()[name] for name in dict.fromkeys(bounds[i].limit for i in involved)]
+        rule = "contradict each other" if len(kinds) > 1 else "cannot be kept with what is free"
+        limits, values = question.limit_values, self._rows.values_of(question)
+        needed = []
+        for i in involved:
+            bound, give = bounds[i], float(gives[i] * self._rows.scales[i])
+            if gives[i] > _KEPT:
+                moved = values[i] + give if bound.upper else values[i] - give
+                kind = limit_kinds()[bound.limit]
+                needed.append(f"{kind.title} from {kind.shown(values[i])} to about {kind.shown(moved)}")
+        names = [f"{kind.title} ({kind.shown(limits[kind.name].value)})" for kind in kinds]
+        words = f"{' and '.join(names)} {rule}"
+        return words + (f"; it would be enough to move {' and '.join(needed)}" if needed else "")
+
+
+_WARM = 20
+"""Iterations at most of a search with the last multipliers; where they do not help one without takes over."""
+_AGAIN = 45
+"""Iterations at most of a search from the last design without its multipliers."""
+_STARTS = 4
+_BESIDE: dict[str, Any] = {
+    "warm_start_init_point": "yes",
+    "mu_init": 1e-5,
+    # Measured over drags of five decks: with the usual rule a flat optimum takes 50 iterations, with this 5.
+    "mu_strategy": "adaptive",
+    **{
+        f"warm_start_{each}": 1e-8
+        for each in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+    },
+}
+
+
+class ParametricProgram:
+    """The program of one structure: see :func:`~.quick_rows.structure_of`.
+
+    Parameters
+    ----------
+    question
+        One of its questions, whose sizes scale the variables.
+    """
+
+    def __init__(self, question: CamQuestion) -> None:
+        self.rows = ProgramRows(question)
+        self.outputs = ProgramOutputs(self.rows)
+        self.softened = SoftenedProgram(self.rows)
+
+    @cached_property
+    def _cold(self) -> ca.Function:
+        return interior_point("quick", self.rows.program, iterations=MOST_ITERATIONS)
+
+    @cached_property
+    def _warm(self) -> ca.Function:
+        return interior_point("beside", self.rows.program, iterations=_WARM, **_BESIDE)
+
+    @cached_property
+    def _again(self) -> ca.Function:
+        return interior_point("again", self.rows.program, iterations=_AGAIN, mu_strategy="adaptive")
+
+    def prepare(self) -> None:
+        """Make the derivatives, which takes some tenths of a second."""
+        _ = self._cold, self._warm, self._again
+
+    def from_starts(self, question: CamQuestion) -> SearchOutcome:
+        """Return the best solution from the starts that are always taken."""
+        best: SearchOutcome | None = None
+        problem = self.rows.problem
+        for start in starts(_STARTS, 1, []):
+            values = start_values(
+                start, scalars=problem.scalars, contour=problem.contour, sizes=problem.sizes
+            )
+            outcome = self._solved(self._cold, question, SearchPoint(self.rows.completed(question, values)))
+            if best is None or (outcome.state == "solved", -outcome.cost) > (
+                best.state == "solved",
+                -best.cost,
+            ):
+                best = outcome
+            if problem.contour is None and best.state == "solved":
+                break
+        assert best is not None
+        return best
+
+    def beside(self, question: CamQuestion, last: SearchPoint) -> SearchOutcome:
+        """Return the solution beside the last one."""
+        return self._solved(self._warm, question, last)
+
+    def from_point(self, question: CamQuestion, point: SearchPoint, room: Array | float) -> SearchOutcome:
+        """Return the solution from unknowns that keep all limits, as far as they do there."""
+        return self._solved(self._cold, question, point, room)
+
+    def from_values(self, question: CamQuestion, values: Mapping[str, float]) -> SearchOutcome:
+        """Return the solution from scaled values of another program or design."""
+        point = SearchPoint(self.rows.completed(question, values))
+        return self._solved(self._again, question, point)
+
+    def _solved(
+        self, solver: ca.Function, question: CamQuestion, begin: SearchPoint, room: Array | float = 0.0
+    ) -> SearchOutcome:
+        low, high = self.rows.ranges_of(question)
+        rows_low, rows_high = self.rows.limits_of(question, room)
+        given: dict[str, Any] = {"x0": np.clip(begin.unknowns, low, high)}
+        if len(begin.of_rows) == len(rows_low):
+            given |= {"lam_x0": begin.of_bounds, "lam_g0": begin.of_rows}
+        numbers = self.rows.numbers_of(question)
+        answer = solver(p=numbers, lbx=low, ubx=high, lbg=rows_low, ubg=rows_high, **given)
+        status = str(solver.stats()["return_status"])
+        point = SearchPoint(*(np.array(answer[key]).ravel() for key in ("x", "lam_x", "lam_g")))
+        cost = float(answer["f"])
+        finite = bool(np.all(np.isfinite(point.unknowns)) and math.isfinite(cost))
+        if finite and status in SOLVED:
+            return SearchOutcome("solved", "", point, cost)
+        state = "infeasible" if status == PROVED_INFEASIBLE else "not solved"
+        return SearchOutcome(state, f"the solver stopped with '{status}'", point if finite else None)

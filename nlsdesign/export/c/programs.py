@@ -1,0 +1,134 @@
+"""Programs beside a generated step: its self-test, main programs and build files for a controller."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from ...foundation.arrays import Array
+from ...model.flat import FlatModel, Variable
+from ..files import filled, write_all
+from .c_text import Real, comment
+from .guarded_step import GuardedModel
+from .writer import CSource, CWriter
+
+SAMPLES = 120
+DOUBLE_TOLERANCE = 1e-12
+"""Largest difference relative to the largest size of each output, for double."""
+FLOAT_TOLERANCE = 2e-4
+"""The same for float: some 3000 times its rounding error of 6e-8. This covers the rounding of a few
+hundred operations, accumulated by stable poles over some ten samples, and still reveals a wrong term."""
+
+
+def sample_inputs(model: FlatModel, real: Real) -> Array:
+    """Return an input sequence that sweeps each range, with NaN, infinities, excesses, a jump and a gap.
+
+    A measured input moves over its usual range, and no faster than is believed. The numbers are exact in the
+    number type; shape (samples, inputs).
+    """
+    columns = np.zeros((SAMPLES, len(model.inputs)))
+    for i, variable in enumerate(model.inputs):
+        middle, half = _range(variable)
+        columns[:, i] = middle + half * _wave(variable, half, float(model.sample_time or 0.0), i)
+        for at, bad in ((50, math.nan), (60, math.inf), (70, -math.inf)):
+            columns[at + i % 8, i] = bad
+        if variable.maximum < math.inf:
+            columns[80 + i % 8, i] = variable.maximum + 0.1 * half
+        if variable.minimum > -math.inf:
+            columns[90 + i % 8, i] = variable.minimum - 10.0 * half
+        if variable.plausibility is not None:
+            columns[100 + i % 8, i] += 0.5 * half
+            columns[108 + i % 4 : 112 + i % 4, i] = math.nan
+    return np.vectorize(real.round, otypes=[float])(columns) if columns.size else columns
+
+
+def _wave(variable: Variable, half: float, sample_time: float, number: int) -> Array:
+    """Return a motion within ±0.9; a measured one is slow enough to be believed."""
+    slow, fast = 0.071 * (number + 1), 0.39
+    k = np.arange(SAMPLES, dtype=float)
+    if variable.plausibility is not None:
+        k *= min(
+            1.0, 0.5 * variable.plausibility.largest_rate * sample_time / (half * (0.6 * slow + 0.3 * fast))
+        )
+    return np.asarray(0.6 * np.sin(slow * k + number) + 0.3 * np.sin(fast * k + 2 * number))
+
+
+def _range(variable: Variable) -> tuple[float, float]:
+    if variable.plausibility is None and math.isfinite(variable.minimum) and math.isfinite(variable.maximum):
+        return (variable.minimum + variable.maximum) / 2, (variable.maximum - variable.minimum) / 2
+    return variable.start, variable.nominal
+
+
+def selftest_source(c: CWriter) -> str:
+    """Return a program that feeds recorded inputs to the step and compares with the evaluation in Python.
+
+    Its ``main`` returns 0, or the number of the first sample that differs.
+    """
+    real, inputs = c.real, sample_inputs(c.model, c.real)
+    run = GuardedModel(c.model, real)
+    results = [run.step(row) for row in inputs.tolist()]
+    outputs = np.array([y for y, _ in results]).reshape(len(results), len(c.outputs))
+    size = np.abs(outputs).max(axis=0, initial=0.0)
+    relative = DOUBLE_TOLERANCE if real is Real.DOUBLE else FLOAT_TOLERANCE
+    tolerance = [relative * float(v) + real.epsilon**2 for v in size]
+    values = {
+        "samples": str(len(results)),
+        "given": real.table("given", inputs.tolist()),
+        "expected": real.table("expected", outputs.tolist()),
+        "tolerance": real.table("tolerance", [tolerance]),
+        "status": ", ".join(f"0x{status:x}u" for _, status in results),
+        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(c.inputs)],
+        "comparisons": [
+            f"differs |= !({real.function('fabs')}(outputs.{path} - expected[k][{i}]) <= tolerance[0][{i}]);"
+            for i, path in enumerate(c.outputs)
+        ],
+    }
+    return c.filled("controller_selftest.c", values)
+
+
+def write_examples(source: CSource) -> list[Path]:
+    """Write a C++ class, two main programs and build files beside the files of a step.
+
+    The main programs are a loop on a POSIX timer and a timer interrupt of a Cortex-M; both say where readings
+    come from and where outputs go to, and what to do with the status word.
+
+    Parameters
+    ----------
+    source
+        Files of the step, as :func:`~nlsdesign.export.export_c` writes them.
+
+    Returns
+    -------
+    list
+        Paths of the files that were written.
+
+    Raises
+    ------
+    ExportError
+        If a file cannot be written.
+    """
+    name, folder = source.name, source.header.parent
+    values = {
+        "name": name,
+        "NAME": name.upper(),
+        "real": source.real,
+        "title": f"/* {comment(source.model.description)} */",
+        "read": [
+            f"inputs.{path} = {source.real.literal(0.0)}; /* {comment(v.description)}, {v.unit} */"
+            for v, path in zip(source.model.inputs, source.writer.inputs, strict=True)
+        ],
+        "nanoseconds": str(round(1e9 * float(source.model.sample_time or 0.0))),
+        "microseconds": str(round(1e6 * float(source.model.sample_time or 0.0))),
+    }
+    files = {
+        f"{name}.hpp": "wrapper.hpp",
+        f"{name}_example_posix.c": "example_posix.c",
+        f"{name}_example_cortex_m.c": "example_cortex_m.c",
+        "CMakeLists.txt": "CMakeLists.txt",
+        f"{name}.mk": "example.mk",
+    }
+    texts = {folder / file: filled(shell, values) for file, shell in files.items()}
+    write_all(texts)
+    return list(texts)

@@ -1,0 +1,5 @@
+if (@condition@) {
+    @begin@
+    state->begun = 1u;
+@resume@
+}

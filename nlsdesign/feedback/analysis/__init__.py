@@ -1,0 +1,30 @@
+"""What can be said of a model before anything is built on it: observability, stability, best estimate."""
+
+from .kalman import EstimateDeviation, NoiseAssumptions
+from .observability import EmpiricalGramian, Observability, RankDrops, empirical_gramian, rank_drops
+from .rest import ranges_at_rest
+from .rest_points import RestPoints, rest_points
+from .sensor_ranking import SensorCandidate, SensorRanking, rank_sensors
+from .stability import Stability, sampled_poles
+from .sweep import Chart, View, over_angle
+
+__all__ = [
+    "Chart",
+    "EmpiricalGramian",
+    "EstimateDeviation",
+    "NoiseAssumptions",
+    "Observability",
+    "RankDrops",
+    "RestPoints",
+    "SensorCandidate",
+    "SensorRanking",
+    "Stability",
+    "View",
+    "empirical_gramian",
+    "over_angle",
+    "ranges_at_rest",
+    "rank_drops",
+    "rank_sensors",
+    "rest_points",
+    "sampled_poles",
+]

@@ -1,0 +1,254 @@
+"""Where a model rests at a held angle, how large its variables are, and which law leaves its range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...foundation.arrays import Array
+from ...foundation.errors import ArrangementError, ConvergenceError, unknown_name
+from ...foundation.quantity import with_unit
+from ...model import FlatModel
+from ...model.roles import measured_motion
+from ...model.transform import named
+
+
+def rate_state(model: FlatModel, angle: str) -> str:
+    """Return the name of the state that is the derivative of another one."""
+    states = [v.name for v in model.states]
+    if angle not in states:
+        raise unknown_name("state", angle, states)
+    s = model.symbols()
+    rate = s.derivative[states.index(angle)]
+    for i, name in enumerate(states):
+        if ca.is_equal(rate, s.state[i]):
+            return name
+    raise ArrangementError(
+        f"'{angle}'", "its derivative is not a state", next_step="choose the angle of a moving body"
+    )
+
+
+def rest_states(
+    model: FlatModel,
+    angles: Array,
+    *,
+    angle: str | None = None,
+    consistent: Mapping[str, str] | None = None,
+    tolerance: float = 1e-9,
+) -> Array:
+    """Return the states in which everything rests while the angle is held, at many angles at once.
+
+    ``model``: continuous; inputs are at their start values. ``angle``: state that is held, its rate at zero;
+    by default the motion of the driven body. ``consistent``: states that have to agree with a signal of the
+    same model, such as the extension of the published form with ``"spring.rubber.extension.geometric"``;
+    state name to signal name.
+    """
+    return RestSolver(model, angle=angle, consistent=consistent)(model, angles, tolerance)
+
+
+class RestSolver:
+    """Finds rest states of one model with many sets of numbers; its functions are built once.
+
+    Parameters
+    ----------
+    model
+        Continuous; inputs are at their start values.
+    angle, consistent
+        As for :func:`rest_states`.
+    """
+
+    def __init__(
+        self, model: FlatModel, *, angle: str | None = None, consistent: Mapping[str, str] | None = None
+    ) -> None:
+        angle = measured_motion(model, angle)
+        names, tied = [v.name for v in model.states], dict(consistent or {})
+        self._angle, self._rate = names.index(angle), names.index(rate_state(model, angle))
+        held = {self._angle, self._rate, *(names.index(name) for name in tied)}
+        s = model.symbols()
+        known, arguments = named(model, s), [s.time, s.state, s.input, s.parameter]
+        self._tied = [
+            (names.index(name), ca.Function("follow", arguments, [known[signal]]))
+            for name, signal in tied.items()
+        ]
+        self._free = free = [i for i in range(len(names)) if i not in held]
+        rate = ca.vertcat(*[s.derivative[i] for i in free])
+        slope = ca.jacobian(rate, ca.vertcat(*[s.state[i] for i in free])) if free else ca.SX(0, 0)
+        self._newton = ca.Function("rate", arguments, [rate, ca.densify(slope)])
+
+    def __call__(self, model: FlatModel, angles: Array, tolerance: float = 1e-9) -> Array:
+        """Return rest states, shape (n, states)."""
+        x = np.tile(model.start(model.states), (len(angles), 1))
+        x[:, self._angle] = angles
+        x[:, self._rate] = 0.0
+        p, u = model.start(model.parameters), model.start(model.inputs)
+        for place, follow in self._tied:
+            x[:, place] = evaluate_rows(follow, x, u, p)[0][:, 0]
+        return _newton(self._newton, x, (u, p), self._free, (tolerance, model.name))
+
+
+def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) -> dict[str, float]:
+    """Return a typical size of every state and output over a range of angles, for scaling.
+
+    Angle: the largest in the range. Other states: the largest of their rest values and of what they would
+    jump to if the angle moved there at once from zero. Speed: that of a swing with this amplitude and the
+    largest acceleration at rest. What stays zero has size one.
+
+    ``angle``: name of the state that is swept; by default the motion of the driven body.
+    """
+    angle = measured_motion(model, angle)
+    names = [v.name for v in model.states]
+    speed = rate_state(model, angle)
+    grid = np.linspace(0.0, float(np.max(np.abs(angles))), 65)
+    rest = rest_states(model, grid, angle=angle)
+    s = model.symbols()
+    column = s.state[names.index(speed)]
+    probe = ca.Function(
+        "probe", [s.time, s.state, s.input, s.parameter],
+        [s.derivative, ca.jacobian(s.derivative, column), s.output],
+    )  # fmt: skip
+    rates, driven, outputs = evaluate_rows(
+        probe, rest, model.start(model.inputs), model.start(model.parameters)
+    )
+    steps = np.diff(grid)[:, None]
+    jump = np.abs(np.cumsum((driven[1:] + driven[:-1]) / 2 * steps, axis=0)[-1])
+    sizes = np.maximum(np.max(np.abs(rest), axis=0), jump)
+    at, of = names.index(angle), names.index(speed)
+    sizes[at] = grid[-1]
+    sizes[of] = np.sqrt(grid[-1] * np.max(np.abs(rates[:, of])))
+    result = {name: float(size) if size > 0.0 else 1.0 for name, size in zip(names, sizes, strict=True)}
+    for i, v in enumerate(model.outputs):
+        size = float(np.max(np.abs(outputs[:, i])))
+        result.setdefault(v.name, size if size > 0.0 else 1.0)
+    return result
+
+
+def evaluate_rows(function: ca.Function, x: Array, u: Array, p: Array) -> list[Array]:
+    """Evaluate a function of (time, state, input, parameter) at many states, at time zero.
+
+    ``x``: shape (n, states). ``u``: shape (inputs,), the same for all, or (n, inputs).
+    """
+    count = len(x)
+    if u.ndim == 2:
+        results = _mapped(function, count, (0, 3)).call([0.0, x.T, u.T, p])
+    else:
+        results = _mapped(function, count, (0, 2, 3)).call([0.0, x.T, u, p])
+    rows = []
+    for i, result in enumerate(results):
+        wide = function.size2_out(i)
+        dense = np.array(result).reshape(function.size1_out(i), count, wide)
+        rows.append(np.ascontiguousarray(dense.transpose(1, 0, 2).reshape(count, -1)))
+    return rows
+
+
+@lru_cache(maxsize=128)
+def _mapped(function: ca.Function, count: int, shared: tuple[int, ...]) -> ca.Function:
+    """Return a function of many columns; arguments that are shared are not copied for each."""
+    return function.map("rows", "serial", count, list(shared), [])
+
+
+def _newton(
+    function: ca.Function, x: Array, fixed: tuple[Array, Array], free: list[int], limit: tuple[float, str]
+) -> Array:
+    """Solve for the free states of all rows at once; done when the steps are small or down to rounding."""
+    if not free or not len(x):
+        return x
+    tolerance, name = limit
+    last = np.full(len(free), np.inf)
+    for _ in range(60):
+        rate, slope = evaluate_rows(function, x, *fixed)
+        try:
+            step = np.linalg.solve(slope.reshape(len(x), len(free), len(free)), rate[:, :, None])[:, :, 0]
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                f"rest states of {name}", "a state has no rest of its own: at standstill nothing moves it",
+                next_step="leave out hysteresis that is led by the speed, and bodies that nothing holds",
+            ) from error  # fmt: skip
+        if not np.all(np.isfinite(step)):
+            break
+        x = x.copy()
+        x[:, free] -= step
+        largest = np.max(np.abs(step), axis=0)
+        size = np.maximum(np.max(np.abs(x[:, free]), axis=0), 1e-3)
+        rounding = (largest > 0.5 * last) & (largest <= 1e3 * tolerance * size)
+        if np.all((largest <= tolerance * size) | rounding):
+            return x
+        last = largest
+    raise ConvergenceError(
+        f"rest states of {name}", "not all states come to rest while the angle is held",
+        next_step="hold further states, or leave out what only drifts",
+    )  # fmt: skip
+
+
+_ROUNDING = 1e-9
+"""Excess over a range that is rounding, relative to the nominal size."""
+
+
+class RangeAtRest(NamedTuple):
+    """A signal that leaves the stated range of its law at some angles."""
+
+    name: str
+    unit: str
+    first: float
+    last: float
+    furthest: float
+    minimum: float
+    maximum: float
+
+    @property
+    def part(self) -> str:
+        """Full name of the part that holds the law."""
+        return self.name.rpartition(".")[0]
+
+    def __str__(self) -> str:
+        limits = with_unit(f"[{self.minimum:g}, {self.maximum:g}]", self.unit)
+        angles = [f"{math.degrees(angle):.3g}" for angle in (self.first, self.last)]
+        where = f"at {angles[0]}°" if angles[0] == angles[1] else f"from {angles[0]}° to {angles[1]}°"
+        return (
+            f"{self.name} leaves {limits}, where its law is stated to hold, {where} "
+            f"and reaches {with_unit(f'{self.furthest:.3g}', self.unit)}"
+        )
+
+
+def ranges_at_rest(model: FlatModel, angles: Array, *, angle: str) -> tuple[RangeAtRest, ...]:
+    """Return the laws that are used outside of their stated range while the machine rests at some angles.
+
+    Parameters
+    ----------
+    model
+        Continuous.
+    angles
+        Shape (N,), in rad.
+    angle
+        State that is swept.
+
+    Raises
+    ------
+    ValueRangeError
+        If an angle is not finite.
+    ConvergenceError
+        If the model does not come to rest.
+    """
+    bounded = [(i, v) for i, v in enumerate(model.signals) if v.bounded]
+    if not bounded:
+        return ()
+    s = model.symbols()
+    watched = ca.vertcat(*[s.signal[i] for i, _ in bounded])
+    function = ca.Function("watched", [s.time, s.state, s.input, s.parameter], [ca.densify(watched)])
+    states = rest_states(model, angles, angle=angle)
+    (values,) = evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
+    result = []
+    for (_, v), row in zip(bounded, values.T, strict=True):
+        over = np.maximum(v.minimum - row, row - v.maximum)
+        outside = angles[over > _ROUNDING * v.nominal]
+        if outside.size:
+            near = outside[np.argsort(np.abs(outside))]
+            furthest = float(row[int(np.argmax(over))])
+            result.append(
+                RangeAtRest(v.name, v.unit, float(near[0]), float(near[-1]), furthest, v.minimum, v.maximum)
+            )
+    return tuple(result)

@@ -1,0 +1,297 @@
+"""Properties of a model over its angle: one table, one row per angle, one column per property.
+
+Below it stands the linear algebra of small systems at many angles at once: exponential, Gramian, Riccati
+equation. All take stacks of matrices, shape (N, n, n), and work by doubling: what is known of a short time
+gives twice that time in a few products. So a thousand angles cost little more than one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...foundation.arrays import Array, Mask
+from ...foundation.data_frames import Axis, data_frame, data_set
+from ...foundation.errors import unknown_name
+from ...foundation.quantity import typeset_unit
+from ...foundation.text_files import write_table
+from ...model import FlatModel, Variable
+from ...model.roles import measured_motion
+from .rest_points import RestPoint, RestPoints, rest_points
+
+
+class Columns(NamedTuple):
+    """What a view gives over all angles.
+
+    ``columns``: name, unit and description of each number; ``values``, shape (N, columns); ``words``: by
+    name, one text per angle.
+    """
+
+    columns: tuple[Variable, ...]
+    values: Array
+    words: Mapping[str, tuple[str, ...]]
+
+
+class View(ABC):
+    """A property over the angle; final classes say which numbers and words they give."""
+
+    @abstractmethod
+    def over(self, points: RestPoints) -> Columns:
+        """Return the numbers at all angles, and findings in words.
+
+        Parameters
+        ----------
+        points
+            The model at rest at each angle.
+        """
+
+
+class PointView(View):
+    """A property that is computed angle by angle, the simplest way to write one of your own."""
+
+    @abstractmethod
+    def columns(self, model: FlatModel) -> tuple[Variable, ...]:
+        """Return name, unit and description of each number."""
+
+    @abstractmethod
+    def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
+        """Return the numbers, in the order of the columns, and findings in words."""
+
+    def over(self, points: RestPoints) -> Columns:
+        """Return what :meth:`at` gives at each angle."""
+        columns = self.columns(points.model)
+        values, words = np.zeros((len(points.at), len(columns))), dict[str, list[str]]()
+        for row in range(len(points.at)):
+            values[row], texts = self.at(points.point(row))
+            for name, text in texts.items():
+                words.setdefault(name, []).append(text)
+        return Columns(columns, values, {name: tuple(texts) for name, texts in words.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Columns of numbers over one argument, with units, and findings in words.
+
+    Parameters
+    ----------
+    argument
+        What was swept.
+    at
+        Its values, shape (n,), in SI.
+    columns
+        Name, unit and description of each column.
+    values
+        Shape (n, columns).
+    words
+        By name: one text per row.
+    """
+
+    argument: Variable
+    at: Array
+    columns: tuple[Variable, ...]
+    values: Array
+    words: Mapping[str, tuple[str, ...]]
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one column."""
+        if name == self.argument.name:
+            return self.at
+        names = [v.name for v in self.columns]
+        if name not in names:
+            raise unknown_name("column", name, names)
+        column: Array = self.values[:, names.index(name)]
+        return column
+
+    def to_frame(self) -> Any:
+        """Return a ``pandas.DataFrame`` indexed by the argument; units are in its ``attrs``; needs pandas."""
+        data = {v.name: self.values[:, i] for i, v in enumerate(self.columns)} | dict(self.words)
+        return data_frame(data, units=self._units(), index=self._axis())
+
+    def to_xarray(self) -> Any:
+        """Return an ``xarray.Dataset`` over the argument, each column with its unit; needs xarray."""
+        over = (self.argument.name,)
+        data: dict[str, tuple[tuple[str, ...], Any]] = {
+            v.name: (over, self.values[:, i]) for i, v in enumerate(self.columns)
+        }
+        data |= {name: (over, np.array(texts)) for name, texts in self.words.items()}
+        return data_set(data, axes=[self._axis()], units=self._units())
+
+    def _units(self) -> dict[str, str]:
+        return {v.name: v.unit for v in self.columns}
+
+    def _axis(self) -> Axis:
+        return Axis(self.argument.name, self.argument.unit, self.at)
+
+    def write_csv(self, path: Path) -> None:
+        """Write ``name [unit]`` columns, words last; nothing is left behind if writing fails.
+
+        Parameters
+        ----------
+        path
+            File to write.
+        """
+        header = [f"{v.name} [{v.unit}]" for v in (self.argument, *self.columns)] + list(self.words)
+        rows = [header]
+        for i, at in enumerate(self.at):
+            numbers = [repr(float(value)) for value in (at, *self.values[i])]
+            rows.append(numbers + [text[i] for text in self.words.values()])
+        write_table(path, rows)
+
+    def __str__(self) -> str:
+        names = [f"{v.name} [{typeset_unit(v.unit) or '1'}]" for v in (self.argument, *self.columns)]
+        widths = [max(len(name), 11) for name in names]
+        lines = ["  ".join(name.rjust(w) for name, w in zip(names, widths, strict=True))]
+        for i, at in enumerate(self.at):
+            row = zip((at, *self.values[i]), widths, strict=True)
+            lines.append("  ".join(f"{value:.5g}".rjust(w) for value, w in row))
+        return "\n".join(lines)
+
+
+def over_angle(
+    model: FlatModel,
+    views: Sequence[View],
+    *,
+    angles: Sequence[float] | Array,
+    angle: str | None = None,
+    consistent: Mapping[str, str] | None = None,
+) -> Chart:
+    """Evaluate views of a model at rest over its angle.
+
+    Parameters
+    ----------
+    model
+        Continuous.
+    views
+        For instance ``[Observability(), Stability()]``.
+    angles
+        Shape (n,), in rad.
+    angle
+        State that is swept; by default the motion of the driven body.
+    consistent
+        States that have to agree with a signal, as for :func:`~nlsdesign.feedback.analysis.rest.rest_states`.
+
+    Raises
+    ------
+    ValueRangeError
+        If an angle is not finite, the model has no finite slope at one, or it is not continuous.
+    ConvergenceError
+        If the model does not come to rest.
+    ArrangementError
+        If no angle is named and the structure does not say which body is driven.
+    """
+    angle = measured_motion(model, angle)
+    points = rest_points(model, np.asarray(angles, dtype=float), angle=angle, consistent=consistent)
+    parts = [view.over(points) for view in views]
+    columns = tuple(column for each in parts for column in each.columns)
+    values = np.column_stack([np.zeros((len(points.at), 0)), *(each.values for each in parts)])
+    words = {name: texts for each in parts for name, texts in each.words.items()}
+    return Chart(model.variable(angle), points.at, columns, values, words)
+
+
+_TERMS = 14
+"""Terms of the power series over the shortest time, where the norm is at most 1/8: exact to rounding."""
+_DOUBLINGS = 60
+"""At most this many doublings towards a steady state: 2^60 samples."""
+
+
+def transposed(a: Array) -> Array:
+    """Return each matrix transposed.
+
+    ``a``: shape (N, n, m).
+    """
+    return np.swapaxes(a, -1, -2)
+
+
+def symmetric(a: Array) -> Array:
+    """Return the symmetric part of each matrix.
+
+    ``a``: shape (N, n, n).
+    """
+    half: Array = (a + transposed(a)) / 2.0
+    return half
+
+
+def exponential_and_gramian(a: Array, weight: Array, horizon: float) -> tuple[Array, Array]:
+    """Return e^(A·T) and ∫₀ᵀ e^(Aᵀt)·W·e^(At) dt of each matrix.
+
+    A power series over a short time, then doubling: W(2t) = W(t) + e^(Aᵀt)·W(t)·e^(At). Sums of what is not
+    negative, so nothing cancels. With Aᵀ for A it is the covariance of white noise. Source: Van Loan 1978.
+
+    ``a``, ``weight``: shape (N, n, n), A in 1/s and W symmetric.
+    """
+    norm = float(np.max(np.sum(np.abs(a), axis=-1), initial=0.0)) * horizon
+    doublings = max(0, int(np.ceil(np.log2(max(norm, 1e-300) / 0.125))))
+    step = horizon / 2.0**doublings
+    whole = np.broadcast_to(np.eye(a.shape[-1]), a.shape).copy()
+    total = np.zeros(np.broadcast_shapes(a.shape, weight.shape))
+    power, moment = whole, np.broadcast_to(weight, total.shape)
+    # d/dt of e^(Aᵀt)·W·e^(At) is Aᵀ(·) + (·)A, so its k-th derivative at zero follows from the one before.
+    for k in range(1, _TERMS + 1):
+        total = total + moment * step / k
+        moment = (transposed(a) @ moment + moment @ a) * (step / k)
+        power = power @ a * (step / k)
+        whole = whole + power
+    for _ in range(doublings):
+        total = total + transposed(whole) @ total @ whole
+        whole = whole @ whole
+    return whole, symmetric(total)
+
+
+def covariance_without_measurement(transition: Array, noise: Array) -> Array:
+    """Return P = Φ·P·Φᵀ + Q of each pair by doubling; infinite where it grows without bound.
+
+    ``transition``, ``noise``: Φ and Q, shape (N, n, n).
+    """
+    total, power = noise, transition
+    with np.errstate(over="ignore", invalid="ignore"):  # what grows overflows, and is said to be infinite
+        for _ in range(_DOUBLINGS):
+            more = power @ total @ transposed(power)
+            total, power = total + more, power @ power
+            if not np.any(np.abs(more) > 1e-17 * np.max(np.abs(total), axis=(-1, -2), keepdims=True)):
+                break
+    radius = np.max(np.abs(np.linalg.eigvals(transition)), axis=-1, initial=0.0)
+    return np.where((radius < 1.0)[:, None, None], symmetric(total), np.inf)
+
+
+def riccati(transition: Array, information: Array, noise: Array) -> tuple[Array, Mask]:
+    """Return the steady prior covariance of each Kalman filter, and whether there is one.
+
+    P = Φ·(P − P·Cᵀ(C·P·Cᵀ + R)⁻¹C·P)·Φᵀ + Q by structure-preserving doubling: after k steps it is the
+    covariance after 2^k samples from a known start. There is no steady state where something that does not
+    decay is not seen. Source: Anderson 1978.
+
+    ``transition``: Φ, shape (N, n, n). ``information``: CᵀR⁻¹C, shape (N, n, n). ``noise``: Q, shape (N, n,
+    n). Result: P, shape (N, n, n), not a number where there is none; and shape (N,), whether there is one.
+    """
+    size = transition.shape[-1]
+    identity = np.eye(size)
+    a, g, h = transposed(transition).copy(), information.copy(), noise.copy()
+    settled, open_ = np.zeros(len(a), dtype=bool), np.arange(len(a))
+    with np.errstate(over="ignore", invalid="ignore"):  # what grows overflows, and has no steady state
+        for _ in range(_DOUBLINGS):
+            an, gn, hn = a[open_], g[open_], h[open_]
+            solved = np.linalg.solve(identity + gn @ hn, np.concatenate([an, gn], axis=-1))
+            wa, wg = solved[..., :size], solved[..., size:]
+            more = symmetric(transposed(an) @ hn @ wa)
+            a[open_], g[open_] = an @ wa, symmetric(gn + an @ wg @ transposed(an))
+            h[open_] = hn + more
+            largest, added = (np.max(np.abs(each), axis=(-1, -2)) for each in (h[open_], more))
+            settled[open_] = np.isfinite(largest) & (added <= 1e-14 * largest)
+            open_ = open_[np.isfinite(largest) & ~settled[open_]]
+            if not len(open_):
+                break
+    settled &= _decays(transition, information, np.where(settled[:, None, None], h, 0.0))
+    return np.where(settled[:, None, None], h, np.nan), settled
+
+
+def _decays(transition: Array, information: Array, prior: Array) -> Mask:
+    """Tell whether the error of each filter decays: Φ·(I + P·CᵀR⁻¹C)⁻¹ has all eigenvalues inside 1."""
+    error = transition @ np.linalg.inv(np.eye(transition.shape[-1]) + prior @ information)
+    radius = np.max(np.abs(np.linalg.eigvals(error)), axis=-1, initial=0.0)
+    decays: Mask = radius < 1.0 - 1e-12
+    return decays

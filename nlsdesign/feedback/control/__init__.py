@@ -1,0 +1,95 @@
+"""Torque control on an estimated torque, and what a closed loop does."""
+
+from .closed_loop import ClosedLoop, encoder_loop, joined
+from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
+from .evaluation.loop_verdict import LoopJudge, LoopVerdict
+from .evaluation.margins import (
+    LoopMargins,
+    OutputImpedance,
+    coupled_stability,
+    loop_margins,
+    output_impedance,
+)
+from .evaluation.onset import (
+    LimitCycleOnset,
+    LoopSpread,
+    SaturationLine,
+    loop_over_spread,
+    onset_of_limit_cycling,
+    saturation_line,
+)
+from .evaluation.responses import (
+    SineResponse,
+    Tracking,
+    ZeroTorque,
+    held_torque,
+    sine_response,
+    torque_resolution,
+    tracking,
+    zero_torque,
+)
+from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, evaluate_loop
+from .laws.known_drive import check_torque, largest_torque, only_side
+from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
+from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
+from .laws.torque_loop import TorqueGains, torque_controller
+from .laws.velocity_loop import DisturbanceObserver, FrictionCompensation, VelocityLoop
+from .tuning import LoopChoice, LoopLimits, TunedLoop, bandwidth_against_impedance, best_choices, largest_gain
+
+__all__ = [
+    "AntiWindup",
+    "BackCalculation",
+    "ClosedLoop",
+    "ConditionalIntegration",
+    "DesiredRate",
+    "DisturbanceObserver",
+    "FilteredDifference",
+    "FrictionCompensation",
+    "FrozenTables",
+    "GivenRate",
+    "LimitCycleOnset",
+    "LoopChoice",
+    "LoopEvaluation",
+    "LoopJudge",
+    "LoopLimits",
+    "LoopMargins",
+    "LoopRange",
+    "LoopSpread",
+    "LoopVerdict",
+    "OutputImpedance",
+    "PidTorque",
+    "SaturationLine",
+    "ScheduledTorque",
+    "SineResponse",
+    "SlidingPlant",
+    "SlopedTables",
+    "StuckPlant",
+    "TorqueGains",
+    "TorqueLaw",
+    "Tracking",
+    "TunedLoop",
+    "VelocityLoop",
+    "ZeroTorque",
+    "bandwidth_against_impedance",
+    "best_choices",
+    "check_torque",
+    "coupled_stability",
+    "encoder_loop",
+    "evaluate_loop",
+    "held_torque",
+    "joined",
+    "largest_gain",
+    "largest_torque",
+    "loop_margins",
+    "loop_over_spread",
+    "only_side",
+    "onset_of_limit_cycling",
+    "output_impedance",
+    "saturation_line",
+    "sine_response",
+    "torque_controller",
+    "torque_resolution",
+    "tracking",
+    "with_fine_counts",
+    "zero_torque",
+]

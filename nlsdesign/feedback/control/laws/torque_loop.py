@@ -1,0 +1,216 @@
+"""Torque controller of a series elastic drive: an outer law on the torque around a velocity loop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from ....foundation.errors import ArrangementError, ValueRangeError
+from ....model import FlatModel, Variable
+from ....model.declared_limits import with_declared_reading
+from .known_drive import KnownDrive, voltage_is_limited
+from .law_writer import DESIRED, LawWriter
+from .law_writer import LoopNames as LoopNames
+from .law_writer import loop_names as loop_names
+from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
+from .velocity_loop import VelocityLoop
+
+SHARE_OF_RATE = 0.06
+"""Share of the sampling rate that the velocity loop of the default gains has at most: 60 Hz at 1 kHz."""
+
+CARRIED = 0.1
+"""Share of the sampling rate above which no loop is closed.
+
+From the mean time of a difference of angles to the middle of the hold of the current, one sample of
+computation between them, two samples pass: at a tenth of the rate 72° of phase, which leaves 18° of the 90°
+that an integrating plant has.
+"""
+
+
+@dataclass(frozen=True)
+class TorqueGains:
+    """Settings of a PID law and its velocity loop in one list; all of them can be tuned in the controller.
+
+    Parameters
+    ----------
+    proportional
+        Speed command per torque error, in rad/s per N·m. Below crossover the torque that a moved load feels
+        is its speed over this number.
+    integral
+        In rad/s² per N·m.
+    derivative
+        In rad per N·m.
+    derivative_bandwidth
+        Cut-off frequency of the filter on the derivative, in Hz.
+    speed_limit
+        Largest speed command, in rad/s.
+    velocity_bandwidth
+        Of the velocity loop, in Hz.
+    velocity_integral
+        Frequency below which the velocity loop integrates, in Hz.
+    speed_bandwidth
+        Cut-off frequency of the filter on the difference of the encoder, in Hz.
+    compensation
+        Share of the estimated spring torque that is added to the current, so that the velocity loop does not
+        have to carry it.
+
+    Raises
+    ------
+    ValueRangeError
+        If a gain is negative or not finite.
+    """
+
+    proportional: float = 32.0
+    integral: float = 100.0
+    derivative: float = 0.0
+    derivative_bandwidth: float = 100.0
+    speed_limit: float = 60.0
+    velocity_bandwidth: float = 60.0
+    velocity_integral: float = 6.0
+    speed_bandwidth: float = 300.0
+    compensation: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_settings(self)
+
+    @property
+    def law(self) -> PidTorque:
+        """The outer law with these gains."""
+        return PidTorque(
+            self.proportional, self.integral, self.derivative, self.derivative_bandwidth, self.speed_limit
+        )
+
+    @property
+    def velocity(self) -> VelocityLoop:
+        """The velocity loop with these gains, without compensation of friction."""
+        return VelocityLoop(
+            bandwidth=self.velocity_bandwidth,
+            integral=self.velocity_integral,
+            speed_bandwidth=self.speed_bandwidth,
+            compensation=self.compensation,
+            friction=None,
+        )
+
+
+def torque_controller(
+    plant: FlatModel,
+    *,
+    law: TorqueLaw | None = None,
+    velocity: VelocityLoop | None = None,
+    gains: TorqueGains | None = None,
+    sample_time: float = 1e-3,
+    current: str | None = None,
+) -> FlatModel:
+    """Return the controller as a discrete flat model.
+
+    Inputs are the desired torque, the estimate of the spring's torque and the measured angle of the motor;
+    output is the motor current. Their names are those of the plant, the desired torque has the ending
+    ``.desired``: ``spring.torque.desired``, ``spring.torque``, ``motor.angle`` and ``motor.current`` where
+    the plant's parts are called spring and motor. An outer law commands the speed of the spring, the velocity
+    loop makes it. Inertia, gear ratio, torque constant, limits and friction are parameters of the controller
+    under the names that they have in the plant, the settings are called ``controller.NAME``.
+
+    Parameters
+    ----------
+    plant
+        Continuous, on the bench: load fixed or prescribed.
+    law
+        Outer law, such as :class:`~nlsdesign.feedback.control.laws.outer_laws.ScheduledTorque`; a PID
+        with the
+        defaults of :class:`TorqueGains` if neither a law nor gains are given, its velocity loop at most at
+        0.06 of the sampling rate.
+    velocity
+        Velocity loop inside; with its defaults if only a law is given.
+    gains
+        Settings of a PID and its velocity loop in one list, in place of ``law`` and ``velocity``.
+    sample_time
+        In s.
+    current
+        Name of the output; by default that of the input of the motor.
+
+    Raises
+    ------
+    ArrangementError
+        If the plant has no motor that is driven by a current, or no series spring that it turns, or both
+        gains and parts are given.
+    ValueRangeError
+        If the sample time is not positive, a bandwidth is more than it carries, or the outer loop is faster
+        than the inner one.
+    """
+    if not (math.isfinite(sample_time) and sample_time > 0.0):
+        raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
+    outer, inner = _parts(law, velocity, gains or _gains_by_default(law, velocity, sample_time))
+    _check_bandwidths(outer, inner, sample_time)
+    drive, writer = KnownDrive(plant), LawWriter(sample_time, plant.origin)
+    names = drive.names
+    heard = Heard(
+        writer.input(names.desired, "N*m", "torque that the spring should have"),
+        writer.input(names.torque, "N*m", "estimate of the torque that the spring has"),
+        writer.input(names.angle, "rad", "measured angle of the motor"),
+    )
+    command = outer.command(writer, drive, heard)
+    motor = inner.current(writer, drive, heard, command)
+    command.finish(motor.held)
+    speed = command.speed / drive.spring_turns(writer)
+    writer.signal(f"{names.speed}.{DESIRED}", "rad/s", "speed command", speed)
+    writer.signal(f"{names.speed}.measured", "rad/s", "filtered speed", motor.speed)
+    limit = plant.variable(drive.motor.current_limit).start
+    output = Variable(
+        current or names.current, "A", "current for the coming sample",
+        nominal=limit, minimum=-limit, maximum=limit,
+    )  # fmt: skip
+    supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
+    description = f"{outer.title} around a velocity loop{supply}"
+    model = writer.model("torque_controller", description, (output, motor.current))
+    return _with_declared_angle(model, plant, names.angle)
+
+
+def _with_declared_angle(controller: FlatModel, plant: FlatModel, angle: str) -> FlatModel:
+    """Return the controller with what the deck declares of the readings of its angle."""
+    inputs = [with_declared_reading(v, plant, angle) if v.name == angle else v for v in controller.inputs]
+    return replace(controller, inputs=tuple(inputs))
+
+
+def _parts(
+    law: TorqueLaw | None, velocity: VelocityLoop | None, gains: TorqueGains | None
+) -> tuple[TorqueLaw, VelocityLoop]:
+    if gains is not None and (law is not None or velocity is not None):
+        raise ArrangementError(
+            "gains", "are those of a PID law and its velocity loop, and law or velocity is given as well",
+            next_step="give law=PidTorque(...) and velocity=VelocityLoop(...) alone",
+        )  # fmt: skip
+    if gains is not None:
+        return gains.law, gains.velocity
+    return law or PidTorque(), velocity or VelocityLoop()
+
+
+def _gains_by_default(
+    law: TorqueLaw | None, velocity: VelocityLoop | None, sample_time: float
+) -> TorqueGains | None:
+    """Return the default gains where nothing is given, with a velocity loop that the sample time carries."""
+    if law is not None or velocity is not None:
+        return None
+    usual = TorqueGains()
+    return replace(usual, velocity_bandwidth=min(usual.velocity_bandwidth, SHARE_OF_RATE / sample_time))
+
+
+def _check_bandwidths(law: TorqueLaw, velocity: VelocityLoop, sample_time: float) -> None:
+    outer, inner = law.closes_at(sample_time), velocity.closes_at(sample_time)
+    loops = {"torque loop": outer, "velocity loop": inner}
+    if velocity.disturbance is not None:
+        loops["disturbance observer"] = velocity.disturbance.bandwidth
+    for name, value in loops.items():
+        if value > CARRIED / sample_time * (1.0 + 1e-9):
+            raise ValueRangeError(
+                f"bandwidth of the {name} {value:g} Hz",
+                f"is more than a sample time of {1e3 * sample_time:g} ms carries: a tenth of the sampling "
+                f"rate, {CARRIED / sample_time:g} Hz, where the two samples between angle and current take "
+                "72° of phase",
+                next_step=f"ask for {CARRIED / sample_time:g} Hz or less, or sample faster",
+            )
+    if outer > inner:
+        raise ValueRangeError(
+            f"bandwidth of the torque loop {outer:g} Hz",
+            f"is above that of the velocity loop inside, {inner:g} Hz, which has to make its commands",
+            next_step=f"ask for a third of it or less, {inner / 3.0:g} Hz",
+        )

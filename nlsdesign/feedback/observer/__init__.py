@@ -1,0 +1,93 @@
+"""From a flat model to a discrete observer, which is a flat model again."""
+
+from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
+from .adaptive.duty_and_directions import AdaptiveSettings, Trust
+from .adaptive.estimator_bound import EstimatorBound, estimator_bound
+from .certificates import (
+    Assumptions,
+    Certificate,
+    CertifiedGain,
+    CodeToCompare,
+    ContinuousContraction,
+    Contraction,
+    HeldEstimate,
+    Verification,
+    certified_design,
+    certify,
+    certify_continuous,
+    certify_held_estimate,
+    clamped_estimate_bound,
+    declared_assumptions,
+    read_certificate,
+    verify,
+    write_certificate,
+)
+from .scheduling.angle_form import Minimal, PaperForm, StateForm
+from .scheduling.measured_angle import observe
+from .scheduling.scheduled import ErrorStability, ObserverDesign, design_observer_with_details
+from .scheduling.step import CascadeGain, ConstantGain, GainRule, PolePlacement, SteadyStateKalman
+from .scheduling.table import FixedGrid, Grid, GridByTolerance
+from .scheduling.torque_grid import GridByTorqueError
+from .spread.choice import (
+    DesignedObserver,
+    ObserverOfChoice,
+    choose_observer,
+    design_observer,
+    designed_observer,
+    least_torque_error,
+)
+from .spread.observer_bench import ObserverBench, observer_bench
+from .spread.spread_errors import SpreadErrors, errors_beside, observer_errors
+
+__all__ = [
+    "AdaptiveDesign",
+    "AdaptiveSettings",
+    "Assumptions",
+    "CascadeGain",
+    "Certificate",
+    "CertifiedGain",
+    "CodeToCompare",
+    "ConstantGain",
+    "ContinuousContraction",
+    "Contraction",
+    "DesignedObserver",
+    "ErrorStability",
+    "EstimatorBound",
+    "FixedGrid",
+    "GainRule",
+    "Grid",
+    "GridByTolerance",
+    "GridByTorqueError",
+    "HeldEstimate",
+    "Minimal",
+    "ObserverBench",
+    "ObserverDesign",
+    "ObserverOfChoice",
+    "PaperForm",
+    "PolePlacement",
+    "SpreadErrors",
+    "StateForm",
+    "SteadyStateKalman",
+    "Trust",
+    "Verification",
+    "certified_design",
+    "certify",
+    "certify_continuous",
+    "certify_held_estimate",
+    "choose_observer",
+    "clamped_estimate_bound",
+    "declared_assumptions",
+    "design_adaptive_observer",
+    "design_observer",
+    "design_observer_with_details",
+    "designed_observer",
+    "errors_beside",
+    "estimator_bound",
+    "least_torque_error",
+    "observe",
+    "observer_bench",
+    "observer_errors",
+    "read_certificate",
+    "verify",
+    "write_certificate",
+]

@@ -1,0 +1,35 @@
+"""What is proved of an observer: gains and Lyapunov functions from matrix inequalities, files of proof.
+
+``spread`` and the rooms above may import it; it builds on ``scheduling`` and ``adaptive``.
+It never trusts the solver: what is written is checked in exact or interval arithmetic.
+"""
+
+from .certificate import CERTIFICATE, Certificate, Proof, write_certificate
+from .co_design import CertifiedGain
+from .continuous import ContinuousContraction, certify_continuous
+from .contraction import Contraction, certify, declared_assumptions
+from .held_estimate import HeldEstimate, certify_held_estimate, clamped_estimate_bound
+from .torque_bound import Assumptions
+from .verification import CodeToCompare, Verification, certified_design, read_certificate, verify
+
+__all__ = [
+    "CERTIFICATE",
+    "Assumptions",
+    "Certificate",
+    "CertifiedGain",
+    "CodeToCompare",
+    "ContinuousContraction",
+    "Contraction",
+    "HeldEstimate",
+    "Proof",
+    "Verification",
+    "certified_design",
+    "certify",
+    "certify_continuous",
+    "certify_held_estimate",
+    "clamped_estimate_bound",
+    "declared_assumptions",
+    "read_certificate",
+    "verify",
+    "write_certificate",
+]

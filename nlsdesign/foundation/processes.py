@@ -1,0 +1,319 @@
+"""Parallel map over processes, and what an interrupt leaves behind.
+
+Results of a map are in order and independent of the number of processes. ``__main__`` runs the program in
+:func:`guarded` before anything else is imported. An interrupt is raised in the main thread as usual, so
+that every part of the package cleans up. What a library swallows, or does not let through in time, a watch
+ends: it ends the processes that were started and removes what is temporary. All temporary folders of a run
+stand in one whose name is known before it exists.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+from .text_files import remove_drafts
+
+if TYPE_CHECKING:
+    from multiprocessing.pool import IMapIterator
+
+T = TypeVar("T")
+Mapper: TypeAlias = Callable[[Callable[[int], Any], int], Iterator[Any]]
+"""Takes what :func:`parallel_map` takes and yields what it yields."""
+
+_MOST_PROCESSES = 4
+_LONGEST_WAIT = 0.2
+"""Seconds after which a signal is handled at the latest."""
+_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of Linux."""
+_work: Callable[[int], Any] | None = None
+_alone = False
+_asked_for: int | None = None
+"""Processes that somebody asked for, in place of one for each core and at most :data:`_MOST_PROCESSES`."""
+_mapper: Mapper | None = None
+
+
+def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
+    """Yield ``work(0)`` to ``work(count - 1)``, in order.
+
+    Processes are forked, so that they see all data of the work without copying; only results are pickled.
+    Without fork, on one core, or inside such a process or a worker of a sweep, the work is done in this
+    process. Within :func:`mapped_by` it is done wherever that says.
+
+    ``work``: an exception in it ends the whole map; its results must be picklable.
+    """
+    global _work
+    if _mapper is not None and not _alone and not multiprocessing.current_process().daemon:
+        yield from _mapper(work, count)
+        return
+    can_fork = hasattr(os, "sched_getaffinity")
+    usual = min(_MOST_PROCESSES, len(os.sched_getaffinity(0))) if can_fork else 1
+    cores = min(count, usual if _asked_for is None or not can_fork else _asked_for)
+    if cores < 2 or _alone or multiprocessing.current_process().daemon:
+        yield from map(work, range(count))
+        return
+    _work = work
+    # An interrupt between fork and the first line of a helper would end that helper, and the pool would wait
+    # for it for ever. A request to end that comes there is lost where this process handles such requests, for
+    # after a fork Python forgets what it has not handled. So neither is delivered until helpers are ready.
+    with signals_held():
+        pool = multiprocessing.get_context("fork").Pool(cores, initializer=ready_as_helper)
+    try:
+        results = pool.imap(_call, range(count))
+        for _ in range(count):
+            yield _waited_for(results)
+    finally:
+        with signals_held():
+            pool.terminate()
+            pool.join()
+
+
+def _waited_for(results: IMapIterator[T]) -> T:
+    """Return the next result.
+
+    A signal that comes just before a thread begins to wait for a lock does not wake it, and Python handles it
+    only when the wait is over. So no wait is long.
+    """
+    while True:
+        try:
+            return results.next(timeout=_LONGEST_WAIT)
+        except multiprocessing.TimeoutError:
+            continue
+
+
+@contextlib.contextmanager
+def alone() -> Iterator[None]:
+    """Do the work of :func:`parallel_map` in this process until the end of the block.
+
+    A worker of many computes whole points, and its neighbours have the other cores.
+    """
+    global _alone
+    before, _alone = _alone, True
+    try:
+        yield
+    finally:
+        _alone = before
+
+
+@contextlib.contextmanager
+def at_most(processes: int | None) -> Iterator[None]:
+    """Let :func:`parallel_map` take so many processes until the end of the block; without fork it takes none.
+
+    ``processes``: at least one, which is this process; ``None`` for the usual number.
+    """
+    global _asked_for
+    before, _asked_for = _asked_for, processes
+    try:
+        yield
+    finally:
+        _asked_for = before
+
+
+@contextlib.contextmanager
+def mapped_by(mapper: Mapper) -> Iterator[None]:
+    """Let another map do the work of :func:`parallel_map` until the end of the block.
+
+    ``mapper``: takes work and count, and yields the results in order; what the work raises, it raises.
+    """
+    global _mapper
+    before, _mapper = _mapper, mapper
+    try:
+        yield
+    finally:
+        _mapper = before
+
+
+def run_to_end(
+    command: Sequence[str], *, environment: Mapping[str, str] | None = None, seconds: float | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a program and return what it printed; an interrupt ends it with all that it has started.
+
+    ``environment``: of the program; this one's without it. ``seconds``: most time that it may take;
+    ``subprocess.TimeoutExpired`` is raised beyond it.
+    """
+    group = None if sys.platform == "win32" else 0
+    with signals_held():
+        # It inherits that signals are held; a group of its own, which is killed, makes up for that.
+        process = subprocess.Popen(
+            command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True, errors="replace", process_group=group,
+        )  # fmt: skip
+    try:
+        out, errors = process.communicate(timeout=seconds)
+    except BaseException:
+        with signals_held(), contextlib.suppress(OSError):
+            if group is not None:
+                os.killpg(process.pid, signal.SIGKILL)
+            process.kill()
+        with signals_held():
+            process.wait()
+        raise
+    return subprocess.CompletedProcess(command, process.returncode, out, errors)
+
+
+@contextlib.contextmanager
+def signals_held() -> Iterator[None]:
+    """Hold interrupts and requests to end back until the end of the block, where they are delivered."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def ready_as_helper(at_death_of_parent: signal.Signals = signal.SIGTERM) -> None:
+    """Let the parent handle interruptions, and end at once when it asks for it or ends itself."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, at_death_of_parent)
+
+
+def _call(number: int) -> Any:
+    assert _work is not None
+    return _work(number)
+
+
+_PATIENCE = 1.0
+"""Seconds that the parts of the package have to clean up by themselves."""
+_usual_folder: str | None = None
+_received = threading.Event()
+
+
+def was_interrupted() -> bool:
+    """Tell whether this run was asked to end: an error that comes then may be of the interrupt's making."""
+    return _received.is_set()
+
+
+def usual_temporary_folder() -> Path:
+    """Return the folder of the system for what is temporary, which outlives this run."""
+    return Path(_usual_folder or tempfile.gettempdir())
+
+
+def guarded(run: Callable[[], None]) -> None:
+    """Run the program; SIGINT ends it with status 130, SIGTERM with 143.
+
+    ``run``: the program; it may leave by :class:`SystemExit`.
+    """
+    guard = _Guard()
+    try:
+        run()
+    except SystemExit as leaving:
+        if guard.received and leaving.code not in (0, 1, None):
+            guard.end(announced=leaving.code == 130)
+        raise
+    except BaseException:
+        # A library may have turned the interrupt into an error of its own.
+        if guard.received:
+            guard.end()
+        raise
+    finally:
+        try:
+            guard.leave()
+        except KeyboardInterrupt:
+            guard.end()
+
+
+class _Guard:
+    """Handlers of both signals, a folder for all that is temporary, and a watch."""
+
+    def __init__(self) -> None:
+        global _usual_folder
+        self.received = 0
+        self._ending = threading.Lock()
+        self._leaving = False
+        _usual_folder = tempfile.gettempdir()
+        self._folder = Path(_usual_folder) / f"nlsdesign-run-{os.getpid()}-{time.time_ns():x}"
+        for number in (signal.SIGINT, signal.SIGTERM):
+            # Who starts a command in the background has interrupts ignored, and means it.
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self._handle)
+        with contextlib.suppress(OSError):  # then each part says itself that it cannot write there
+            self._folder.mkdir(mode=0o700)
+            tempfile.tempdir = str(self._folder)
+        self._process = os.getpid()
+        sys.unraisablehook = self._unraisable
+
+    @staticmethod
+    def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
+        """Say nothing of an interrupt that came while an object was let go of; the watch ends the program."""
+        if unraisable.exc_type is not KeyboardInterrupt:
+            sys.__unraisablehook__(unraisable)
+
+    def _handle(self, number: int, _: FrameType | None) -> None:
+        if self.received or self._leaving:
+            return
+        self.received = number
+        _received.set()
+        threading.Thread(target=self._watch, daemon=True).start()
+        raise KeyboardInterrupt
+
+    def _watch(self) -> None:
+        time.sleep(_PATIENCE)
+        if not self._leaving:
+            self.end()
+
+    def end(self, *, announced: bool = False) -> None:
+        """End the processes that were started, remove what is temporary, and end this process."""
+        self._ending.acquire()  # never released: whoever comes second waits for the end
+        _end_children()
+        self._sweep()
+        with contextlib.suppress(OSError, ValueError):
+            sys.stdout.flush()
+        with contextlib.suppress(OSError, ValueError):
+            sys.stderr.write("" if announced else "interrupted\n")
+            sys.stderr.flush()
+        os._exit(128 + self.received)
+
+    def leave(self) -> None:
+        """Remove what is temporary; from here on interrupts change nothing."""
+        if os.getpid() == self._process:
+            self._leaving = True
+            for number in (signal.SIGINT, signal.SIGTERM):
+                # At its very end Python gives handlers back to the system, which would end it by the signal;
+                # what is ignored stays ignored.
+                signal.signal(number, signal.SIG_IGN)
+            self._sweep()
+
+    def _sweep(self) -> None:
+        remove_drafts()
+        for _ in range(10):
+            shutil.rmtree(self._folder, ignore_errors=True)
+            if not self._folder.exists():
+                return
+            time.sleep(0.02)  # a process that was ended just now may still have written
+
+
+def _end_children() -> None:
+    """End all processes that descend from this one, where the system lists them."""
+    for number in _descendants():
+        with contextlib.suppress(OSError):
+            os.kill(number, signal.SIGKILL)
+
+
+def _descendants() -> list[int]:
+    parents: dict[int, list[int]] = {}
+    with contextlib.suppress(OSError):
+        for entry in os.listdir("/proc"):
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                fields = Path("/proc", entry, "stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+                parents.setdefault(int(fields[1]), []).append(int(entry))
+    below, left = [], [os.getpid()]
+    while left:
+        left = [child for one in left for child in parents.get(one, [])]
+        below += left
+    return below

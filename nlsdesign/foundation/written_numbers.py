@@ -1,0 +1,103 @@
+"""Numbers and heads of columns as people write them: taken apart into number or name, and unit.
+
+Errors are written with the prefix of their unit that leaves no power of ten.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+from .errors import UnitError
+from .quantity import parse_unit, typeset_unit
+
+_COMMA = re.compile(r",(?P<digits>\d[\d.,]*(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)$")
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
+
+
+def split_number(text: str) -> tuple[float, str]:
+    """Return number and unit of ``"5 N·m"``, ``"5N*m"`` or ``"5N.m"``; a full stop in a unit is a product.
+
+    Examples
+    --------
+    >>> split_number("5N.m")
+    (5.0, 'N*m')
+    """
+    match = re.match(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)\b)\s*(.*)$", text)
+    if match is None:
+        raise UnitError(f"'{text}'", "does not start with a number")
+    comma = _COMMA.match(match.group(2))
+    if comma is not None:
+        raise _with_comma(text, match.group(1), comma)
+    unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", match.group(2).strip())
+    return float(match.group(1)), unit
+
+
+def _with_comma(text: str, whole: str, behind: re.Match[str]) -> UnitError:
+    """Return the error on a comma, which parts decimals in one country and thousands in another."""
+    digits, unit = behind["digits"], behind["unit"]
+    pieces = [f"{whole}.{digits} {unit}".rstrip()]
+    if len(digits) == 3 and whole.strip("-+0"):
+        pieces.append(f"{whole}{digits} {unit}".rstrip())
+    several = any(mark in digits for mark in ",.")
+    step = "write it without commas" if several else "write " + " or ".join(f"'{each}'" for each in pieces)
+    return UnitError(f"'{text}'", "has a comma; decimals are written with a point", next_step=step)
+
+
+def name_and_unit(head: str) -> tuple[str, str | None]:
+    """Return what the head of a column says, ``name [unit]`` or ``name_unit``: its name and its unit."""
+    match = _BRACKETED.match(head)
+    name, _, unit = (match["name"], "", match["unit"]) if match else head.rpartition("_")
+    try:
+        parse_unit(unit)
+    except UnitError:
+        return head, None  # brackets that hold no unit belong to the name
+    return name, unit
+
+
+_PREFIXES = ((1e3, 1e-3, "k"), (1.0, 1.0, ""))
+
+
+def shared_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
+    """Return the factor by which numbers of one table or line are shown, and their unit, typeset.
+
+    ``values``: in SI; the largest decides, below one it is shown in thousandths.
+
+    Examples
+    --------
+    >>> shared_prefix([0.002, 0.4], "N*m"), shared_prefix([0.4, -3.99], "N*m")
+    ((1000.0, 'mN·m'), (1.0, 'N·m'))
+    """
+    sizes = (abs(float(f"{value:.3g}")) for value in values if math.isfinite(value))
+    largest = max(sizes, default=0.0)
+    for least, factor, prefix in _PREFIXES:
+        if largest >= least:
+            return factor, prefix + typeset_unit(unit)
+    return 1e3, "m" + typeset_unit(unit)
+
+
+def prefixed(value: float, unit: str = "N*m", *, digits: int = 3) -> str:
+    """Return a number with the prefix that fits it.
+
+    ``unit``: without a prefix; a torque if none is given.
+
+    Examples
+    --------
+    >>> prefixed(3.99), prefixed(0.0123), prefixed(0.9999), prefixed(346.0, "N", digits=2)
+    ('3.99 N·m', '12.3 mN·m', '1 N·m', '350 N')
+    """
+    factor, shown = shared_prefix([value], unit)
+    return f"{without_power(factor * value, digits)} {shown}"
+
+
+def without_power(value: float, digits: int = 3) -> str:
+    """Return a number with significant digits, and zeros in place of a power of ten.
+
+    Examples
+    --------
+    >>> without_power(3987.0), without_power(0.01234), without_power(2.5e7, 2)
+    ('3990', '0.0123', '25000000')
+    """
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text else text

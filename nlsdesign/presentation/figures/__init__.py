@@ -1,0 +1,84 @@
+"""Figures: functions from results to matplotlib figures, and from figures to SVG in the page's colours."""
+
+from matplotlib.figure import Figure
+
+from .before_after import RecordError, gap_bars
+from .cam_motion import CamMotion, cam_motion_of, cam_positions, torque_curve
+from .curves import (
+    PointPanel,
+    curves,
+    curves_beside_points,
+    loop_area,
+    metric_note,
+    torque_against_measured,
+    torque_against_target,
+    torque_loops,
+)
+from .design_figures import (
+    curve_of_task,
+    design_picture,
+    limit_margins,
+    motor_over_task,
+    pareto_front,
+    tolerance_bars,
+    torque_band,
+)
+from .design_pictures import DesignPictures, inspection_rows
+from .loop_evaluation import (
+    coupled_stability_map,
+    impedance_over_frequency,
+    margins_over_angle,
+    torque_responses,
+)
+from .over_angle import errors_over_spread, observability_over_angle, ranked_intervals, stability_over_angle
+from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time, run_over_time
+from .style import compact
+from .svg import inline_svg, write_figures
+from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
+
+__all__ = [
+    "CamMotion",
+    "ClosedLoopRun",
+    "DesignPictures",
+    "Figure",
+    "InspectionRow",
+    "PointPanel",
+    "RecordError",
+    "TitleBlock",
+    "cam_motion_of",
+    "cam_positions",
+    "closed_loop",
+    "closed_loop_of",
+    "compact",
+    "coupled_stability_map",
+    "curve_of_task",
+    "curves",
+    "curves_beside_points",
+    "design_picture",
+    "errors_over_spread",
+    "gap_bars",
+    "impedance_over_frequency",
+    "inline_svg",
+    "inspection_rows",
+    "limit_margins",
+    "loop_area",
+    "margins_over_angle",
+    "metric_note",
+    "motor_over_task",
+    "observability_over_angle",
+    "observer_error",
+    "over_time",
+    "pareto_front",
+    "ranked_intervals",
+    "run_over_time",
+    "stability_over_angle",
+    "tolerance_bars",
+    "torque_against_measured",
+    "torque_against_target",
+    "torque_band",
+    "torque_curve",
+    "torque_loops",
+    "torque_responses",
+    "workshop_drawing",
+    "write_figures",
+]

@@ -1,0 +1,231 @@
+"""Reports that commands write beside their files: a fit, an analysis over the angle, errors of observers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...bench.discrepancy.reporting.refit import Refit
+from ...feedback.analysis import Chart, RankDrops, SensorRanking
+from ...feedback.observer import SpreadErrors
+from ...foundation.quantity import three_digits, typeset_unit
+from ...foundation.written_numbers import prefixed, shared_prefix, without_power
+from ...model import FlatModel
+from ..figures import (
+    RecordError,
+    errors_over_spread,
+    gap_bars,
+    observability_over_angle,
+    stability_over_angle,
+)
+from .diagnosis_sections import ROLES, fitted_table
+from .page import write_report
+from .sections import (
+    FigureSection,
+    FileSection,
+    KeyNumber,
+    NumbersSection,
+    Section,
+    TableSection,
+    TextSection,
+)
+
+
+def write_fit_report(path: Path, result: Refit, *, facts: Mapping[str, str], files: Sequence[Path]) -> Path:
+    """Write the report on a fit: errors with the declared and the fitted numbers, and the numbers.
+
+    Parameters
+    ----------
+    path
+        File to write, ending in ``.html``.
+    result
+        Of the fit.
+    facts
+        Short texts by name, for instance deck and records.
+    files
+        Written beside the report.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ExportError
+        If the file cannot be written.
+    """
+    errors = result.errors()
+    keys = tuple(
+        KeyNumber(
+            f"{e.block}, {ROLES.get(e.role, e.role)}",
+            f"{three_digits(e.fitted)} {typeset_unit(e.unit)}",
+            f"rms, declared → fitted; noise {three_digits(e.noise_floor)}",
+            before=three_digits(e.declared),
+        )
+        for e in errors
+    )
+    sections: list[Section] = [NumbersSection("Errors", keys)]
+    if result.words():
+        caption = "What the records do not say, and what is suspect."
+        rows = tuple((each,) for each in result.words())
+        sections.append(TableSection("Remarks", ("remark",), rows, caption=caption))
+    for block in dict.fromkeys(g.block for g in result.gaps):
+        gaps = [g for g in result.gaps if g.block == block]
+        bars = [RecordError(g.record, g.before, g.after, g.noise_floor, g.role == "held_out") for g in gaps]
+        sections.append(
+            FigureSection(
+                f"Error of each record: {block}",
+                gap_bars(bars, unit=gaps[0].unit),
+                caption="Root mean square error with the declared numbers (before) and with the fitted ones "
+                "(after), filtered alike; the line across is what noise alone leaves.",
+                means="Records marked as held out were used by no fit. What stays far above the line is not "
+                "a matter of these numbers: ask `nlsdesign diagnose`.",
+            )
+        )
+    sections += fitted_table(result.numbers, "with nothing added")
+    sections.append(_files(files))
+    return write_report(path, *sections, title=f"{result.actuator.name}: refitted numbers", facts=facts)
+
+
+def write_analysis_report(
+    path: Path,
+    chart: Chart,
+    drops: RankDrops,
+    *,
+    model: str,
+    ranking: SensorRanking | None,
+    files: Sequence[Path] = (),
+) -> Path:
+    """Write the report on an analysis over the angle: what the sensors do not show, poles, further sensors.
+
+    Parameters
+    ----------
+    path
+        File to write, ending in ``.html``.
+    chart
+        Over the angle.
+    drops
+        Exact angles at which a state does not show.
+    model
+        Its name.
+    ranking
+        Which sensor would help most; ``None`` where none were ranked.
+    files
+        Written beside the report.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ExportError
+        If the file cannot be written.
+    """
+    stiffness = chart["stiffness.slow"]
+    low, high = (three_digits(float(end)) for end in (np.min(stiffness), np.max(stiffness)))
+    seen = "at every angle" if drops.detectable else "not everywhere"
+    keys = (
+        KeyNumber("detectable", seen, f"from {' and '.join(drops.measured)}"),
+        KeyNumber("stiffness at rest", f"{low} to {high} N·m/rad", "relaxed, over these angles"),
+    )
+    lines = tuple((line.replace(" -", " −"),) for line in drops.lines())
+    sections: list[Section] = [
+        NumbersSection("Key numbers", keys),
+        TableSection(
+            "What the sensors do not show", ("finding",), lines,
+            caption="States that do not show at exact angles, why, and whether they decay by themselves.",
+        ),
+        FigureSection(
+            "Observability", observability_over_angle({model: chart}, drops={model: drops}),
+            caption="Rank and condition of what the sensors show of the states; a cross is a lost rank.",
+        ),
+        FigureSection(
+            "Poles and stiffness", stability_over_angle({model: chart}),
+            caption="Poles of the plant in each of its modes, and its stiffness.",
+            means="Sliding: every body moves. Stuck: dry friction holds what it can.",
+        ),
+    ]  # fmt: skip
+    if ranking is not None:
+        rows = tuple(tuple(row) for row in ranking.rows())
+        heads = tuple(ranking.headings)
+        sections.append(
+            TableSection("Which sensor would help the torque most", heads, rows, caption=ranking.condition)
+        )
+    sections.append(_files(files))
+    return write_report(path, *sections, title=f"{model}: over the angle", facts={"deck": f"`{model}`"})
+
+
+def write_observer_report(
+    path: Path, model: FlatModel, errors: SpreadErrors, *, words: Sequence[str], files: Sequence[Path]
+) -> Path:
+    """Write the report on an observer: its torque errors over the spread beside others, and their causes.
+
+    Parameters
+    ----------
+    path
+        File to write, ending in ``.html``.
+    model
+        The observer.
+    errors
+        Of it, first, and of those that it is compared with.
+    words
+        What is said of it, one sentence or drawing of several lines each.
+    files
+        Written beside the report.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ExportError
+        If the file cannot be written.
+    """
+    first, unit = errors.observers[0], typeset_unit(errors.unit)
+    causes = errors.ranked_causes(first)
+    factor, shown = shared_prefix([size for _, size in causes], errors.unit)
+    keys = tuple(
+        KeyNumber(
+            f"{name}, median over the spread",
+            f"{prefixed(float(np.max(errors.quantile(name, 0.5))), errors.unit)} rms",
+            f"at the worst of {', '.join(f'{f:g}' for f in errors.frequencies)} Hz",
+        )
+        for name in errors.observers
+    )
+    heads = ("observer", "Hz", "exact numbers", "median", "90 %", "rms", "bound on rms")
+    sections: list[Section] = [
+        NumbersSection("Torque error", keys),
+        TextSection("The observer", drawing="\n".join(words)),
+        FigureSection(
+            "Torque errors over the spread", errors_over_spread(errors),
+            caption=f"Sines of {three_digits(errors.torque)} {unit}; {errors.drawn.shape[1]} machines drawn "
+            "from the spreads of the deck. Dashed: what no estimator with these sensors betters.",
+            means="Below: what one standard deviation of each number costs.",
+            assumed="Numbers of the deck are independent.",
+        ),
+        TableSection(
+            "Torque errors", heads, tuple(tuple(row) for row in errors.rows()),
+            caption=f"In {errors.shown_in}, root mean square.",
+        ),
+        TableSection(
+            f"Causes, {first}", ("number", f"{shown} rms"),
+            tuple((name, without_power(factor * size)) for name, size in causes),
+            caption="Torque error where one number is off by one standard deviation.", folded=True,
+        ),
+        _files(files),
+    ]  # fmt: skip
+    return write_report(path, *sections, title=f"{model.name}: torque observer")
+
+
+def _files(files: Sequence[Path]) -> FileSection:
+    kinds = {".csv": "table", ".json": "numbers for programs", ".svg": "figure", ".toml": "deck", ".c": "C99",
+             ".h": "C99, interface", ".fmu": "co-simulation FMU"}  # fmt: skip
+    named = {each: kinds.get(each.suffix, "file") for each in files}
+    return FileSection("Files", named, caption="Written beside this report.")

@@ -1,0 +1,91 @@
+"""Records on a finer clock: what a model does between samples is evaluated, and nothing else changes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nlsdesign.bench.discrepancy.block_prediction import band_errors, predict
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import Record, RecordSet
+from nlsdesign.bench.identification.equation_error import evidence
+from nlsdesign.bench.identification.equation_error.between_samples import on_clock, refined
+from nlsdesign.bench.identification.equation_error.block import Block
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.mapping import Column
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import flatten
+from nlsdesign.simulation import Trace, measure, simulate
+
+CAM = declare(load_deck(str(Path(__file__).parents[4] / "models" / "templates" / "cam-actuator.toml")))
+STEP = 5e-3
+MEASURED = ("motor_encoder.reading", "motor.current")
+
+
+def sine(frequency: float = 3.0) -> Record:
+    """Four seconds at 200 Hz; the cable changes sides of the cam in less than a sample."""
+    fine = 1e-3 * np.arange(4001)
+    current = 0.3 * np.sin(math.tau * frequency * fine)
+    run = simulate(flatten(CAM), fine, inputs={"motor.current": current}, tolerance=1e-7)
+    angle = measure(run, CAM, seed=1)["motor_encoder.reading"]
+    signals = {"motor_encoder.reading": angle[::5], "motor.current": current[::5]}
+    return Record("sine", Trace(fine[::5], signals, dict(zip(MEASURED, ("rad", "A"), strict=True)), "sine"))
+
+
+RECORDS = RecordSet((sine(),), tuple(Column(n, n, u) for n, u in zip(MEASURED, ("rad", "A"), strict=True)))
+
+
+def squares(bench: Bench) -> float:
+    (block,) = bench_blocks()
+    (each,) = bench.evidence(bench.driven(block, []), bench.records.records, {})
+    return float(np.mean(each.residual({})[0] ** 2))
+
+
+def bench_blocks() -> list[Block]:
+    return list(blocks_of(flatten(CAM), MEASURED))
+
+
+def test_a_corner_that_is_passed_between_samples_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(RECORDS, bench_blocks())
+    assert bench.clock < 0.6 * STEP
+    assert squares(bench) < 1.4
+    (remark,) = bench.records.remarks
+    assert "sampled so slowly" in str(remark)
+    monkeypatch.setattr(evidence, "resolving_step", lambda readings: math.inf)
+    assert squares(Bench(RECORDS, bench_blocks())) > 1.4, "or the test would show nothing"
+
+
+def test_what_is_predicted_stays_on_the_samples_as_measured() -> None:
+    assert predict(CAM, RECORDS, "sine").time.shape == RECORDS.records[0].trace.time.shape
+    (error,) = band_errors(CAM, RECORDS, "sine").values()
+    assert error.error < 1.2 * error.noise_floor
+
+
+def test_samples_stay_between_which_others_are_put() -> None:
+    whole = RECORDS.records[0]
+    finer = refined(whole, 4)
+    assert finer.step == pytest.approx(0.25 * STEP)
+    for name in MEASURED:
+        np.testing.assert_allclose(finer.trace[name][::4], whole.trace[name], atol=1e-12)
+        assert finer.resolution_of(name).quantum == pytest.approx(2.0 * whole.resolution_of(name).quantum)
+    assert on_clock(RECORDS, STEP) is RECORDS
+
+
+def test_a_masked_sample_has_no_part_in_what_is_put_beside_it() -> None:
+    whole = RECORDS.records[0]
+    mask = np.zeros(len(whole.trace), dtype=bool)
+    mask[200] = True
+    spoilt = whole.trace["motor.current"].copy()
+    spoilt[200] += 1e3
+    signals = {**whole.trace.signals, "motor.current": spoilt}
+    one, other = (
+        refined(replace(whole, masked={"motor.current": mask}, trace=trace), 2)
+        for trace in (whole.trace, replace(whole.trace, signals=signals))
+    )
+    np.testing.assert_array_equal(one.trace["motor.current"], other.trace["motor.current"])
+    assert list(np.flatnonzero(one.masked["motor.current"])) == [399, 400, 401]

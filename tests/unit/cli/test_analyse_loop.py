@@ -1,0 +1,118 @@
+"""``nlsdesign analyse loop``: numbers, findings, files, exit status."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from nlsdesign.cli.analyse_loop import _loops, loop
+from nlsdesign.feedback.control import LoopVerdict, only_side, sine_response
+from nlsdesign.feedback.control.evaluation.whole_evaluation import stretches
+
+FINGER = str(Path(__file__).parents[3] / "models" / "templates" / "one-sided-finger.toml")
+
+
+def run(out: Path, *options: str) -> tuple[int, dict]:
+    result = CliRunner().invoke(loop, [*options, "--out", str(out), "--json"])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.output
+    return result.exit_code, json.loads(result.stdout)
+
+
+def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp_path: Path) -> None:
+    options = ("--deck", "austin2015_figure_consistent", "--proportional", "70 rad/s/N/m",
+               "--amplitude", "2.8 N*m")  # fmt: skip
+    status, found = run(tmp_path, *options)
+    assert status == 1
+    assert not found["stable"]
+    assert any(line.startswith("2.8 N·m held: limit cycle of ±") for line in found["findings"])
+    # The sine limit-cycles at nearly all frequencies, which is one finding with their range.
+    (sine,) = [line for line in found["findings"] if line.startswith("sine of ")]
+    assert sine.startswith("sine of ±2.8 N·m at 0.1 to 8.6 Hz (19 of 20 frequencies): limit cycle of ±0.0")
+    (onset,) = found["onset"]
+    assert onset["value"] == pytest.approx(38.1, rel=0.05)
+    assert onset["linear"] == pytest.approx(37.5, rel=0.05)
+    (response,) = found["responses"]
+    lost = [v is None for v in response["magnitude_dB"]]
+    assert any(lost)
+    assert lost == [not text.startswith("settled") for text in response["verdicts"]]
+    for name in ("responses", "impedance", "margins", "coupled_stability"):
+        assert "<svg" in (tmp_path / f"{name}.svg").read_text("utf-8")
+    assert (
+        (tmp_path / "responses.csv")
+        .read_text("utf-8")
+        .startswith("amplitude [N*m],offset [N*m],frequency [Hz],")
+    )
+
+
+def test_frequencies_side_by_side_with_one_verdict_share_a_finding() -> None:
+    def ended(state: str, size: float, frequency: float, share: float) -> LoopVerdict:
+        return LoopVerdict(state, size, frequency, share, 20.0, 0.05)
+
+    settled, none = ended("settled", 0.01, math.nan, 0.0), ended("no answer", 0.0, math.nan, 0.0)
+    swings = [ended("limit cycle", size, 40.0, share) for size, share in ((0.1, 0.5), (1.0, 1.0))]
+    frequencies = [0.1, 0.2, 0.4, 0.8, 1.6, 3.2]
+    found = dict(stretches(frequencies, [swings[0], swings[1], settled, swings[0], none, none]))
+    assert found == {
+        "0.1 to 0.2 Hz (2 of 6 frequencies)": "limit cycle of ±0.1 to 1 N·m at 40 Hz, current up to 20 A, "
+        "50 to 100 % of the time at the current limit",
+        "0.8 Hz": str(swings[0]),
+        "1.6 to 3.2 Hz (2 of 6 frequencies)": "no answer",
+    }
+
+
+@pytest.mark.slow
+def test_a_gentle_loop_on_a_linear_spring_has_no_finding(tmp_path: Path) -> None:
+    status, found = run(tmp_path, "--deck", "austin2015_soft_spring", "--amplitude", "0.8 N*m")
+    assert status == 0
+    assert found["stable"]
+    assert found["findings"] == []
+    assert "no limit cycle" in found["onset"][0]["words"]
+    assert min(v for v in found["margins"][0]["gain_dB"]) > 3.0
+
+
+def test_bad_input_writes_nothing(tmp_path: Path) -> None:
+    out = tmp_path / "none"
+    result = CliRunner().invoke(
+        loop, ["--deck", "austin2015_soft_spring", "--amplitude", "9 N*m", "--out", str(out)]
+    )
+    assert "is more than the drive can hold, 4.3" in str(result.exception)
+    assert not out.exists()
+    result = CliRunner().invoke(loop, ["--deck", "vhb4910_specimen", "--out", str(out)])
+    assert "needs" in str(result.exception)
+    assert not out.exists()
+
+
+def test_a_spring_of_one_sign_is_swung_about_a_bias_and_silence_is_no_answer() -> None:
+    fixed, _ = _loops(FINGER, {"gains": None}, 1, 1e-3)
+    side = only_side(fixed.plant)
+    assert abs(side) == 1.0
+    size, at = 0.02, [5.0]
+    silent = sine_response(fixed, amplitude=size, frequencies=at, offset=-1.5 * side * size)
+    assert [str(v) for v in silent.verdicts] == ["no answer"]
+    assert np.all(np.isnan(silent.decibel))
+    biased = sine_response(fixed, amplitude=size, frequencies=at, offset=1.25 * side * size)
+    assert [v.state for v in biased.verdicts] == ["settled"]
+    assert np.all(np.isfinite(biased.decibel))
+
+
+def test_a_spring_of_both_signs_needs_no_bias() -> None:
+    fixed, _ = _loops("austin2015_soft_spring", {"gains": None}, 1, 1e-3)
+    assert only_side(fixed.plant) == 0.0
+
+
+@pytest.mark.slow
+def test_the_loop_of_a_finger_is_judged_on_the_side_that_pulls(tmp_path: Path) -> None:
+    status, found = run(tmp_path, "--deck", FINGER)
+    assert status in (0, 1)
+    for response in found["responses"]:
+        assert abs(response["offset_Nm"]) == pytest.approx(1.25 * response["amplitude_Nm"])
+        for value, text in zip(response["magnitude_dB"], response["verdicts"], strict=True):
+            assert isinstance(value, float) == text.startswith("settled")
+    table = (tmp_path / "responses.csv").read_text("utf-8")
+    assert "inf" not in table
+    assert ",-0," not in table

@@ -1,0 +1,105 @@
+"""``nlsdesign export fmu``: what is written, for whom, by whom."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.util import read_csv
+
+from tests.command_line import Run, files_in, run
+
+__all__ = ["run"]  # the fixture
+
+WORDS = ("export", "fmu", "--deck", "austin2015_figure_consistent", "--kind", "cascade")
+
+
+def described(file: Path) -> fmpy.model_description.ModelDescription:
+    return fmpy.read_model_description(str(file))
+
+
+def test_all_that_the_deck_allows_is_written_with_its_author_and_date(run: Run, tmp_path: Path) -> None:
+    about = ("--author", "A. Maker", "--licence", "CC0", "--date", "2026-03-04T12:00:00Z")
+    status, out, err = run(*WORDS, "--out", "o", *about)
+    assert (status, err) == (0, "")
+    assert "left out" not in out
+    names = files_in(tmp_path / "o")
+    assert names == ["controller.fmu", "observer.fmu", "observer_and_controller.fmu", "plant.fmu"]
+    for name in names:
+        found = described(tmp_path / "o" / name)
+        assert (found.author, found.license) == ("A. Maker", "CC0")
+        assert found.generationDateAndTime == "2026-03-04T12:00:00Z"
+    joint = described(tmp_path / "o" / "observer_and_controller.fmu")
+    assert {v.name for v in joint.modelVariables if v.causality == "input"} == {
+        "motor.angle",
+        "spring.torque.desired",
+    }
+    first = {name: (tmp_path / "o" / name).read_bytes() for name in names}
+    assert run(*WORDS, "--out", "again", *about)[0] == 0
+    assert {name: (tmp_path / "again" / name).read_bytes() for name in names} == first
+
+
+def test_the_law_is_that_of_the_c_code(run: Run, tmp_path: Path) -> None:
+    asked = ("--what", "controller", "--out", "o")
+    for law, words in (((), "speed by tangent stiffness"), (("--law", "pid"), "PID on the")):
+        assert run(*WORDS, *asked, *law)[0] == 0
+        assert words in described(tmp_path / "o" / "controller.fmu").description
+        assert run("export", "c", *WORDS[2:4], "--what", "controller", "--out", "c", *law)[0] == 0
+        assert words in (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
+
+
+def test_what_is_asked_for_is_written_once_with_its_reference(run: Run, tmp_path: Path) -> None:
+    asked = ("--what", "controller", "--what", "controller", "--reference", "--version", "2.0")
+    status, out, err = run(*WORDS, "--out", "o", *asked)
+    assert (status, err) == (0, "")
+    names = {"controller.fmu", "controller_in.csv", "controller_ref.csv", "controller_ref.opt"}
+    assert set(files_in(tmp_path / "o")) == names
+    assert all(name in out for name in names)
+    reference = read_csv(str(tmp_path / "o" / "controller_ref.csv"))
+    result = fmpy.simulate_fmu(
+        str(tmp_path / "o" / "controller.fmu"),
+        stop_time=1.0,
+        output_interval=1e-3,
+        input=read_csv(str(tmp_path / "o" / "controller_in.csv")),
+        output=["motor.current"],
+    )
+    size = np.ptp(reference["motor.current"])
+    assert size > 1.0
+    assert np.abs(result["motor.current"] - reference["motor.current"]).max() < 1e-9 * size
+
+
+def test_all_platforms_by_one_word(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from nlsdesign.export.fmi import fmu as compiled_binaries
+
+    def instead(sources, target, *, platform, include):  # type: ignore[no-untyped-def]
+        target.write_bytes(platform.name.encode())
+
+    monkeypatch.setenv("NLSDESIGN_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(compiled_binaries, "compile_library", instead)
+    status, _, err = run(*WORDS, "--out", "o", "--what", "plant", "--platform", "all")
+    assert (status, err) == (0, "")
+    with zipfile.ZipFile(tmp_path / "o" / "plant.fmu") as archive:
+        folders = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
+    assert folders == {"x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin"}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--what", "motor"), "'motor' is not one of"),
+        (("--platform", "amiga"), "amiga"),
+        (("--date", "yesterday"), "is no date"),
+        (("--date", "2026-03-04"), "has no time zone"),
+        (("--version", "1.0"), "'1.0' is not one of"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_leaves_nothing(
+    run: Run, tmp_path: Path, words: tuple[str, ...], message: str
+) -> None:
+    status, _, err = run(*WORDS, "--out", "o", *words)
+    assert status == 2
+    assert message in err
+    assert not (tmp_path / "o").exists()

@@ -1,0 +1,124 @@
+"""``nlsdesign observer``: kinds, reason, errors over the spread, head of the C code."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.cli.observer_kinds import KINDS
+from nlsdesign.components.assembly.deck_writer import declare, write_deck
+from nlsdesign.feedback.observer import choose_observer, designed_observer
+from nlsdesign.feedback.observer.spread import choice
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import flatten
+from tests.command_line import Run, run
+
+__all__ = ["run"]
+DECK = "austin2015_soft_spring"
+
+
+def without_spread(path: Path) -> Path:
+    """The deck with no spread at all: every machine is the one that is declared."""
+    write_deck(declare(load_deck(DECK)), path)
+    text = re.sub(r",?\s*spread = [0-9.e+-]+", "", path.read_text("utf-8"))
+    path.write_text(text, "utf-8")
+    assert all(q.spread == 0.0 for q in declare(load_deck(path)).quantities().values())
+    return path
+
+
+def test_all_commands_write_what_errs_least_over_the_spread(run: Run, tmp_path: Path) -> None:
+    chosen = choose_observer(flatten(declare(load_deck(DECK))))
+    status, out, err = run("observer", "--deck", DECK, "--out", "o", "--json")
+    assert status == 0, err
+    found = json.loads(out)
+    assert found["reason"] == chosen.reason
+    assert found["expected_rms"] == pytest.approx(chosen.expected)
+    assert (found["kind"] == "adaptive") == (chosen.expected[1] < chosen.expected[0])
+    assert not found["certified"]
+    assert run("export", "c", "--deck", DECK, "--out", "c")[0] == 0
+    codes = [(tmp_path / folder / "observer.c").read_text("utf-8") for folder in "oc"]
+    assert codes[0] == codes[1]
+    head = (tmp_path / "c" / "observer.h").read_text("utf-8").splitlines()[0]
+    assert chosen.reason in head
+    assert "not certified" in head
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("best", "adaptive")])
+def test_every_kind_is_written(run: Run, tmp_path: Path, kind: str) -> None:
+    deck = "austin2015_figure_consistent" if kind == "published" else DECK  # its states need a cam
+    status, out, err = run("observer", "--deck", deck, "--kind", kind, "--out", "o", "--json")
+    assert status == 0, err
+    found = json.loads(out)
+    assert (found["kind"], found["certified"]) == (kind, kind == "certified")
+    head = (tmp_path / "o" / "observer.h").read_text("utf-8").splitlines()[0]
+    assert ("not certified" in head) == (kind != "certified")
+    if kind == "certified":
+        assert found["statement"][0] in head
+        folder = str(tmp_path / "o")
+        assert run("observer", "verify", f"{folder}/certificate.json", "--c", folder)[0] == 0
+
+
+def test_the_option_offers_the_kinds_that_can_be_designed() -> None:
+    assert KINDS == choice.KINDS
+
+
+def test_kinds_differ_in_their_gains() -> None:
+    model = flatten(declare(load_deck("austin2015_figure_consistent")))
+    words = {kind: str(designed_observer(model, kind=kind).design.step.gain)
+             for kind in ("cascade", "certified", "kalman")}  # fmt: skip
+    assert len(set(words.values())) == 3
+    published = designed_observer(model, kind="published").design
+    assert len(published.step.plant.states) == 4  # Austin et al. 2015: angle, speed, extension, force
+
+
+def test_a_deck_without_spread_gets_the_cascade_and_the_reason(run: Run, tmp_path: Path) -> None:
+    deck = str(without_spread(tmp_path / "exact.toml"))
+    status, out, err = run("observer", "--deck", deck, "--out", "o")
+    assert status == 0, err
+    assert "cascade, for no adaptive observer can be designed: " in out
+    status, out, err = run("observer", "--deck", deck, "--errors", "--out", "e")
+    assert status == 2
+    assert "declares no spread" in err
+    assert not (tmp_path / "e").exists(), "nothing half-written"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--kind", "adaptive", "--certificate"), "an observer of kind 'adaptive' cannot be certified"),
+        (("--kind", "cascade", "--certificate", "--decay", "5"), "--decay belongs to --kind certified"),
+        (("--decay", "5"), "belong to --certificate"),
+        (("--kind", "cascades"), "'cascades' is not one of"),
+    ],
+)
+def test_what_does_not_fit_is_refused(run: Run, tmp_path: Path, words: tuple[str, ...], said: str) -> None:
+    status, _, err = run("observer", "--deck", DECK, *words, "--out", "o")
+    assert status == 2
+    assert said in err
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.slow
+def test_errors_are_printed_and_written(run: Run, tmp_path: Path) -> None:
+    words = ("--deck", "austin2015_figure_consistent", "--kind", "cascade", "--errors", "--draws", "6")
+    status, out, err = run("observer", *words, "--out", "o", "--json")
+    assert status == 0, err
+    errors = json.loads(out)["errors"]
+    assert errors == json.loads((tmp_path / "o" / "errors.json").read_text("utf-8"))
+    rows = {(row["observer"], row["frequency_Hz"]): row for row in errors["errors"]}
+    assert set(rows) == {(name, f) for name in ("cascade", "published") for f in (2.0, 5.0)}
+    assert errors["draws"] == 6
+    assert all(row["exact"] < row["median"] < row["quantile_90"] for row in rows.values())
+    # The cascade takes rubber and cam for granted and never hears the current.
+    causes = errors["causes"]["cascade"]
+    assert max(causes, key=causes.__getitem__).startswith("spring.")
+    assert causes["motor.torque_constant"] < 0.01 * max(causes.values())
+    table = list(csv.reader((tmp_path / "o" / "errors.csv").read_text("utf-8").splitlines()))
+    assert len(table) == 1 + len(rows)
+    assert float(table[1][3]) == pytest.approx(rows["cascade", 2.0]["median"], rel=1e-6)
+    assert "<svg" in (tmp_path / "o" / "errors.svg").read_text("utf-8")
+    assert "Causes, cascade" in (tmp_path / "o" / "report.html").read_text("utf-8")

@@ -1,0 +1,112 @@
+"""A command loads the libraries that it needs and no others."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.cli.main import program
+
+HEAVY = {"casadi", "numpy", "sympy", "control", "scipy", "matplotlib", "fmpy", "rich", "jinja2"}
+DECK = "austin2015_figure_consistent"
+AT_THE_END = """
+import atexit, sys
+atexit.register(lambda: print(*{name.partition(".")[0] for name in sys.modules}, file=sys.stderr))
+"""
+COMMAND = "from nlsdesign.cli.main import main; sys.argv = ['nlsdesign', *{words!r}]; main()"
+Loaded = Callable[..., tuple[set[str], str]]
+
+
+@pytest.fixture
+def loaded(root: Path, tmp_path: Path) -> Loaded:
+    """Run code in a process of its own; returns the top-level modules loaded at its end, and the output."""
+
+    def call(code: str, **environment: str) -> tuple[set[str], str]:
+        done = subprocess.run(
+            [sys.executable, "-c", AT_THE_END + code], capture_output=True, text=True, cwd=tmp_path,
+            timeout=120, env={**os.environ, "PYTHONPATH": str(root), **environment},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return set(done.stderr.splitlines()[-1].split()), done.stdout
+
+    return call
+
+
+def commands() -> list[tuple[str, ...]]:
+    """Every command of the program, those inside groups too."""
+    inner = {name: getattr(command, "commands", {}) for name, command in program.commands.items()}
+    return [(name, *below) for name, group in inner.items() for below in [(), *((one,) for one in group)]]
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_the_program_itself_loads_no_library(loaded: Loaded, option: str) -> None:
+    modules, shown = loaded(COMMAND.format(words=[option]))
+    assert "nlsdesign" in shown
+    assert "click" in modules
+    assert not modules & HEAVY
+
+
+def test_help_of_every_command_loads_no_library(loaded: Loaded) -> None:
+    asked = commands()
+    assert {("deck", "check"), ("export", "fmu"), ("study", "run"), ("diagnose",)} <= set(asked)
+    modules, shown = loaded(
+        f"""
+from click.testing import CliRunner
+from nlsdesign.cli.main import program
+for words in {asked!r}:
+    shown = CliRunner().invoke(program, [*words, "--help"])
+    assert shown.exit_code == 0, shown.output
+    print(shown.output)
+"""
+    )
+    assert shown.count("Usage:") == len(asked)
+    assert not modules & HEAVY
+
+
+def test_completion_in_the_shell_loads_no_library(loaded: Loaded) -> None:
+    typed = {"_NLSDESIGN_COMPLETE": "bash_complete", "COMP_WORDS": "nlsdesign de", "COMP_CWORD": "1"}
+    modules, offered = loaded(
+        "from nlsdesign.cli.main import program; program(prog_name='nlsdesign')", **typed
+    )
+    assert {"plain,deck", "plain,design"} <= set(offered.split())
+    assert not modules & HEAVY
+
+
+NOT_NEEDED = {
+    ("deck", "check", DECK): {"sympy", "control", "matplotlib", "fmpy", "rich", "jinja2"},
+    ("deck", "show", DECK): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
+    ("parts",): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
+    ("materials",): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
+    ("analyse", "--deck", DECK, "--count", "2", "--out", "out"): {"sympy", "control", "fmpy"},
+}
+
+
+@pytest.mark.parametrize("words", NOT_NEEDED, ids=lambda words: " ".join(words[:2]))
+def test_a_command_does_not_load_what_it_does_not_use(loaded: Loaded, words: tuple[str, ...]) -> None:
+    modules, shown = loaded(COMMAND.format(words=words))
+    assert shown.strip()
+    assert "casadi" in modules
+    assert not modules & NOT_NEEDED[words]
+
+
+@pytest.mark.parametrize("deck", ["cam-actuator", "test_rig"])
+def test_the_live_page_answers_before_any_numerical_library_is_loaded(loaded: Loaded, deck: str) -> None:
+    ended = """
+import nlsdesign.live.server as server
+server.asyncio.run = lambda run: run.close()
+"""
+    modules, _ = loaded(ended + COMMAND.format(words=["serve", deck, "--no-browser"]))
+    assert "uvicorn" in modules
+    assert not modules & HEAVY
+
+
+@pytest.mark.parametrize("room", ["report", "discrepancy", "observer", "control"])
+def test_a_room_loads_sympy_and_python_control_only_when_it_uses_them(loaded: Loaded, room: str) -> None:
+    modules, _ = loaded(f"import nlsdesign as nls; nls.{room}")
+    assert "casadi" in modules
+    assert not modules & {"sympy", "control"}

@@ -1,0 +1,66 @@
+"""The page on targets says what is measured, and the goals it names are met."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import nlsdesign as nls
+from benchmarks import targets
+from nlsdesign.export import CORTEX_M4F
+from nlsdesign.export.compilation.target_run import TargetRun, missing_emulator
+from nlsdesign.feedback.control import joined
+from nlsdesign.feedback.observer import design_observer_with_details
+
+needs_emulator = pytest.mark.skipif(bool(missing_emulator()), reason=missing_emulator())
+
+
+@pytest.fixture(scope="module")
+def chosen():
+    """Cascade observer, and it with the controller."""
+    plant = nls.flatten(nls.declare(nls.load_deck(targets.DECK)))
+    cascade = design_observer_with_details(plant).model
+    return {
+        "cascade observer": cascade,
+        "cascade observer and controller": joined(cascade, nls.torque_controller(plant)),
+    }
+
+
+@needs_emulator
+@pytest.mark.parametrize("name", targets.GOALS)
+def test_the_goals_are_met_and_the_page_says_what_is_measured(name, chosen, root):
+    cost = targets.measured(chosen[name], "float", CORTEX_M4F)
+    assert targets.missed([(name, "float", CORTEX_M4F, cost)]) == []
+    page = (root / "docs" / "targets.md").read_text(encoding="utf8")
+    (row,) = re.findall(rf"^\| {name} \| Cortex-M4F \| float \| (.*) \|$", page, flags=re.MULTILINE)
+    usual, most, flash, memory, stack = (int(cell.replace(",", "")) for cell in row.split(" | "))
+    # A change of the code moves a few instructions; a page from another time differs by more.
+    instructions = cost.run.instructions
+    assert usual == pytest.approx(np.median(instructions), rel=0.1)
+    assert most == pytest.approx(instructions.max(), rel=0.1)
+    assert flash == pytest.approx(cost.flash, rel=0.1)
+    assert (memory, stack) == (cost.memory, pytest.approx(cost.run.stack.max(), abs=32))
+
+
+def test_a_missed_goal_is_named(chosen, monkeypatch):
+    cost = nls.export.TargetMeasurement(
+        source=None,
+        processor=CORTEX_M4F,
+        alone=None,
+        added=nls.export.compilation.target_build.SectionSizes(20_000, 0, 0),
+        state=10,
+        run=TargetRun(np.array([450, 460, 470]), np.array([8]), np.zeros(1), np.zeros(1), True),
+    )
+    assert targets.missed([("cascade observer", "float", CORTEX_M4F, cost)]) == [
+        "cascade observer: 460 instructions, the goal is 400",
+        "cascade observer: 20000 B of flash, the goal is 16384",
+    ]
+
+
+def test_tables_are_put_between_their_marks():
+    page = "a\n<!-- begin: one -->\nold\n<!-- end: one -->\nb\n"
+    assert targets.replaced(page, {"one": ["| new |"]}) == page.replace("old", "| new |")
+    with pytest.raises(SystemExit, match="marks of 'two' are missing"):
+        targets.replaced(page, {"two": []})

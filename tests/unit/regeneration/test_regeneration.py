@@ -1,0 +1,129 @@
+"""The observer from the better model: its torque error before and after, known here in closed form."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nlsdesign import regeneration
+from nlsdesign.bench.identification import Record, RecordSet
+from nlsdesign.bench.identification.least_squares import Fit
+from nlsdesign.bench.identification.parameters import declared_parameter
+from nlsdesign.bench.identification.records.mapping import Column
+from nlsdesign.components import ROTATION, Assembly, Encoder, Fixed, GearedMotor, Inertia, Spring, tie
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.foundation.quantity import Quantity
+from nlsdesign.model import flatten
+from nlsdesign.presentation import report
+from nlsdesign.regeneration import ObserverChoice, Regeneration, regenerate, write_regeneration
+from nlsdesign.simulation import Trace
+
+TIME = np.arange(1500) * 0.002
+ANGLE = 0.3 * np.sin(4.0 * TIME)
+TRUE, DECLARED = 2.4, 2.0
+
+
+def machine(stiffness: float) -> Assembly:
+    source = "by hand"
+    number = Quantity(stiffness, "N*m/rad", source, spread=0.1)
+    return assembly(
+        "machine",
+        motor=GearedMotor(
+            inertia=Quantity(0.01, "kg*m^2", source),
+            gear_ratio=20.0,
+            torque_constant=Quantity(0.05, "N*m/A", source),
+            current_limit=Quantity(50.0, "A", source),
+        ),
+        load=Fixed(),
+        spring=tie(Spring(stiffness=number, domain=ROTATION), "motor", "load"),
+        encoder=Encoder(of="motor.angle", quantum=Quantity(1e-5, "rad", source)),
+    )
+
+
+def bench(*signals: str) -> RecordSet:
+    """The angle swings slowly; current and torque are those of the true spring."""
+    torque = TRUE * ANGLE
+    known = {
+        "encoder.reading": (ANGLE, "rad"),
+        "motor.current": ((torque - 0.01 * 16.0 * ANGLE) / (20.0 * 0.05), "A"),
+        "spring.torque": (torque, "N*m"),
+    }
+    trace = Trace(TIME, {n: known[n][0] for n in signals}, {n: known[n][1] for n in signals})
+    columns = tuple(Column(n, n, known[n][1]) for n in signals)
+    return RecordSet((Record("slow", trace, "fit"), Record("seen last", trace, "held_out")), columns)
+
+
+ALL = ("encoder.reading", "motor.current", "spring.torque")
+CHOICE = ObserverChoice(sample_time=2e-3)
+
+
+@pytest.fixture(scope="module")
+def result() -> Regeneration:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(regeneration, "DRAWS", 3)
+        better = flatten(machine(TRUE))
+        parameter = declared_parameter(better.variable("spring.stiffness"))
+        fit = Fit((parameter,), {"spring.stiffness": TRUE}, np.array([[1e-6]]), 0.0, {}, True)
+        return regenerate(flatten(machine(DECLARED)), better, bench(*ALL), fits=[fit], choice=CHOICE)
+
+
+def test_the_error_before_is_that_of_the_wrong_stiffness_and_is_gone_after(result: Regeneration) -> None:
+    assert [e.record for e in result.errors] == ["seen last"], "held-out records alone"
+    before, after = result.nominal
+    assert before == pytest.approx((TRUE - DECLARED) * float(np.sqrt(np.mean(ANGLE**2))), rel=0.05)
+    assert after < 0.02 * before
+    assert result.errors[0].torque == pytest.approx(TRUE * float(np.sqrt(np.mean(ANGLE**2))), rel=0.01)
+    assert (result.quantity, result.unit, result.reasons) == ("spring.torque", "N*m", ())
+
+
+def test_over_the_spread_the_declared_numbers_scatter_and_the_fitted_hardly(result: Regeneration) -> None:
+    assert len(result.spread_before) == len(result.spread_after) == 3
+    assert np.ptp(result.spread_before) > 0.1 * result.nominal[0]
+    assert max(result.spread_after) < 0.05 * min(result.spread_before)
+
+
+def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Path) -> None:
+    nominal, spread, learning, generated = result.words()
+    assert nominal.startswith("Error of the observer of `spring.torque` with the nominal numbers")
+    assert nominal.endswith(" N·m.")
+    assert "over the spread" in spread
+    assert "that learns" in learning
+    least = min((result.nominal[1], "cascade"), (result.learning[1], "adaptive"))
+    assert generated.startswith(f"Generated is the {least[1]}")
+    assert (len(result.observer.states) > 20) == (least[1] == "adaptive")
+    written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert written["nominal"]["before"] == result.nominal[0]
+    page = report.write_report(tmp_path / "r.html", *report.regeneration_sections(result, {}), title="t")
+    assert nominal.partition(": ")[2].removesuffix(".") in page.read_text(encoding="utf-8")
+
+
+def test_observer_and_plant_are_written(
+    result: Regeneration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(regeneration, "export_fmu", lambda model, path: path)
+    files, reasons = write_regeneration(result, tmp_path)
+    assert {p.name for p in files} >= {"observer.c", "observer.h", "observer.fmu", "plant.fmu"}
+    assert reasons == ()
+    assert (tmp_path / "c" / "observer.c").is_file()
+
+
+def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:
+    wheel = flatten(assembly("wheel", wheel=Inertia(inertia=1e-3)))
+    lacking = regenerate(wheel, wheel, bench(*ALL), choice=CHOICE)
+    assert lacking.observer is None
+    assert lacking.reasons[0].startswith("no observer can be designed for the better model: ")
+    assert "spring" in lacking.reasons[0]
+    assert lacking.words() == ()
+    assert math.isnan(lacking.nominal[0])
+    assert report.regeneration_sections(lacking, {})
+
+
+def test_without_a_measured_torque_there_is_an_observer_but_no_error() -> None:
+    model = flatten(machine(TRUE))
+    lacking = regenerate(model, model, bench(*ALL[:2]), choice=CHOICE)
+    assert lacking.observer is not None
+    assert "measures neither the torque 'spring.torque' nor a force behind its cam" in lacking.reasons[0]
