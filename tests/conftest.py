@@ -24,13 +24,20 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark as slow what ``long_cases.txt`` lists."""
-    lines = Path(__file__).with_name("long_cases.txt").read_text(encoding="utf8").splitlines()
-    long = {line for line in lines if line and not line.startswith("#")}
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark as slow the cases that a test names in its mark ``long_cases``; each must be one of its cases."""
+    unseen: dict[str, set[str]] = {}
     for item in items:
-        if item.nodeid in long or item.nodeid.partition("[")[0] in long:
+        mark = item.get_closest_marker("long_cases")
+        if mark is None:
+            continue
+        test, _, case = item.nodeid.partition("[")
+        unseen.setdefault(test, set(mark.args)).discard(case.removesuffix("]"))
+        if case.removesuffix("]") in mark.args:
             item.add_marker(pytest.mark.slow)
+    wrong = {test: cases for test, cases in unseen.items() if cases}
+    if wrong and not any("::" in argument for argument in config.args):
+        raise pytest.UsageError(f"no such cases, see the mark long_cases: {wrong}")
 
 
 @pytest.fixture(scope="session")

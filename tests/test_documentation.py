@@ -439,12 +439,3 @@ def test_a_walk_that_lost_its_way_is_noticed(tmp_path: Path) -> None:
     row = "## Two walks\n\n| room | where |\n| model | [`work`](../a.py#L{}) |\n"
     assert list(lost_lines(walks(row.format(4))[0], tmp_path)) == []
     assert list(lost_lines(walks(row.format(3))[0], tmp_path)) == ["a.py, line 3: 'work' stands in line [4]"]
-
-
-def test_every_long_case_is_that_of_a_test(root: Path) -> None:
-    lines = (root / "tests" / "long_cases.txt").read_text(encoding="utf8").splitlines()
-    named = [line for line in lines if line and not line.startswith("#")]
-    assert len(named) == len(set(named))
-    for line in named:
-        file, _, case = line.partition("::")
-        assert f"def {case.partition('[')[0]}(" in (root / file).read_text(encoding="utf8"), line

@@ -67,6 +67,7 @@ def test_a_late_torque_has_the_published_phase_of_the_nonlinear_spring() -> None
     assert followed(NONLINEAR, 0).deviation[1] > scatter()
 
 
+@pytest.mark.slow
 def test_it_halves_the_error_of_all_three_springs_together() -> None:
     """With the same gains; of the stiff spring alone a torque that comes at once is nearer to the points."""
     late, at_once = (

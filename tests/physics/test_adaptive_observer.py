@@ -123,6 +123,7 @@ def test_a_wide_prediction_is_corrected_as_by_kalman() -> None:
     assert kept == pytest.approx(1.0 / 401.0)
 
 
+@pytest.mark.long_cases("raised")
 @pytest.mark.parametrize("side", ["declared", "raised"])
 def test_a_step_is_the_equations_over_one_sample(cam: FlatModel, side: str) -> None:
     """Integrated finely from a moving state; the step reads the angle at both ends."""

@@ -103,6 +103,7 @@ def test_anchored_cam_against_the_law_of_the_cable() -> None:
     assert found.rms == pytest.approx(twin.rms, rel=0.02)
 
 
+@pytest.mark.long_cases("one-sided")
 @pytest.mark.parametrize("kind", ["anchored", "one-sided"])
 def test_contour_of_a_declared_cam_is_that_of_the_design(kind: str) -> None:
     if kind == "anchored":

@@ -52,6 +52,7 @@ def without_torque(model: FlatModel, design: ObserverDesign) -> Certificate[Cont
     return certify(model, design, assumptions=Assumptions((0.3, 0.32)))
 
 
+@pytest.mark.long_cases("austin2015_as_printed-411.0", "austin2015_as_printed-411000.0")
 @pytest.mark.parametrize(
     ("deck", "viscosity"),
     [
@@ -79,6 +80,7 @@ def test_both_decks_are_certified_with_their_dry_friction(deck: str, viscosity: 
     assert np.max(norms) > math.exp(-1.1 * found.proof.decay * TIME), "the proof is not far from what is true"
 
 
+@pytest.mark.long_cases("austin2015_as_printed-0.002-gain1")
 @pytest.mark.parametrize(
     ("deck", "time", "gain"),
     [

@@ -108,6 +108,7 @@ def coverage(seeds: range, counts: int) -> tuple[Array, Array]:
     return np.mean(np.abs(all_scores) < 1.96, axis=0), np.mean(all_scores, axis=0)
 
 
+@pytest.mark.long_cases("8192")
 @pytest.mark.parametrize("counts", [512, 8192])
 def test_intervals_hold_the_truth_at_coarse_and_at_fine_counts(counts: int) -> None:
     held, mean = coverage(range(3, 7), counts)

@@ -160,6 +160,17 @@ CASES = {
 }
 
 
+@pytest.mark.long_cases(
+    "a dashpot alone-0.3",
+    "a dashpot alone-4.0",
+    "a dashpot beside them-0.3",
+    "one branch-0.3",
+    "one branch-4.0",
+    "one-sided-0.3",
+    "one-sided, part-4.0",
+    "part of the range-0.3",
+    "two branches-4.0",
+)
 @pytest.mark.parametrize("frequency", [0.3, 4.0])
 @pytest.mark.parametrize("case", CASES)
 def test_losses_and_both_strokes_are_those_of_the_integrated_network(case: str, frequency: float) -> None:
@@ -174,6 +185,7 @@ def test_losses_and_both_strokes_are_those_of_the_integrated_network(case: str, 
     assert error == pytest.approx(np.sqrt(cycle.mean_square), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_band_is_the_mean_of_its_frequencies() -> None:
     problem = given(machine(SLOW))
     cycles = [by_integration(declared_arm(), f, LAST, (SLOW,)) for f in (0.3, 1.0, 4.0)]
@@ -181,6 +193,7 @@ def test_a_band_is_the_mean_of_its_frequencies() -> None:
     assert value(problem, BothStrokes((0.3, 1.0, 4.0))) == pytest.approx(wanted, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_free_contour_on_its_way_has_the_cycle_of_its_own_nodes() -> None:
     """Angles of the nodes depend on the contour there; part of the range ends between nodes."""
     made = machine(SLOW, FAST)
@@ -226,6 +239,7 @@ def test_fast_cycles_have_the_instantaneous_modulus() -> None:
     assert value(problem, BothStrokes((9e3,))) == pytest.approx(wanted, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_round_cam_loses_what_complex_stiffness_says() -> None:
     """On a round cam the strain is a sine; its loss is π·E″ per volume and amplitude squared."""
     made = machine(SLOW, one_sided=True).with_part(

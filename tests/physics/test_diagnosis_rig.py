@@ -34,6 +34,7 @@ SINGLE = [
 ]
 
 
+@pytest.mark.long_cases("coulomb_friction")
 @pytest.mark.parametrize(
     ("actuator", "effect", "number", "field"),
     SINGLE,
@@ -91,6 +92,7 @@ def test_what_no_catalogue_knows_is_not_named(tmp_path: Path) -> None:
     assert found.rms("before", "held_out") > 5.0 * found.rms("noise_floor", "held_out")
 
 
+@pytest.mark.long_cases("p07-expected3-1.3")
 @pytest.mark.parametrize(
     ("name", "expected", "reached"),
     [

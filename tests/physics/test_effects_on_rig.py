@@ -44,6 +44,9 @@ SLOW = {"drive_delay", "strain_stiffening", "permanent_set", "self_heating", "an
 """One of each room stays in the quick run."""
 
 
+@pytest.mark.long_cases(
+    "torque_constant_saturation", "cam_profile_error", "stress_softening", "cable_friction"
+)
 @pytest.mark.parametrize(
     "effect",
     [pytest.param(effect, marks=pytest.mark.slow) if effect in SLOW else effect for effect in CASES],

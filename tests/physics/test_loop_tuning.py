@@ -64,6 +64,7 @@ def test_the_largest_gain_keeps_the_margin_and_a_larger_one_does_not(loops: dict
     assert not np.all(linear_loop(replace(tuned.loop, controller=louder), at).stable())
 
 
+@pytest.mark.slow
 def test_draws_and_simulated_runs_take_gain_away(loops: dict[str, ClosedLoop]) -> None:
     loop, at = loops["nonlinear"], np.radians([10.0, 35.0])
     plain = largest_gain(loop, GAIN, between=(2.0, 200.0), angles=at)

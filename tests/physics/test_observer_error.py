@@ -117,6 +117,7 @@ def test_a_quantised_angle_costs_no_more_than_half_a_count(
     assert rms(found["motor.speed"] - moving["motor.speed"]) < 0.15
 
 
+@pytest.mark.long_cases("31000.0")
 @pytest.mark.parametrize("viscosity", [ob.PRINTED, ob.SLOW])
 def test_integrating_the_rate_of_the_extension_costs_accuracy(viscosity: float) -> None:
     """The published form carries F and integrates K(δ)·dδ/dt; its error against carrying F_M; 45°, 30 Hz.
@@ -241,6 +242,7 @@ def test_dry_friction_does_not_make_the_estimated_speed_chatter() -> None:
     assert np.max(np.abs(found["motor.speed"])[slow]) < 0.05
 
 
+@pytest.mark.long_cases("-60.0-441")
 @pytest.mark.parametrize("points", [111, 441])
 @pytest.mark.parametrize("first", [-60.0, -1500.0])
 def test_pole_placement_is_unstable_between_its_grid_points(points: int, first: float) -> None:

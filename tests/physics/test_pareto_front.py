@@ -111,6 +111,7 @@ FRONTS = [
 ]
 
 
+@pytest.mark.long_cases("error and size")
 @pytest.mark.parametrize(("first", "second", "which"), FRONTS)
 def test_the_table_says_what_the_designs_are_worth(first: type, second: type, which: tuple[int, int]) -> None:
     front = front_of(first, second)
@@ -123,6 +124,7 @@ def test_the_table_says_what_the_designs_are_worth(first: type, second: type, wh
     assert np.all(np.diff(front.values[:, 1]) < 0.0)
 
 
+@pytest.mark.long_cases("error and size")
 @pytest.mark.parametrize(("first", "second", "which"), FRONTS)
 def test_no_design_nearby_is_better_in_both(first: type, second: type, which: tuple[int, int]) -> None:
     """200 neighbours that miss no limit by more than 0.02 %: scattered, and between a point and the next."""

@@ -93,6 +93,7 @@ def fuzzed(
     return int(words[0]), int(words[1]), float(words[2]), int(words[3])
 
 
+@pytest.mark.long_cases("finite", "jump", "frozen")
 @pytest.mark.parametrize("kind", ["finite", "not a number", "jump", "frozen", "any"])
 def test_one_fault_is_forgotten_within_five_time_constants(kind: str, tmp_path: Path) -> None:
     number = ["finite", "not a number", "jump", "frozen", "any"].index(kind)
@@ -104,6 +105,7 @@ def test_one_fault_is_forgotten_within_five_time_constants(kind: str, tmp_path: 
     assert worst <= 0.01
 
 
+@pytest.mark.slow
 def test_half_the_sampling_rate_and_another_deck(tmp_path: Path) -> None:
     for number, observer in enumerate((cascade(sample_time=2e-3), cascade("austin2015_as_printed"))):
         folder = tmp_path / str(number)
@@ -262,6 +264,7 @@ def test_nothing_happens_before_a_usable_reading() -> None:
     assert outputs[0] > 0.5
 
 
+@pytest.mark.long_cases("adaptive")
 @pytest.mark.parametrize("which", ["cascade", "adaptive", "both"])
 def test_c_does_what_the_reference_does_under_faults(which: str, tmp_path: Path) -> None:
     models = {

@@ -43,6 +43,7 @@ def common(inverses: list, whole: float, most: float) -> float:
     return brentq(lambda f: sum(z(f) for z in inverses) - whole, -most, most, xtol=1e-300, rtol=1e-14)
 
 
+@pytest.mark.long_cases("6")
 @pytest.mark.parametrize("count", [3, 4, 6])
 def test_hardening_springs_share_by_the_common_force(count: int) -> None:
     draw = np.random.default_rng(count)
@@ -117,6 +118,7 @@ def test_the_derivative_is_that_of_the_implicit_function() -> None:
         assert slope == pytest.approx((ahead - behind) / (2 * step), rel=1e-8)
 
 
+@pytest.mark.slow
 def test_together_as_nested_two_by_two_also_where_rates_are_asked_for() -> None:
     a, c = Hardening(stiffness=30.0, hardening=4e4), Hardening(stiffness=10.0, hardening=9e5)
     b = BoucWen(still=5.0, level=0.3, yields_at=0.004)

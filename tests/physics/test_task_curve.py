@@ -83,6 +83,7 @@ def without_a_form(joint: str, count: int) -> tuple[float, np.ndarray, np.ndarra
     return float(rest**2), cycle.torque, bent
 
 
+@pytest.mark.long_cases("ankle-1440", "hip-480")
 @pytest.mark.parametrize(("joint", "count"), [("hip", 480), ("knee", 480), ("ankle", 1440)])
 def test_no_worse_than_the_optimum_without_a_form(joint: str, count: int) -> None:
     """The quick fall of the ankle's torque takes a tenth of the stride, so that task needs more samples."""
@@ -152,6 +153,7 @@ def test_a_cubic_spring_is_found_from_its_own_oscillation() -> None:
     assert curve.linear.heat > 20.0 * curve.best.heat, "a linear spring does not swing like this"
 
 
+@pytest.mark.long_cases("knee", "hip")
 @pytest.mark.parametrize("joint", WALKING)
 def test_the_motor_torque_moves_the_motor_as_claimed(joint: str) -> None:
     """Forward in time: the claimed torque on motor and gear, against the spring, gives the claimed motion."""

@@ -372,6 +372,7 @@ def test_without_any_spread_nothing_deviates() -> None:
     assert result.errors[0] == pytest.approx(check.rms, rel=1e-3)  # 101 angles against 801
 
 
+@pytest.mark.slow
 def test_alone_and_measured_and_halved_are_those_of_other_spreads() -> None:
     """What a cause does alone, or less of it, is what an analysis with these spreads gives."""
     result = tolerance_analysis(actuator(), target=TARGET, draws=1000, seed=5)

@@ -161,6 +161,7 @@ def test_the_robust_design_is_a_third_better_after_the_same_trim(
     assert robust.quantiles[-1].value > 0.8 * nominal.quantiles[-1].value
 
 
+@pytest.mark.slow
 def test_the_room_for_the_trim_is_kept(designs: tuple[CamDesign, CamDesign]) -> None:
     result = tolerance_analysis(designs[1].actuator, target=TARGET, rules=ANCHORED)
     (state,) = (each for each in designs[1].limits if each.limit == "TrimRoom" and each.upper)

@@ -69,6 +69,7 @@ def case(actuator: str, effect: str) -> Case:
     return Case(records, comparison, comparison.base(declared))
 
 
+@pytest.mark.long_cases("wrist-strain_stiffening-spring")
 @pytest.mark.parametrize(
     ("actuator", "effect", "block"),
     [("arm", "rubbing_spot", "motor"), ("wrist", "strain_stiffening", "spring")],

@@ -15,6 +15,7 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 
 
+@pytest.mark.slow
 def test_what_is_freed_decides_what_is_reached(tmp_path: Path) -> None:
     results = run_study("joint_cam_design", tmp_path, fast=True)
     assert set(results) == set(claims("joint_cam_design"))

@@ -46,6 +46,21 @@ def test_some_documents_show_code() -> None:
     assert len(SHOWING) > 5
 
 
+@pytest.mark.long_cases(
+    "certificates.md",
+    "how_to/both_strokes_and_losses.md",
+    "how_to/calibrate_on_the_bench.md",
+    "how_to/choose_a_torque_controller.md",
+    "how_to/co_simulate.md",
+    "how_to/design_a_cam.md",
+    "how_to/drawing_for_the_workshop.md",
+    "how_to/judge_a_torque_loop.md",
+    "how_to/own_study.md",
+    "how_to/pareto_front.md",
+    "how_to/tolerances_and_trim.md",
+    "observers.md",
+    "targets.md",
+)
 @pytest.mark.parametrize("document", SHOWING)
 def test_the_code_in_the_other_documents_runs(
     document: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -20,10 +20,12 @@ def line(request: pytest.FixtureRequest) -> Line:
     return next(iter(lines([deck], [seed])))
 
 
+@pytest.mark.long_cases("austin2015_figure_consistent-4")
 def test_a_target_is_met_at_once_or_after_the_first_advice(line: Line) -> None:
     assert line.verdict != "not met", line
 
 
+@pytest.mark.long_cases("austin2015_figure_consistent-4")
 def test_a_miss_says_so_and_what_to_do(line: Line) -> None:
     assert line.first.error is not None
     if line.first.error > 0.01:
@@ -36,6 +38,7 @@ def test_a_miss_says_so_and_what_to_do(line: Line) -> None:
         assert line.first.words == ""
 
 
+@pytest.mark.slow
 def test_the_error_is_that_of_the_machine_as_declared() -> None:
     """The torque follows from cam and rubber by hand: N·h(θ)·F at the extension of the flat model."""
     actuator = nls.models.cam_rubber_actuator(nls.load_deck(DECKS[1]))

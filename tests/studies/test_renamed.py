@@ -88,6 +88,7 @@ def test_flat_model_and_simulation(scheme: Scheme, deck: str) -> None:
     equal(machine.keys(traces[0]), traces[1])
 
 
+@pytest.mark.long_cases("exchanged", "nested", "against_the_order")
 @EVERY
 def test_analyse(run: Run, tmp_path: Path, scheme: Scheme) -> None:
     write_deck(renamed(published(), scheme).assembly, tmp_path / "other.toml")
@@ -146,6 +147,7 @@ def test_export_c(run: Run, tmp_path: Path, scheme: Scheme) -> None:
     assert numbers_in(sources[0]) == numbers_in(sources[1])
 
 
+@pytest.mark.slow
 def test_export_fmu_and_cosimulate(run: Run, tmp_path: Path) -> None:
     machine = renamed(published(), exchanged)
     write_deck(machine.assembly, tmp_path / "other.toml")
@@ -174,6 +176,7 @@ def test_export_fmu_and_cosimulate(run: Run, tmp_path: Path) -> None:
     equal(translated, sizes[1])
 
 
+@pytest.mark.slow
 def test_design(run: Run, tmp_path: Path) -> None:
     machine = renamed(published(), nested)
     write_deck(machine.assembly, tmp_path / "other.toml")

@@ -101,6 +101,7 @@ def test_a_design_that_misses_is_no_success(run: Run, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "o" / "design.json").read_text(encoding="utf-8"))["met"] is False
 
 
+@pytest.mark.slow
 def test_a_design_file_is_followed_and_a_part_drawn(run: Run, tmp_path: Path) -> None:
     text = """
     free = ["spring.cam.contour", "spring.pretension", "spring.rubber.area", "spring.rubber.rest_length"]
@@ -186,6 +187,7 @@ def test_a_plant_that_is_no_actuator_is_exported_alone(run: Run, deck: str, tmp_
     assert not (tmp_path / "c").exists()
 
 
+@pytest.mark.slow
 def test_a_drive_without_an_observer_is_exported_as_its_plant_alone(run: Run, tmp_path: Path) -> None:
     words = ("export", "fmu", "--deck", "one_sided_cable_drive", "--out", "o")
     status, _, err = run(*words, "--what", "plant", "--what", "observer")
@@ -200,6 +202,7 @@ def test_a_drive_without_an_observer_is_exported_as_its_plant_alone(run: Run, tm
     assert not (tmp_path / "o" / "observer.fmu").exists()
 
 
+@pytest.mark.slow
 def test_a_drive_with_a_gear_is_analysed_over_the_angle_of_its_motor(run: Run, tmp_path: Path) -> None:
     over = ("--to", "700 deg", "--count", "3", "--out", "o", "--json")
     status, out, _ = run("analyse", "--deck", "one_sided_cable_drive", *over)

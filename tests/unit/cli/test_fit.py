@@ -168,6 +168,7 @@ def test_a_drive_that_moves_freely_is_fitted_by_simulation_over_windows() -> Non
     assert found.actuator.quantities()["body.mass"].number == pytest.approx(2.0, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_fitted_machine_is_exported_and_belongs_to_its_deck(
     run: Run, bench: Path, tmp_path: Path
 ) -> None:

@@ -66,6 +66,7 @@ def test_the_option_offers_the_kinds_that_can_be_designed() -> None:
     assert KINDS == choice.KINDS
 
 
+@pytest.mark.slow
 def test_kinds_differ_in_their_gains() -> None:
     model = flatten(declare(load_deck("austin2015_figure_consistent")))
     words = {kind: str(designed_observer(model, kind=kind).design.step.gain)

@@ -105,6 +105,7 @@ server.asyncio.run = lambda run: run.close()
     assert not modules & HEAVY
 
 
+@pytest.mark.long_cases("report", "observer")
 @pytest.mark.parametrize("room", ["report", "discrepancy", "observer", "control"])
 def test_a_room_loads_sympy_and_python_control_only_when_it_uses_them(loaded: Loaded, room: str) -> None:
     modules, _ = loaded(f"import nlsdesign as nls; nls.{room}")

@@ -141,6 +141,7 @@ def test_the_anchor_may_be_free_with_the_contour() -> None:
     assert loose.rms <= fixed.rms * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_a_law_with_knots_is_designed_on_too() -> None:
     """On this one Newton's method goes round in circles; the error is still that of the sharp law."""
     sharp = StrainStiffening(
@@ -227,6 +228,7 @@ def test_conflict_with_the_target_is_named_too() -> None:
     assert "MaximumCamRadius" in str(caught.value).partition(" -> ")[2]
 
 
+@pytest.mark.slow
 def test_limits_of_the_geometry_alone_can_be_in_conflict() -> None:
     """An arc of 53° with a radius of 30 mm reaches further than 10 mm."""
     keep = [MinimumRadiusOfCurvature(30e-3), MaximumCamRadius(10e-3)]

@@ -107,6 +107,7 @@ def test_the_table_holds_goals_numbers_and_limits(tmp_path: Path) -> None:
         assert row[4] == "; ".join(point.binding)
 
 
+@pytest.mark.slow
 def test_what_the_solver_does_not_find_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     solve = Program.solve
 

@@ -67,6 +67,7 @@ def test_a_miss_says_how_far_where_why_and_what_to_free() -> None:
     assert then.rms <= 1.05 * promised.error
 
 
+@pytest.mark.slow
 def test_the_largest_error_is_the_designers() -> None:
     strict = DesignSettings(look_for_size_ranges=False, largest_error=0.004)
     design = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=strict)
@@ -87,6 +88,7 @@ def test_a_number_without_influence_is_refused_by_name() -> None:
         design_cam(published, target=TARGET, free=[*CONTOUR, "motor.gear_ratio"], keep=KEEP)
 
 
+@pytest.mark.slow
 def test_a_conflict_says_which_number_to_free() -> None:
     """With 3 mm of pretension on 12.5 mm the strain begins at 0.24: only the pretension is to blame."""
     keep = [MinimumRadiusOfCurvature(1e-3), MaximumCamRadius(20e-3), MaximumStrain(0.2)]
@@ -131,6 +133,7 @@ def test_starts_are_reproducible_by_seed() -> None:
     assert first[4:] != other[4:]
 
 
+@pytest.mark.slow
 def test_ranges_of_sizes_that_cost_nothing_are_true() -> None:
     """At both ends the target is still met, the other sizes following."""
     design = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=KEEP)
@@ -145,6 +148,7 @@ def test_ranges_of_sizes_that_cost_nothing_are_true() -> None:
         assert there.rms < 1.2e-3 * TARGET.largest
 
 
+@pytest.mark.slow
 def test_a_stock_is_gone_through_and_listed() -> None:
     elements = Stock("spring.cam.elements", (1, 2, 4))
     keep = [*KEEP, MaximumCableTension(100.0)]
@@ -200,6 +204,7 @@ def test_over_travel_keeps_the_strain_beyond_the_last_angle() -> None:
     assert model.evaluate(state)["spring.rubber.strain"] == pytest.approx(kept.value, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_what_a_goal_measures_may_be_a_limit() -> None:
     """Mass of rubber by hand: density · N · A · L; the plates weigh next to nothing."""
     mass = LeastMass(rubber_density=1100.0, plate_thickness=1e-5, plate_density=100.0)

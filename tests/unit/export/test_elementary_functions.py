@@ -68,6 +68,7 @@ def errors(program: Path, stride: int, *names: str) -> dict[str, float]:
     return {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines()}
 
 
+@pytest.mark.long_cases("double")
 @pytest.mark.parametrize("real", quick_only(REALS, [Real.DOUBLE]), ids=str)
 def test_no_error_is_larger_than_its_comment_says_and_none_is_far_smaller(real, tmp_path):
     if real is Real.DOUBLE and np.finfo(np.longdouble).nmant < 63:

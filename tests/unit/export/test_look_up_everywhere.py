@@ -51,6 +51,7 @@ def program(spacing: str, folder: Path, spoil=lambda text: text) -> Path:
     return compile_program([folder / "look_up.c"], folder / "look_up", flags=[*CHECKED, *macros])
 
 
+@pytest.mark.long_cases("even", "crowded at one end", "crowded in the middle")
 @pytest.mark.parametrize("spacing", SPACINGS)
 def test_sampled_floats_find_their_cell_and_no_index_leaves_the_table(spacing, tmp_path):
     done = subprocess.run([program(spacing, tmp_path), "10007"], capture_output=True, text=True)

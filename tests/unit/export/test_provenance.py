@@ -40,6 +40,7 @@ def macro(text: str, name: str) -> str:
     return value.strip('"')
 
 
+@pytest.mark.long_cases("austin2015_as_printed")
 @pytest.mark.parametrize("name", DECKS)
 def test_header_and_source_name_the_deck_and_its_digest(name: str, tmp_path: Path) -> None:
     source = export_c(observer(name), tmp_path, name="eye")

@@ -31,6 +31,7 @@ def adaptive():
 MODELS = {"plant": plant, "observer": observer, "adaptive": adaptive}
 
 
+@pytest.mark.long_cases("adaptive")
 @pytest.mark.parametrize("name", MODELS)
 def test_the_windows_library_gives_the_same_as_the_one_for_this_machine(name, tmp_path):
     # The loader, windows_loader.c, puts x86-64 code into a Linux process and calls it there.

@@ -226,6 +226,9 @@ MISSES = {("design", "two_motors"), ("design", "one_sided_cable_drive")}
 QUICK = set(product(COMMANDS, MACHINES)) - MISSES
 
 
+@pytest.mark.long_cases(
+    "analyse-one_sided_cable_drive", "export c-austin2015_soft_spring", "analyse-austin2015_soft_spring"
+)
 @pytest.mark.parametrize(("command", "deck"), quick_only(product(COMMANDS, MACHINES), QUICK))
 def test_a_machine_passes_or_one_sentence_says_why(
     run: Run, decks: dict[str, str], tmp_path: Path, command: str, deck: str

@@ -36,6 +36,7 @@ def test_programs_for_valgrind_have_no_instructions_of_this_machine_alone(compil
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long_cases("aarch64-linux", "aarch64-darwin", "x86_64-darwin")
 @pytest.mark.parametrize("name", ALL_PLATFORMS)
 def test_libraries_have_no_instructions_of_this_machine_alone(name, tmp_path):
     where = PLATFORMS[name]

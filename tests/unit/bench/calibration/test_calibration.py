@@ -134,6 +134,7 @@ def test_friction_turns_at_once_on_the_bench() -> None:
     assert rub is not None
 
 
+@pytest.mark.long_cases("kind1-one_sided_cable_drive")
 @pytest.mark.parametrize("name", [CAM, "test_rig", "one_sided_cable_drive"])
 @pytest.mark.parametrize("kind", [HungWeightTest(), LoadCellTest()])
 def test_slopes_are_those_of_differences(name: str, kind: CalibrationTest) -> None:
@@ -225,6 +226,7 @@ def test_a_wrong_declared_number_is_suspect(tmp_path: Path) -> None:
     assert any("motor.torque_constant moved by +3" in w for w in calibrated(deck(LINEAR), found).words())
 
 
+@pytest.mark.long_cases("-1.0")
 @pytest.mark.parametrize("factor", [1e-3, -1.0])
 def test_a_weight_in_another_unit_or_sign_is_refused(tmp_path: Path, factor: float) -> None:
     folder = recorded("hung_weight", tmp_path, replace(TRUE, weight_factor=factor))

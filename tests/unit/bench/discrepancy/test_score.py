@@ -150,6 +150,7 @@ def test_a_run_goes_on_where_it_was_interrupted(
     assert "pairs: exactly the right set | 4/4" in capsys.readouterr().out
 
 
+@pytest.mark.long_cases("cam")
 @pytest.mark.parametrize(
     ("case", "files", "signals"),
     [
@@ -168,6 +169,7 @@ def test_the_files_of_a_case_are_all_that_is_needed(
     assert not any("slack" in name for name, _ in declared.parts)
 
 
+@pytest.mark.slow
 def test_the_wrong_number_is_the_declared_one(tmp_path: Path) -> None:
     case = Case("wrong number", "elbow", (), 0.0, 201)
     path = write_case(tmp_path, case)
