@@ -27,11 +27,9 @@ from nlsdesign.feedback.analysis import (
     Stability,
     empirical_gramian,
     over_angle,
+    rank_drops,
     rest_points,
     sampled_poles,
-)
-from nlsdesign.feedback.analysis import (
-    observability as rank_drops,
 )
 from nlsdesign.feedback.analysis.stability import least_damped
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer

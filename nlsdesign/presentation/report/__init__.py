@@ -3,7 +3,7 @@
 from .command_pages import write_analysis_report, write_fit_report, write_observer_report
 from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
 from .diagnosis_sections import regeneration_sections, verdict_sections
-from .equation_section import EquationsSection
+from .equations_section import EquationsSection
 from .page import write_report
 from .sections import (
     Chapter,

@@ -275,7 +275,7 @@ def typeset(expression: Any) -> Html:
     >>> typeset(sympy.Symbol("F_M"))
     "<math displaystyle='true'><mrow><msub><mi>F</mi><mi>M</mi></msub></mrow></math>"
     """
-    from .equation_section import formula  # here, because it loads SymPy
+    from .mathml import formula  # here, because it loads SymPy
 
     rate = r"<mfrac><mrow><mi>d</mi><mi>\1</mi></mrow><mrow><mi>d</mi><mi>\2</mi></mrow></mfrac>"
     text = _RATE.sub(rate, formula(expression))

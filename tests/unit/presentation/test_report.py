@@ -28,7 +28,7 @@ from nlsdesign.model import flatten
 from nlsdesign.model.equations import equations
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
-from nlsdesign.presentation.report.equation_section import formula
+from nlsdesign.presentation.report.mathml import formula
 from nlsdesign.presentation.report.page import report_text
 from nlsdesign.presentation.report.sections import prose, words
 from tests import figure_samples as samples

@@ -1,21 +1,21 @@
-"""The equations of a flat model as a section, in MathML, which browsers typeset without a library."""
+"""Equations as MathML, which browsers typeset without a library, with full names.
+
+Every text is escaped here (SymPy's printer does not escape), products carry a visible dot because names have
+several letters, and a long sum is a row of formulas, so that its lines wrap.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from html import escape
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
 
 import sympy
 from sympy.core.function import AppliedUndef
 
 from ...model.equations import Equations
-from .sections import Html, PagePosition, Section
-
-if TYPE_CHECKING:
-    from ...model.equations import Equations
+from .sections import Html
 
 _INDEXED = re.compile(r"^(?P<name>.+)\[(?P<index>\d+)\]$")
 _RELATIONS = {"==": "=", "!=": "≠", "<=": "≤", ">=": "≥"}
@@ -169,30 +169,3 @@ def _bracketed(e: Any) -> str:
 
 def _group(inner: str) -> str:
     return f"<mrow>{inner}</mrow>"
-
-
-@dataclass(frozen=True, eq=False)
-class EquationsSection(Section):
-    """The equations of a flat model.
-
-    Parameters
-    ----------
-    equations
-        From :func:`nlsdesign.model.equations.equations`.
-    caption
-        What they describe.
-    folded
-        Whether they are closed until the reader opens them.
-    """
-
-    equations: Equations
-    caption: str = ""
-    folded: bool = False
-    template: ClassVar[str] = "equations.html"
-
-    def content(self, place: PagePosition) -> Mapping[str, Any]:
-        """Return the rows of the derivatives and of the definitions."""
-        pass
-
-        states, signals = equation_rows(self.equations)
-        return {"states": states, "signals": signals, "caption": self.caption, "folded": self.folded}
