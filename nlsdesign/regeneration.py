@@ -9,7 +9,6 @@ fits after.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,13 +39,12 @@ from .model import FlatModel
 from .model.readings import reading_of
 from .model.roles import measured_motion, series_spring
 from .model.structure import SpringNames
-from .simulation import Trace
+from .simulation import Trace, declared_prior
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
 _POINTS = 257
 """Grid points of the observers of the draws, whose tables need no finer error bound than the spread."""
-_LONGEST_ROW = 12
 """Points of a row of numbers beyond which it is the table of a shape, drawn with one common factor."""
 _SEED = 0
 
@@ -400,17 +398,12 @@ def _along(model: FlatModel, record: Record, shown: Mapping[str, str], signal: s
 def _draws(model: FlatModel, fits: Sequence[Fit]) -> list[dict[str, float]]:
     """Return draws of the numbers: from the covariance of fits, all others from their declared spreads."""
     random = np.random.default_rng(_SEED)
-    rows = Counter(v.name.partition("[")[0] for v in model.parameters)
     fitted = {p.name for fit in fits for p in fit.parameters}
+    declared = declared_prior(model)
+    drawn_numbers = declared.only([n for n in declared.names if n not in fitted]).draws(DRAWS, _SEED)
     result = []
-    for _ in range(DRAWS):
-        common = {row: random.uniform(-1.0, 1.0) for row in rows}
-        values = {}
-        for v in model.parameters:
-            row = v.name.partition("[")[0]
-            if v.spread > 0.0 and v.name not in fitted:
-                share = common[row] if rows[row] > _LONGEST_ROW else random.uniform(-1.0, 1.0)
-                values[v.name] = v.start * math.exp(share * math.log1p(v.spread))
+    for number in range(DRAWS):
+        values = {name: float(column[number]) for name, column in drawn_numbers.items()}
         for fit in fits:
             centre = np.array([p.inward(fit.values[p.name]) for p in fit.parameters])
             drawn = random.multivariate_normal(centre, fit.covariance, method="eigh")

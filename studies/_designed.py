@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import nlsdesign as nls
@@ -51,7 +51,7 @@ def with_machined_contour(actuator: nls.Assembly, anchor: nls.Quantity | None = 
     ``anchor``: place of the cable's anchor in the new design; as declared if it is left out.
     """
     arm = actuator.quantities()["spring.cam.lever_arm"]
-    values = {"spring.cam.lever_arm": replace(arm, spread=0.0)}
+    values = {"spring.cam.lever_arm": arm.with_spread(0.0)}
     if anchor is not None:
         values["spring.cam.anchor_distance"] = anchor
     return actuator.with_values(values)

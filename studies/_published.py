@@ -51,7 +51,7 @@ def with_bench_sensors(actuator: nls.Assembly) -> nls.Assembly:
     )
     numbers, before = bench.quantities(), ParentDeck(actuator.name, deck_digest(actuator), "bench sensors")
     bench = replace(bench, parent=before)
-    return bench.with_values({n: replace(q, spread=0.0) for n, q in numbers.items() if _is_dimension(n)})
+    return bench.with_values({n: q.with_spread(0.0) for n, q in numbers.items() if _is_dimension(n)})
 
 
 _BENCH_NOISE = ((0.3, "N"), (0.04, "A"))

@@ -6,7 +6,7 @@ Identification Benchmarks, 2019. They are read where they are and never copied.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -124,7 +124,7 @@ def viscous_only(published: nls.Assembly) -> nls.Assembly:
     numbers, source = bare.quantities(), "assumed: an order of magnitude"
     guess = {"carriage.mass": 60.0, "guide.damping": 100.0}
     return bare.with_values(
-        {name: replace(numbers[name].with_value(v, source), spread=2.0) for name, v in guess.items()}
+        {name: numbers[name].with_value(v, source).with_spread(2.0) for name, v in guess.items()}
     )
 
 

@@ -108,7 +108,7 @@ def elastic_strip(deck: Deck) -> nls.Assembly:
     size = {name: declared.quantities()[f"strip.rubber.{name}"] for name in ("area", "rest_length")}
     modulus = nls.quantity(40.0, "kPa", source="assumed: an order of magnitude", spread=2.0)
     rubber = nls.specimen(
-        area=replace(size["area"], spread=0.0),
+        area=size["area"].with_spread(0.0),
         rest_length=size["rest_length"],
         elastic=NeoHooke(shear_modulus=modulus),
     )

@@ -157,16 +157,14 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
     if as_json:
         show_json(
             {
-                n: {"value": q.value, "unit": q.unit, "source": q.source, "spread": q.spread}
+                n: {"value": q.value, "unit": q.unit, "source": q.source, "spread": q.spread_data}
                 for n, q in numbers.items()
             }
         )
         return
     title = f"{assembly.name}: {assembly.description}".rstrip(": ")
     click.echo(draw(title, assembly.parts, width=line_width()) + "\n")
-    rows = [
-        (n, _short(q), f"± {100 * q.spread:.0f} %" if q.spread else "", q.source) for n, q in numbers.items()
-    ]
+    rows = [(n, _short(q), q.spread_text, q.source) for n, q in numbers.items()]
     show_table("Numbers", ("name", "value", "spread", "source"), rows)
 
 

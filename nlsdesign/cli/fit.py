@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from ..foundation.quantity import typeset_unit
+from ..foundation.quantity import typeset_unit, with_error
 from .exported_machine import MACHINE, ExportedMachine, export_machine, export_option
 from .named_paths import NamedPath
 from .observer import sample_time_option
@@ -92,13 +92,13 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
         (
             n.name,
             f"{n.declared:.4g}",
-            f"{n.fitted:.4g} ± {n.standard_error:.2g}",
+            with_error(n.fitted, n.standard_error),
             typeset_unit(n.unit),
             f"{n.strain:+.2f}",
         )
         for n in result.numbers
     ]
-    show_table("Numbers", ("name", "declared", "fitted", "unit", "change in spreads"), numbers)
+    show_table("Numbers", ("name", "declared", "fitted", "unit", "moved, in spreads"), numbers)
     errors = [
         (e.block, e.role.replace("_", " "), *(f"{v:.3g}" for v in e[2:5]), typeset_unit(e.unit))
         for e in result.errors()

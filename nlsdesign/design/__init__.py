@@ -69,7 +69,7 @@ from .statics.contour import Contour, contour_from_curvature, contour_from_lever
 from .statics.declared_cam import cam_from_profile, contour_of_cam
 from .statics.equilibrium import elastic_law, equilibrium_torque
 from .statics.unmakeable import UnmakeablePart, unmakeable_parts
-from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread
+from .tolerance.causes import Cause
 from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
@@ -114,7 +114,6 @@ __all__ = [
     "MinimumRadiusOfCurvature",
     "MotorAndGear",
     "MotorCycle",
-    "NormalSpread",
     "NumberRange",
     "OddSpring",
     "OneBatch",
@@ -131,7 +130,6 @@ __all__ = [
     "RubberStock",
     "SeparateModuli",
     "SmoothContour",
-    "SpreadReading",
     "SpreadRules",
     "SpringLimits",
     "SpringSymmetry",
@@ -152,7 +150,6 @@ __all__ = [
     "Trim",
     "TrimRoom",
     "TwoBranchSpring",
-    "UniformSpread",
     "UnmakeablePart",
     "WrittenDesign",
     "cam_from_profile",

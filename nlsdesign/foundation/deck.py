@@ -13,8 +13,10 @@ from typing import Any, Self
 
 from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name, visible
 from .locations import folder
-from .quantity import Quantity, parse_unit
+from .quantity import Quantity, parse_unit, same_dimension
+from .spread import EXACT, NormalSpread, RelativeSpread, Spread, UniformSpread
 from .text_files import is_there, text_of
+from .written_numbers import split_number
 
 _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
@@ -28,7 +30,7 @@ _MOST_LEVELS = 64
 _TOO_DEEP = re.compile(rf"""(?<![\w.\-"'])(?:[\w\-"']+\s*\.\s*){{{_MOST_LEVELS}}}""")
 _MOST_DIGITS = 1000
 _TOO_MANY_DIGITS = re.compile(rf"[0-9A-Fa-f_]{{{_MOST_DIGITS}}}")
-NUMBER_FIELDS = ("value", "unit", "source", "spread")
+NUMBER_FIELDS = ("value", "unit", "source", "spread", "range")
 
 
 class Written(float):
@@ -124,7 +126,7 @@ class Deck:
 
     def numbers(self) -> list[str]:
         """Return the full names of all numbers in the deck, in written order."""
-        return [name for name, table in _tables("", self.tables) if "value" in table]
+        return [name for name, table in _tables("", self.tables) if "value" in table or "range" in table]
 
     def number(self, full_name: str, raw: object) -> Quantity:
         """Return a number of the deck as a quantity."""
@@ -143,17 +145,25 @@ class Deck:
             raise UnitError(
                 where, "has no unit", next_step='add for instance unit = "mm"; "1" for a pure number'
             )
-        missing = [key for key in ("value", "source") if key not in raw]
+        if "range" in raw:
+            for key in ("value", "spread"):
+                if key in raw:
+                    rule = f"has both range and {key}"
+                    raise DeckError(where, rule, next_step=f"leave out {key}: a range has none")
+        given = {*raw, "value"} if "range" in raw else set(raw)
+        missing = [key for key in ("value", "source") if key not in given]
         if missing:
             raise DeckError(where, f"has no {' and no '.join(missing)}", next_step=f"add {missing[0]} = ...")
         return self._converted(where, raw)
 
     def _converted(self, where: str, raw: dict[str, Any]) -> Quantity:
-        value, spread = raw["value"], raw.get("spread", 0.0)
-        items = value if isinstance(value, list) else [value]
-        if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in [*items, spread]):
-            raise DeckError(where, f"value {brief(value)} or spread {brief(spread)} is not a number")
-        if any(isinstance(v, Written) and len(v.text) > _MOST_DIGITS for v in [*items, spread]):
+        given: Any = raw.get("range", raw.get("value"))
+        items, spread = given if isinstance(given, list) else [given], raw.get("spread", 0.0)
+        numbers = [*items, *(() if isinstance(spread, str) else (spread,))]
+        if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in numbers):
+            shown = f", spread {brief(spread)}" if spread else ""
+            raise DeckError(where, f"{brief(given)}{shown} is not a number")
+        if any(isinstance(v, Written) and len(v.text) > _MOST_DIGITS for v in numbers):
             raise DeckError(where, f"has a number of more than {_MOST_DIGITS} digits")
         for key in ("unit", "source"):
             if not isinstance(raw[key], str) or not raw[key].strip():
@@ -162,19 +172,45 @@ class Deck:
                 )
         try:
             factor = parse_unit(raw["unit"]).factor
-            scaled = tuple(v.times(factor) if isinstance(v, Written) else v * factor for v in items)
-            in_si = scaled if isinstance(value, list) else scaled[0]
-            if spread > MOST_SPREAD:
-                raise ValueRangeError(
-                    f"spread = {spread:g}", f"means ± {100 * spread:g} %, which leaves nothing of the number",
-                    next_step=f"write spread = {spread / 100:g} if {spread:g} % was meant",
-                )  # fmt: skip
-            return Quantity(in_si, raw["unit"], raw["source"], float(spread))
+            scaled = tuple(v.times(factor) if isinstance(v, Written) else float(v) * factor for v in items)
+            if "range" in raw:
+                return _of_range(scaled, raw["unit"], raw["source"])
+            in_si = scaled if isinstance(given, list) else scaled[0]
+            return Quantity(in_si, raw["unit"], raw["source"], _spread(spread, raw["unit"]))
         except NlsError as error:
             raise error.at(where) from None
         except OverflowError:
-            rule = f"{brief(value)} {raw['unit']}, spread {brief(spread)}, is too large to compute with"
+            rule = f"{brief(given)} {raw['unit']}, spread {brief(spread)}, is too large to compute with"
             raise ValueRangeError(where, rule, next_step="correct the number or its unit") from None
+
+
+def _of_range(ends: tuple[float, ...], unit: str, source: str) -> Quantity:
+    """Return the middle of a range with the range as its spread."""
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise ValueRangeError(
+            "range", "is a range from a smaller to a larger number", next_step="write range = [1.0, 3.0]"
+        )
+    return Quantity(0.5 * (ends[0] + ends[1]), unit, source, UniformSpread(0.5 * (ends[1] - ends[0])))
+
+
+def _spread(given: float | str, unit: str) -> Spread:
+    """Return a spread as it stands in a deck: a share, or a standard deviation with its unit."""
+    if isinstance(given, str):
+        size, written = split_number(given)
+        if not same_dimension(written or "1", unit):
+            raise UnitError(
+                f'spread = "{given}"',
+                f"is not of the dimension of '{unit}'",
+                next_step=f'write spread = "{size:g} {unit}", or a share without a unit, 0.1 for 10 %',
+            )
+        return NormalSpread(size * parse_unit(written or "1").factor)
+    if given > MOST_SPREAD:
+        raise ValueRangeError(
+            f"spread = {given:g}", f"means a factor of {1.0 + given:g} up or down for one standard deviation",
+            next_step=f"write spread = {given / 100:g} if {given:g} % was meant, or a standard deviation "
+            f'with its unit, spread = "1 {unit}", if the sign of the number is not known',
+        )  # fmt: skip
+    return RelativeSpread(float(given)) if given else EXACT
 
 
 def _tables(path: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

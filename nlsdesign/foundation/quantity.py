@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from .errors import UnitError, ValueRangeError, nearest, visible
+from .spread import EXACT, Spread, as_spread
 
 NOT_SI = {
     "psi": "6.895 kPa for one psi", "bar": "100 kPa for one bar", "atm": "101.325 kPa for one atm",
@@ -231,7 +232,7 @@ def _plain(value: float | Iterable[float]) -> float | tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number (or a row of numbers) in SI with its unit, source and relative spread.
+    """A number (or a row of numbers) in SI with its unit, source and spread.
 
     Parameters
     ----------
@@ -242,7 +243,7 @@ class Quantity:
     source
         Citation, data-sheet page, bench file with date, or "assumed" with a reason.
     spread
-        One-sided relative spread; 0.06 means ± 6 %.
+        How far the true number may lie from this one; a bare 0.06 is a relative spread of ± 6 %.
 
     Raises
     ------
@@ -253,7 +254,7 @@ class Quantity:
     value: float | tuple[float, ...]
     unit: str = "1"
     source: str = "not stated"
-    spread: float = 0.0
+    spread: Spread = EXACT
     _parsed: Unit = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -264,8 +265,7 @@ class Quantity:
             raise ValueRangeError(with_unit("()", self.unit), "a row of numbers needs at least one")
         if not all(math.isfinite(item) for item in self.values):
             raise ValueRangeError(with_unit(str(self.value), self.unit), "a quantity must be finite")
-        if not self.spread >= 0.0:
-            raise ValueRangeError(f"spread {self.spread}", "a relative spread is a number >= 0, 0.06 for 6 %")
+        object.__setattr__(self, "spread", as_spread(self.spread))
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -292,6 +292,19 @@ class Quantity:
         return rounded if isinstance(self.value, tuple) else rounded[0]
 
     @property
+    def spread_text(self) -> str:
+        """The spread as people read it, in the unit of the number; nothing for an exact one."""
+        return self.spread.text(self._with_unit)
+
+    @property
+    def spread_data(self) -> float | str:
+        """The spread in a file of data: a relative one as a number, others as text with unit."""
+        return self.spread.data(self._with_unit)
+
+    def _with_unit(self, value: float) -> str:
+        return with_unit(f"{value / self._parsed.factor:.6g}", self.unit)
+
+    @property
     def assumed(self) -> bool:
         """Whether the source is an assumption rather than evidence."""
         return self.source.lower().startswith(("assumed", "not stated"))
@@ -315,6 +328,16 @@ class Quantity:
         if source is None:
             source = self.source if new.value == self.value else changed_source(self._brief(), self.source)
         return replace(new, source=source)
+
+    def with_spread(self, spread: Spread | float) -> Quantity:
+        """Return a copy with another spread.
+
+        Parameters
+        ----------
+        spread
+            A bare number is a relative spread.
+        """
+        return replace(self, spread=as_spread(spread))
 
     def _brief(self) -> str:
         count = len(self.values)
@@ -340,7 +363,11 @@ def changed_source(old: str, source: str) -> str:
 
 
 def quantity(
-    value: float | tuple[float, ...], unit: str, *, source: str = "not stated", spread: float = 0.0
+    value: float | tuple[float, ...],
+    unit: str,
+    *,
+    source: str = "not stated",
+    spread: Spread | float = EXACT,
 ) -> Quantity:
     """Return a quantity from a value in the given unit.
 
@@ -353,7 +380,7 @@ def quantity(
     source
         Where the number comes from.
     spread
-        One-sided relative spread.
+        How far the true number may lie from this one; a bare 0.06 is a relative spread of ± 6 %.
 
     Examples
     --------
@@ -362,7 +389,7 @@ def quantity(
     """
     factor, plain = parse_unit(unit).factor, _plain(value)
     converted = tuple(item * factor for item in plain) if isinstance(plain, tuple) else plain * factor
-    return Quantity(converted, unit, source, spread)
+    return Quantity(converted, unit, source, as_spread(spread))
 
 
 def significant(values: Iterable[float], digits: int = 9) -> tuple[float, ...]:

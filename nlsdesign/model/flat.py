@@ -13,6 +13,7 @@ import numpy as np
 from ..foundation.arrays import Array
 from ..foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..foundation.quantity import Quantity, changed_source, same_dimension, with_unit
+from ..foundation.spread import EXACT, Spread
 from ..foundation.symbolic import Expression
 from .notebook_view import model_html
 from .origin import Origin
@@ -44,7 +45,7 @@ class Variable:
     minimum, maximum
         Range in which the laws are stated to hold.
     source, spread
-        Where a parameter's number comes from and its one-sided relative spread.
+        Where a parameter's number comes from, and how far the true one may lie from it.
     plausibility
         Of a measured input: what a reading can be; ``None`` for a command.
     """
@@ -57,8 +58,18 @@ class Variable:
     minimum: float = -float("inf")
     maximum: float = float("inf")
     source: str = ""
-    spread: float = 0.0
+    spread: Spread = EXACT
     plausibility: Plausibility | None = None
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether the number may differ from the declared one: a relative spread leaves a zero as it is."""
+        return self.spread.standard_error(self.start) > 0.0
+
+    @property
+    def spread_text(self) -> str:
+        """The spread as people read it, in SI where it is not relative; nothing for an exact number."""
+        return self.spread.text(lambda v: with_unit(f"{v:.6g}", self.unit))
 
     @property
     def bounded(self) -> bool:

@@ -1,9 +1,10 @@
 """What is known of the numbers of a model: declared values, and how far each may lie from them.
 
-Every number is its declared value times exp(x), and the x are jointly normal with zero mean. So a spread is a
-factor, as a deck states it, no draw changes the sign of a number or makes a stiffness vanish, products and
-quotients of numbers are as simple as the numbers themselves (the logarithm of a torque constant over an
-inertia is a difference), and the covariance of the x is that of relative errors where these are small.
+Every number is ``spread.number(value, x)`` (:mod:`nlsdesign.foundation.spread`), and the x are jointly normal
+with zero mean. A number with a relative spread is its declared value times exp(x): no draw changes its sign
+or makes a stiffness vanish, products and quotients of numbers are as simple as the numbers themselves (the
+logarithm of a torque constant over an inertia is a difference), and the covariance of the x is that of
+relative errors where these are small. The x of a number whose spread has a unit counts standard deviations.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from ..foundation.arrays import Array
 from ..foundation.errors import ValueRangeError, unknown_name
+from ..foundation.spread import RelativeSpread, Spread
 from ..model import FlatModel
 
 LONGEST_ROW = 12
@@ -38,17 +40,20 @@ class Prior:
     names
         Full names of the numbers.
     values
-        In SI, shape (numbers,); none is zero. The median of each number.
+        In SI, shape (numbers,). The median of each number.
     covariance
-        Of the logarithms of the numbers over their values, shape (numbers, numbers). It may be singular:
-        numbers that share one factor move together.
+        Of the coordinates x of the numbers, shape (numbers, numbers). It may be singular: numbers that share
+        one factor move together.
     minimum, maximum
         Ranges in which the laws are stated to hold, in SI, shape (numbers,); empty for none.
+    kinds
+        What x is of each number; relative spreads where it is left out.
 
     Raises
     ------
     ValueRangeError
-        If the shapes do not fit, a value is zero or not finite, or the covariance is none.
+        If the shapes do not fit, a value is not finite, a relative spread is that of zero, or the covariance
+        is none.
     """
 
     names: tuple[str, ...]
@@ -56,17 +61,23 @@ class Prior:
     covariance: Array
     minimum: Array = field(default_factory=_unbounded)
     maximum: Array = field(default_factory=_unbounded)
+    kinds: tuple[Spread, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.names)
+        if not self.kinds:
+            kinds = tuple(map(RelativeSpread, np.expm1(self.deviations).tolist()))
+            object.__setattr__(self, "kinds", kinds)
         if self.values.shape != (count,) or self.covariance.shape != (count, count):
             raise ValueRangeError(
                 f"{count} names with {self.values.shape} values and {self.covariance.shape} covariances",
                 "there must be one value and one row and column of the covariance for each name",
             )
-        for name, value in zip(self.names, self.values, strict=True):
-            if value == 0.0 or not np.isfinite(value):
-                raise ValueRangeError(f"{name} = {value:g}", "has no relative spread")
+        for name, value, kind in zip(self.names, self.values, self.kinds, strict=True):
+            if not np.isfinite(value) or (value == 0.0 and isinstance(kind, RelativeSpread)):
+                raise ValueRangeError(
+                    f"{name} = {value:g}", "has no relative spread", next_step="give its spread a unit"
+                )
         size = float(np.max(np.diag(self.covariance), initial=0.0))
         even = np.allclose(self.covariance, self.covariance.T, rtol=0.0, atol=1e-9 * size)
         if not even or np.min(np.linalg.eigvalsh(self.covariance), initial=0.0) < -1e-9 * size:
@@ -76,16 +87,46 @@ class Prior:
 
     @property
     def deviations(self) -> Array:
-        """Standard deviation of the logarithm of each number, shape (numbers,)."""
+        """Standard deviation of the coordinate of each number, shape (numbers,)."""
         result: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return result
 
+    def spread_of(self, name: str) -> Spread:
+        """Return the spread of a number as a deck states it.
+
+        Parameters
+        ----------
+        name
+            Full name.
+        """
+        k = self.place(name)
+        kind = self.kinds[k]
+        return kind.narrowed(float(self.deviations[k]) / kind.deviation) if kind else kind
+
     def spreads(self) -> dict[str, float]:
-        """Return the spread of each number by name: the factor of one standard deviation, minus one."""
-        return dict(zip(self.names, np.expm1(self.deviations).tolist(), strict=True))
+        """Return the spread of each number by name, relative to the number."""
+        return {n: self.spread_of(n).share(v) for n, v in zip(self.names, self.values.tolist(), strict=True)}
+
+    def numbers(self, x: Array) -> Array:
+        """Return the numbers at coordinates, not held inside any range.
+
+        Parameters
+        ----------
+        x
+            Shape (..., numbers).
+
+        Returns
+        -------
+        numpy.ndarray
+            In SI, of the shape of ``x``.
+        """
+        columns = [
+            kind.number(v, x[..., k]) for k, (kind, v) in enumerate(zip(self.kinds, self.values, strict=True))
+        ]
+        return np.stack(columns, axis=-1) if columns else np.array(x, dtype=float)
 
     def correlation(self, first: str, second: str) -> float:
-        """Return the correlation of the logarithms of two numbers; zero if one of them is known exactly.
+        """Return the correlation of the coordinates of two numbers; zero if one of them is known exactly.
 
         Parameters
         ----------
@@ -127,9 +168,10 @@ class Prior:
             Full names.
         """
         places = [self.place(name) for name in names]
-        ends = [end[places] if len(end) else end for end in (self.minimum, self.maximum)]
+        low, high = (end[places] if len(end) else end for end in (self.minimum, self.maximum))
         covariance = self.covariance[np.ix_(places, places)]
-        return Prior(tuple(names), self.values[places], covariance, *ends)
+        kinds = tuple(self.kinds[k] for k in places)
+        return Prior(tuple(names), self.values[places], covariance, low, high, kinds)
 
     def draws(self, count: int, seed: int) -> dict[str, Array]:
         """Return numbers drawn at random, held inside the ranges of their laws.
@@ -147,8 +189,7 @@ class Prior:
             Values in SI by name, each of shape (count,).
         """
         normal = np.random.default_rng(seed).standard_normal((count, len(self.names)))
-        factors = np.exp(normal @ self.root.T)
-        drawn = self.values * factors
+        drawn = self.numbers(normal @ self.root.T)
         if len(self.minimum):
             drawn = np.maximum(drawn, self.minimum)
         if len(self.maximum):
@@ -161,7 +202,7 @@ class Prior:
         Parameters
         ----------
         information
-            Fisher information on the logarithms of the numbers, shape (numbers, numbers): the slopes of
+            Fisher information on the coordinates of the numbers, shape (numbers, numbers): the slopes of
             whitened measurements, J, give JᵀJ.
         """
         root = self.root
@@ -175,7 +216,7 @@ class Prior:
         Parameters
         ----------
         slopes
-            Derivatives of the quantities with respect to the logarithms of the numbers, shape
+            Derivatives of the quantities with respect to the coordinates of the numbers, shape
             (quantities, numbers).
 
         Returns
@@ -190,8 +231,8 @@ class Prior:
 def declared_prior(model: FlatModel, longest_row: int = LONGEST_ROW) -> Prior:
     """Return what a deck states of its numbers: a spread of 0.15 is a factor of 1.15 per standard deviation.
 
-    The numbers are independent, but for those of a row that is longer than ``longest_row``, which share one
-    factor. Numbers without a spread are taken as exact and are left out, as are zeros, which a relative
+    The numbers are independent, but for those of a row that is longer than ``longest_row``, which deviate
+    together. Numbers without a spread are taken as exact and are left out, as are zeros, which a relative
     spread leaves as they are.
 
     Parameters
@@ -212,8 +253,8 @@ def declared_prior(model: FlatModel, longest_row: int = LONGEST_ROW) -> Prior:
     (('wheel.inertia',), [0.0953])
     """
     rows = Counter(_row(v.name) for v in model.parameters)
-    free = [v for v in model.parameters if v.spread > 0.0 and v.start != 0.0]
-    deviations = np.log1p(np.array([v.spread for v in free], dtype=float))
+    free = [v for v in model.parameters if v.uncertain]
+    deviations = np.array([v.spread.deviation for v in free], dtype=float)
     shapes = [_row(v.name) if rows[_row(v.name)] > longest_row else v.name for v in free]
     together = np.array([[a == b for b in shapes] for a in shapes], dtype=float).reshape(len(free), len(free))
     return Prior(
@@ -222,6 +263,7 @@ def declared_prior(model: FlatModel, longest_row: int = LONGEST_ROW) -> Prior:
         together * np.outer(deviations, deviations),
         np.array([v.minimum for v in free], dtype=float),
         np.array([v.maximum for v in free], dtype=float),
+        tuple(v.spread for v in free),
     )
 
 

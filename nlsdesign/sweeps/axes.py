@@ -285,16 +285,19 @@ class RandomDraws(AxisSet):
         values = np.where(shapes, 1.0, prior.values[at])
         low = _ends_of(prior.minimum, at, shapes, -np.inf)
         high = _ends_of(prior.maximum, at, shapes, np.inf)
-        deviations = prior.deviations[at]
+        deviations, kinds = prior.deviations[at], [prior.kinds[k] for k in at]
+
+        def moved(x: Array) -> Array:
+            return np.array([k.number(v, e) for k, v, e in zip(kinds, values.tolist(), x, strict=True)])
 
         def row(number: int) -> tuple[float, ...]:
             normal = np.random.default_rng([self.seed, number]).standard_normal(len(at))
-            return tuple(np.clip(values * np.exp(deviations * normal), low, high).tolist())
+            return tuple(np.clip(moved(deviations * normal), low, high).tolist())
 
         columns = []
-        for name, value, each in zip(chosen, values, deviations, strict=True):
+        edges = np.sort([moved(-3.0 * deviations), moved(3.0 * deviations)], axis=0).T
+        for name, value, ends in zip(chosen, values, edges.tolist(), strict=True):
             column, _ = subject.column(name, (float(value),), "random")
-            ends = sorted((float(value * np.exp(-3.0 * each)), float(value * np.exp(3.0 * each))))
             words = "drawn over its spread; range of three deviations"
             columns.append(SweepColumn(column.name, column.unit, words, "axis", "random", *ends))
         return BoundAxes(tuple(columns), self.count, row)

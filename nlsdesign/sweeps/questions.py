@@ -156,7 +156,7 @@ class SpreadQuestion(SweepQuestion):
             If no number of the deck has a spread.
         """
         model, torque, angle = _plant(assembly, "", "")
-        if not any(v.spread > 0.0 for v in model.parameters):
+        if not any(v.uncertain for v in model.parameters):
             raise ArrangementError(
                 f"model '{model.name}'", "declares no spread, so there are no errors over it",
                 next_step="give numbers a spread",

@@ -69,7 +69,8 @@ def candidates() -> list[Candidate]:
         if not _has_curve(rubber) and rubber.family in graded:
             continue
         elastic = rubber if _has_curve(rubber) else known[STANDS_IN]
-        spreads = [p.quantity.spread for p in elastic.properties if p.name.startswith("nominal_stress")]
+        curves = [p.quantity for p in elastic.properties if p.name.startswith("nominal_stress")]
+        spreads = [each.spread.share(each.values[-1]) for each in curves]
         made.append(Candidate(name, elastic, loss_of(rubber), max([*spreads, 0.0]) or SPREAD))
     return made
 

@@ -178,7 +178,7 @@ def test_the_torque_never_errs_by_more_than_the_bound(deck: str, share: float, f
     model, draw = plant(deck), np.random.default_rng(5)
     design = design_observer_with_details(model)
     torque, quantum = design.step.plant.estimate.name, model.values["motor_encoder.quantum"]
-    spreads = {v.name: share * v.spread for v in model.parameters if share * v.spread > 0.0}
+    spreads = {v.name: share * v.spread.share(v.start) for v in model.parameters if share > 0.0 and v.spread}
     bound = torque_bound(model, design, Assumptions((-0.6, 0.6), 15.0, quantum / 2.0, spreads))
     assert bound.total == pytest.approx(sum(bound.causes.values()))
     worst = 0.0

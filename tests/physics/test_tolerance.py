@@ -32,7 +32,6 @@ from nlsdesign.design import (
     PowerTorque,
     SpreadRules,
     Trim,
-    UniformSpread,
     equilibrium_torque,
     tolerance_analysis,
 )
@@ -41,6 +40,7 @@ from nlsdesign.design.tolerance.causes import draw_deviations
 from nlsdesign.design.tolerance.declared_spreads import spring_causes
 from nlsdesign.design.tolerance.made_spring import MadeSpring, made_spring
 from nlsdesign.foundation.quantity import quantity
+from nlsdesign.foundation.spread import UniformSpread
 from nlsdesign.model import flatten
 from tests.cam_cases import NeoHooke
 from tests.taut_string import arc_lip, pulled
@@ -160,11 +160,14 @@ def test_without_deviations_it_is_the_declared_spring(bench: MadeSpring) -> None
 @pytest.mark.parametrize(
     ("name", "changed"),
     [
-        ("spring.element.moduli", lambda z: replace(NOMINAL, modulus=0.85e6 * (1 + 0.15 * z))),
-        ("spring.element.area", lambda z: replace(NOMINAL, area=1e-4 * (1 + 0.05 * z))),
-        ("spring.element.rest_length", lambda z: replace(NOMINAL, rest_length=12.5e-3 * (1 + 0.04 * z))),
-        ("spring.pretension", lambda z: replace(NOMINAL, pretension=4e-3 * (1 + 0.05 * z))),
-        ("spring.cam.anchor_distance", lambda z: replace(NOMINAL, anchor=ANCHOR * (1 + 0.04 * z))),
+        ("spring.element.moduli", lambda z: replace(NOMINAL, modulus=0.85e6 * (1 + np.log1p(0.15) * z))),
+        ("spring.element.area", lambda z: replace(NOMINAL, area=1e-4 * (1 + np.log1p(0.05) * z))),
+        (
+            "spring.element.rest_length",
+            lambda z: replace(NOMINAL, rest_length=12.5e-3 * (1 + np.log1p(0.04) * z)),
+        ),
+        ("spring.pretension", lambda z: replace(NOMINAL, pretension=4e-3 * (1 + np.log1p(0.05) * z))),
+        ("spring.cam.anchor_distance", lambda z: replace(NOMINAL, anchor=ANCHOR * (1 + np.log1p(0.04) * z))),
     ],
 )
 def test_a_deviating_number_gives_the_torque_of_a_taut_string(
@@ -247,7 +250,7 @@ def test_friction_of_guides_acts_against_both_strokes() -> None:
     extensions, arms = pulled(arc_lip(RADIUS, MIDDLE), ANCHOR, spring.angles[SEEN])
     found = alone(spring, "spring.element.friction", 1.0)
     for stroke, sign in ((found[:101], 1.0), (found[101:], -1.0)):
-        rubbing = replace(NOMINAL, exponent=sign * 0.1 * 1.4 * 1.5)
+        rubbing = replace(NOMINAL, exponent=sign * 0.1 * (1.0 + np.log1p(0.4)) * 1.5)
         assert stroke[SEEN] == pytest.approx(rubbing.torque(extensions, arms), rel=5e-5)
     # Half of the strokes each: the mean square of both errors.
     errors = found - np.tile(TARGET.torque(spring.angles), 2)
@@ -279,9 +282,9 @@ def own_draws(count: int, seed: int) -> list[tuple[Numbers, float]]:
     for _ in range(count):
         z = generator.normal(size=6)
         numbers = Numbers(
-            modulus=0.85e6 * (1 + 0.15 * z[0]), area=1e-4 * (1 + 0.05 * z[1]),
-            rest_length=12.5e-3 * (1 + 0.04 * z[2]), pretension=4e-3 * (1 + 0.05 * z[3]),
-            anchor=ANCHOR * (1 + 0.04 * z[4]),
+            modulus=0.85e6 * (1 + np.log1p(0.15) * z[0]), area=1e-4 * (1 + np.log1p(0.05) * z[1]),
+            rest_length=12.5e-3 * (1 + np.log1p(0.04) * z[2]), pretension=4e-3 * (1 + np.log1p(0.05) * z[3]),
+            anchor=ANCHOR * (1 + np.log1p(0.04) * z[4]),
         )  # fmt: skip
         result.append((numbers, 1e-4 * z[5]))
     return result
@@ -332,14 +335,14 @@ def test_the_trim_is_the_least_error_that_scipy_finds() -> None:
     touched = pulled_arc(result.angles[1:], ANCHOR, 0.0)
     touched = (np.append(0.0, touched[0]), np.append(0.0, touched[1]))
     causes = spring_causes(flatten(actuator()), None, rules)
-    columns = draw_deviations(causes, 20, seed=8, reading=rules.reading).T
+    columns = draw_deviations(causes, 20, seed=8).T
     z = {cause.name.rpartition(".")[2]: column for cause, column in zip(causes, columns, strict=True)}
     for k in range(20):
         numbers = replace(
             NOMINAL,
-            modulus=0.85e6 * (1 + 0.15 * z["moduli"][k]),
-            area=1e-4 * (1 + 0.05 * z["area"][k]),
-            rest_length=12.5e-3 * (1 + 0.04 * z["rest_length"][k]),
+            modulus=0.85e6 * (1 + np.log1p(0.15) * z["moduli"][k]),
+            area=1e-4 * (1 + np.log1p(0.05) * z["area"][k]),
+            rest_length=12.5e-3 * (1 + np.log1p(0.04) * z["rest_length"][k]),
         )
         best = best_pretension(numbers, touched, result.angles)
         assert result.trims[0].errors[k] == pytest.approx(best.fun, rel=1e-4)
@@ -387,7 +390,7 @@ def test_alone_and_measured_and_halved_are_those_of_other_spreads() -> None:
     # Alone: the torque is proportional to the modulus, so the error is a known function of one number.
     angles, nominal = result.angles, result.nominal
     z = np.random.default_rng(1).normal(size=20000)
-    errors = nominal * (1 + 0.15 * z[:, None]) - TARGET.torque(angles)
+    errors = nominal * (1 + np.log1p(0.15) * z[:, None]) - TARGET.torque(angles)
     rms = np.sqrt(np.trapezoid(errors**2, angles, axis=1) / LAST)
     assert effect.alone == pytest.approx(np.quantile(rms, 0.95), rel=0.02)
 
@@ -404,14 +407,18 @@ def test_shares_are_those_of_finite_differences_on_the_taut_string() -> None:
         return float(np.trapezoid(slope**2, angles))
 
     sizes = {
-        "spring.element.moduli": size(lambda z: torque(replace(NOMINAL, modulus=0.85e6 * (1 + 0.15 * z)))),
-        "spring.element.area": size(lambda z: torque(replace(NOMINAL, area=1e-4 * (1 + 0.05 * z)))),
-        "spring.element.rest_length": size(
-            lambda z: torque(replace(NOMINAL, rest_length=12.5e-3 * (1 + 0.04 * z)))
+        "spring.element.moduli": size(
+            lambda z: torque(replace(NOMINAL, modulus=0.85e6 * (1 + np.log1p(0.15) * z)))
         ),
-        "spring.pretension": size(lambda z: torque(replace(NOMINAL, pretension=4e-3 * (1 + 0.05 * z)))),
+        "spring.element.area": size(lambda z: torque(replace(NOMINAL, area=1e-4 * (1 + np.log1p(0.05) * z)))),
+        "spring.element.rest_length": size(
+            lambda z: torque(replace(NOMINAL, rest_length=12.5e-3 * (1 + np.log1p(0.04) * z)))
+        ),
+        "spring.pretension": size(
+            lambda z: torque(replace(NOMINAL, pretension=4e-3 * (1 + np.log1p(0.05) * z)))
+        ),
         "spring.cam.anchor_distance": size(
-            lambda z: torque(replace(NOMINAL, anchor=ANCHOR * (1 + 0.04 * z)))
+            lambda z: torque(replace(NOMINAL, anchor=ANCHOR * (1 + np.log1p(0.04) * z)))
         ),
         "spring.cam.cable_radius": size(lambda z: torque(NOMINAL, 1e-4 * z)),
     }
@@ -421,11 +428,11 @@ def test_shares_are_those_of_finite_differences_on_the_taut_string() -> None:
     assert sum(found.values()) == pytest.approx(1.0)
 
 
-def test_a_spread_read_as_a_bound_stays_within_it() -> None:
-    bounds = SpreadRules(reading=UniformSpread())
+def test_a_range_stays_within_its_ends() -> None:
+    bounds = SpreadRules(given={"spring.element.moduli": UniformSpread(0.15)})
     spring = made(actuator(), rules=bounds)
     moduli = spring.causes[column(spring, "spring.element.moduli")]
     assert moduli.deviation == pytest.approx(0.15 / np.sqrt(3.0))
-    z = bounds.reading.drawn(np.random.default_rng(0), 20000)
+    z = draw_deviations([moduli], 20000, seed=0)[:, 0]
     assert 0.99 * np.sqrt(3.0) < np.max(np.abs(z)) <= np.sqrt(3.0)
     assert np.std(z) == pytest.approx(1.0, rel=0.02)

@@ -219,10 +219,11 @@ def _expressions(model: FlatModel, body: MovingBody, prior: Prior) -> _Expressio
     drive = body.drives[0] if body.drives else ""
     commanded = [data[2] + wide[-2] if v.name == drive else ca.SX(v.start) for v in model.inputs]
     factor = {name: wide[k] for k, names in enumerate(shapes.values()) for name in names}
+    kinds = dict(zip(prior.names, prior.kinds, strict=True))
     numbers = [
         data[3] * (1.0 + wide[-1])
         if v.name == f"{WEIGHT}.load"
-        else v.start * ca.exp(factor.get(v.name, ca.SX(0)))
+        else (kinds[v.name].expression(v.start, factor[v.name]) if v.name in factor else ca.SX(v.start))
         for v in model.parameters
     ]
     arguments = [ca.vertcat(*[held[n] for n in named]), ca.vertcat(*commanded), ca.vertcat(*numbers)]

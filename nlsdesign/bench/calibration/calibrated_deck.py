@@ -16,6 +16,7 @@ from ...components.assembly.named_parts import Assembly
 from ...foundation.deck import Written
 from ...foundation.errors import ExportError, MeasurementError, NlsError
 from ...foundation.quantity import Quantity, parse_unit, three_digits, to_resolution, typeset_unit, with_unit
+from ...foundation.spread import NormalSpread, RelativeSpread
 from ...foundation.text_files import text_of, write_text
 from ...model.derived_deck import derived
 from ...simulation import Prior
@@ -201,19 +202,19 @@ def calibrated(actuator: Assembly, estimate: Estimate, *, day: date | None = Non
 def _calibrated_row(
     old: Quantity, name: str, places: Sequence[int], estimate: Estimate, how: str
 ) -> Quantity:
-    values, spreads = list(old.values), estimate.after.spreads()
-    names = estimate.after.names
+    values, after = list(old.values), estimate.after
+    names = after.names
     for k in places:
         index = int(names[k].partition("[")[2].rstrip("]")) - 1 if "[" in names[k] else 0
         factor = parse_unit(old.unit).factor
         value = float(estimate.after.values[k]) / factor
-        error = abs(value) * float(estimate.after.deviations[k])
+        error = after.spread_of(names[k]).standard_error(float(after.values[k])) / factor
         values[index] = Written(repr(to_resolution(value, error))).times(factor)
     members = [n for n in names if n.partition("[")[0] == name]
-    spread = float(f"{max(spreads[n] for n in members):.3g}")
+    spread = max((after.spread_of(n) for n in members), key=lambda each: each.share(1.0)).rounded(3)
     short = len(values) <= 4
     was = str(old) if short else f"{len(values)} numbers in {typeset_unit(old.unit)}"
-    declared = f"{was} ± {100 * old.spread:.3g} %: {old.source}"
+    declared = f"{was} {old.spread_text}: {old.source}"
     value_now = tuple(values) if isinstance(old.value, tuple) else values[0]
     return replace(old.with_value(value_now, f"{how} (declared {declared})"), spread=spread)
 
@@ -302,11 +303,15 @@ def _joint_text(result: CalibratedMachine) -> str:
 
     names = [n for n in after.names if n.partition("[")[0] in machine]
     shown = after.only(names)
+    sizes = [0.0 if isinstance(k, RelativeSpread) else k.slope(0.0) for k in shown.kinds]
+    straight = "; where sizes is not zero the number is its value plus size times x" if any(sizes) else ""
     content = {
-        "what": "each number is its value (SI) times exp(x); the x are jointly normal with this covariance",
+        "what": "each number is its value (SI) times exp(x); the x are jointly normal with this covariance"
+        + straight,
         "names": names,
         "values": [value(n) for n in names],
         "covariance": [[float(f"{c:.10g}") for c in row] for row in shown.covariance],
+        **({"sizes": sizes} if any(sizes) else {}),
     }
     return json.dumps(content, indent=None, ensure_ascii=False) + "\n"
 
@@ -327,10 +332,16 @@ def read_joint_numbers(path: Path) -> Prior:
     try:
         content = json.loads(text_of(Path(path), MeasurementError))
         covariance = np.array(content["covariance"], dtype=float)
+        names, sizes = tuple(content["names"]), content.get("sizes")
+        relative = np.expm1(np.sqrt(np.diag(covariance))).tolist()
         return Prior(
-            tuple(content["names"]),
+            names,
             np.array(content["values"], dtype=float),
             0.5 * (covariance + covariance.T),
+            kinds=tuple(
+                NormalSpread(size) if size else RelativeSpread(share)
+                for size, share in zip(sizes or [0.0] * len(names), relative, strict=True)
+            ),
         )
     except (ValueError, LookupError, TypeError, RecursionError, OverflowError) as error:
         raise MeasurementError(

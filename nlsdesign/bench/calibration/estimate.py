@@ -206,8 +206,8 @@ def prior_of(actuator: Assembly, given: Prior | None) -> Prior:
                 next_step="give the deck that was written with it",
             )
     numbers = [model.variable(name) for name in given.names]
-    ends = [np.array([getattr(v, end) for v in numbers], dtype=float) for end in ("minimum", "maximum")]
-    return Prior(given.names, given.values, given.covariance, *ends)
+    low, high = (np.array([getattr(v, end) for v in numbers], dtype=float) for end in ("minimum", "maximum"))
+    return Prior(given.names, given.values, given.covariance, low, high, given.kinds)
 
 
 def estimate(

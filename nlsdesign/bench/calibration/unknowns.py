@@ -119,7 +119,7 @@ def bench_evidence(
 def _gain_is_free(model: FlatModel, channel: str) -> bool:
     """Tell whether the deck says itself how well the gain of a cell is known."""
     reading = reading_of(model.readings, channel)
-    return any("gain" in law.parameters() and law.parameters()["gain"].spread > 0.0 for law in reading.laws)
+    return any("gain" in law.parameters() and bool(law.parameters()["gain"].spread) for law in reading.laws)
 
 
 def recorded_bench(
@@ -276,7 +276,7 @@ class Unknowns:
         places = {name: k for k, first in enumerate(self.shapes) for name in members[first]}
         index = [places[name] for name in self.known.names]
         wide = (self.root @ own @ self.root.T)[np.ix_(index, index)]
-        values = self.known.values * np.exp((self.root @ y[:size])[index])
+        values = self.known.numbers((self.root @ y[:size])[index])
         for bound, hold in ((self.known.minimum, np.maximum), (self.known.maximum, np.minimum)):
             if len(bound):
                 values = hold(values, bound)

@@ -10,9 +10,14 @@ from typing import Literal
 import numpy as np
 
 from ...foundation.arrays import Array
+from ...foundation.spread import EXACT, RelativeSpread, Spread, UniformSpread
 from ...model import Variable
 
-_REACH = 2.0
+_REACH = 3.0
+"""Standard deviations of the prior at which a fit stops: one sound number in 400 lies beyond."""
+
+_AT_END = 0.01
+"""Share of the range of a number within which it stands at the end."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class Parameter:
         ``log`` for positive numbers, whose spread is a factor; ``linear`` otherwise.
     size
         Typical size, for the linear scale.
+    spread
+        As declared; exact where nothing is known before.
     """
 
     name: str
@@ -45,6 +52,18 @@ class Parameter:
     upper: float
     scale: Literal["log", "linear"]
     size: float = 1.0
+    spread: Spread = EXACT
+
+    @property
+    def known(self) -> bool:
+        """Whether something is known of the number before it is fitted."""
+        return bool(self.spread)
+
+    def at_end(self, value: float) -> bool:
+        """Tell whether a fitted value stands at one of its bounds."""
+        width = self.inward(self.upper) - self.inward(self.lower)
+        here = self.inward(value)
+        return min(here - self.inward(self.lower), self.inward(self.upper) - here) <= _AT_END * width
 
     def inward(self, value: float) -> float:
         """Return a value in the fitted scale."""
@@ -62,42 +81,39 @@ class Parameter:
 def declared_parameter(variable: Variable, start: float | None = None) -> Parameter:
     """Return a parameter of the model with the prior that its declared spread stands for.
 
-    A one-sided spread s is read as the uniform range from v/(1 + s) to v·(1 + s), whose standard deviation is
-    ln(1 + s)/√3 on the logarithmic scale. The bounds are twice as wide as the range.
+    A positive number with a relative spread s is fitted as its logarithm, with the standard deviation
+    ln(1 + s); a negative one in a straight line, with the same standard deviation to first order; one whose
+    spread has a unit in a straight line too; one of a range within that range, each value as likely. Other
+    fits stop at three standard deviations.
 
     Parameters
     ----------
     variable
-        Parameter of a flat model with a positive spread.
+        Parameter of a flat model that is not known exactly.
     start
         Where to begin; at the declared value by default.
     """
-    value, width = variable.start, math.log1p(variable.spread)
-    begin = value if start is None else start
-    if value > 0.0:
-        factor = math.exp(_REACH * width)
-        return Parameter(
-            variable.name,
-            variable.unit,
-            begin,
-            value,
-            width / math.sqrt(3.0),
-            max(value / factor, variable.minimum),
-            min(value * factor, variable.maximum),
-            "log",
-        )
-    size = abs(value) or 1.0
-    reach = _REACH * variable.spread * size
+    value, spread = variable.start, variable.spread
+    logarithmic = value > 0.0 and isinstance(spread, RelativeSpread)
+    error = spread.standard_error(value)
+    if isinstance(spread, UniformSpread):
+        sigma, ends = math.inf, (value - spread.half_width, value + spread.half_width)
+    elif logarithmic:
+        sigma = spread.deviation
+        ends = (value * math.exp(-_REACH * sigma), value * math.exp(_REACH * sigma))
+    else:
+        sigma, ends = 1.0, (value - _REACH * error, value + _REACH * error)
     return Parameter(
         variable.name,
         variable.unit,
-        begin,
+        value if start is None else start,
         value,
-        variable.spread / math.sqrt(3.0),
-        max(value - reach, variable.minimum),
-        min(value + reach, variable.maximum),
-        "linear",
-        size,
+        sigma,
+        max(ends[0], variable.minimum),
+        min(ends[1], variable.maximum),
+        "log" if logarithmic else "linear",
+        error,
+        spread,
     )
 
 
@@ -107,13 +123,15 @@ def free_parameter(variable: Variable, *, reach: float = 10.0) -> Parameter:
     Parameters
     ----------
     variable
-        Parameter of a flat model. A number above zero is fitted on a logarithmic scale.
+        Parameter of a flat model. A number that its law wants positive is fitted on a logarithmic scale, one
+        that may have either sign in a straight line.
     reach
         Factor from the start to the bounds; on the linear scale, so many times its size to either side.
     """
     value = variable.start
     size = abs(value) or 1.0
-    if value > 0.0:
+    positive = value > 0.0 and variable.minimum >= 0.0
+    if positive:
         low, high = value / reach, value * reach
     else:
         low, high = value - reach * size, value + reach * size
@@ -125,7 +143,7 @@ def free_parameter(variable: Variable, *, reach: float = 10.0) -> Parameter:
         math.inf,
         max(low, variable.minimum),
         min(high, variable.maximum),
-        "log" if value > 0.0 else "linear",
+        "log" if positive else "linear",
         size,
     )
 

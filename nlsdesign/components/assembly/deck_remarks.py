@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from ...foundation.quantity import Quantity
+from ...foundation.spread import RelativeSpread
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
@@ -40,10 +41,11 @@ def deck_remarks(machine: Assembly) -> list[str]:
 
 def _spreads(numbers: Mapping[str, Quantity]) -> Iterator[str]:
     for name, number in numbers.items():
-        if number.spread > _WIDEST or (number.spread >= _WIDE and not number.assumed):
+        relative = number.spread.relative if isinstance(number.spread, RelativeSpread) else 0.0
+        if relative > _WIDEST or (relative >= _WIDE and not number.assumed):
             yield (
-                f"{name}: spread = {number.spread:g} means ± {100 * number.spread:g} % -> write spread = "
-                f"{number.spread / 100:g} if {number.spread:g} % was meant"
+                f"{name}: spread = {relative:g} means a factor of {1.0 + relative:g} for one standard "
+                f"deviation -> write spread = {relative / 100:g} if {relative:g} % was meant"
             )
 
 

@@ -181,7 +181,7 @@ class MotorInertia:
             float(f"{given.number * factor:.12g}"),
             given.unit,
             f"{given.source}; {given} at the {at}, {how}",
-            given.spread,
+            given.spread.times(factor),
         )
 
 

@@ -10,6 +10,7 @@ from itertools import chain
 
 from ...foundation.deck import Written
 from ...foundation.quantity import Quantity, parse_unit
+from ...foundation.spread import NormalSpread, RelativeSpread, UniformSpread
 from ..core.part import Part
 
 
@@ -31,11 +32,20 @@ def part_lines(
 
 def number_of(given: Quantity) -> str:
     """Return a number as an inline table that reads back as the same number."""
-    factor = parse_unit(given.unit).factor
-    items = [_shortest(v, factor) for v in given.values]
-    value = "[" + ", ".join(items) + "]" if isinstance(given.value, tuple) else items[0]
-    text = f"{{value = {value}, unit = {text_of(given.unit)}, source = {text_of(given.source)}"
-    return text + (f", spread = {given.spread!r}}}" if given.spread else "}")
+    factor, spread = parse_unit(given.unit).factor, given.spread
+    if isinstance(spread, UniformSpread):
+        ends = (given.number - spread.half_width, given.number + spread.half_width)
+        number = f"range = [{', '.join(_shortest(v, factor) for v in ends)}]"
+    else:
+        items = [_shortest(v, factor) for v in given.values]
+        number = f"value = {'[' + ', '.join(items) + ']' if isinstance(given.value, tuple) else items[0]}"
+    text = f"{{{number}, unit = {text_of(given.unit)}, source = {text_of(given.source)}"
+    if isinstance(spread, RelativeSpread):
+        return text + (f", spread = {spread.relative!r}}}" if spread else "}")
+    if isinstance(spread, NormalSpread):
+        size = f"{_shortest(spread.size, factor)} {given.unit}"
+        return f"{text}, spread = {text_of(size)}}}"
+    return text + "}"
 
 
 def text_of(text: str) -> str:

@@ -12,6 +12,7 @@ from scipy.optimize import nnls
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity, significant
+from ...foundation.spread import EXACT, Spread
 from ..core.contacts import Rounded
 from ..core.springs import FittedLaw, FittedRange, StrainStiffening
 from .hyperelastic import Ogden, Yeoh
@@ -100,7 +101,7 @@ def _ogden(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[Fitte
     moduli = sizes * np.sign(exponents[chosen])
     law = Ogden(
         moduli=_constant(tuple(map(float, moduli)), "Pa", like),
-        exponents=_constant(tuple(map(float, exponents[chosen])), "1", like, spread=0.0),
+        exponents=_constant(tuple(map(float, exponents[chosen])), "1", like, spread=EXACT),
         data=_range(strain, like),
     )
     yield law, columns[:, chosen] @ sizes
@@ -114,7 +115,7 @@ def _engaging(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[Fi
     chosen, sizes = _fewest(columns, stress, first=(0,))
     law = StrainStiffening(
         modulus=_constant(tuple(map(float, sizes)), "Pa", like),
-        knots=_constant(tuple(map(float, knots[chosen])), "1", like, spread=0.0),
+        knots=_constant(tuple(map(float, knots[chosen])), "1", like, spread=EXACT),
         contact=Rounded(Quantity(width, "1", "assumed: a share of the distance of the measured strains")),
         data=_range(strain, like),
     )
@@ -147,7 +148,7 @@ def _short(constants: Array) -> Array:
 
 
 def _constant(
-    values: tuple[float, ...], unit: str, like: Quantity, *, row: bool = True, spread: float | None = None
+    values: tuple[float, ...], unit: str, like: Quantity, *, row: bool = True, spread: Spread | None = None
 ) -> Quantity:
     return Quantity(
         values if row else values[0], unit, like.source, like.spread if spread is None else spread

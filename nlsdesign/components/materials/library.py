@@ -55,8 +55,7 @@ class Property:
     @property
     def shown(self) -> str:
         """Value with unit and spread as text."""
-        spread = self.quantity.spread
-        return self._text(self.quantity) + (f" ± {100 * spread:g} %" if spread else "")
+        return f"{self._text(self.quantity)} {self.quantity.spread_text}".rstrip()
 
     def _text(self, quantity: Quantity) -> str:
         shown = quantity.shown

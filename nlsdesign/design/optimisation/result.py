@@ -334,7 +334,7 @@ def _in_its_unit(state: LimitState) -> LimitState:
 def design_frames(design: CamDesign) -> dict[str, Any]:
     """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`."""
     rows = [
-        (name if len(q.values) == 1 else f"{name}[{k}]", each, q.unit, q.source, q.spread)
+        (name if len(q.values) == 1 else f"{name}[{k}]", each, q.unit, q.source, q.spread_data)
         for name, q in design.changes
         for k, each in enumerate(np.atleast_1d(np.asarray(q.shown)).tolist(), start=1)
     ]

@@ -51,7 +51,7 @@ class ToleranceQuantile(Goal):
     trims
         Full names of what is set after assembly, together; ``None`` for the pretension, empty for nothing.
     rules
-        How declared spreads are read.
+        How declared spreads become deviations.
 
     Raises
     ------
@@ -98,15 +98,15 @@ class ToleranceQuantile(Goal):
         weights, errors = _weights(design), design.torque_errors
         if not rows:
             return ca.dot(weights, errors**2)
-        left = ca.horzcat(*rows)
+        left = ca.horzcat(*[row for _, row in rows])
         for tangent in _orthogonal(tangents, weights):
             along = (weights * tangent).T @ left / (ca.dot(weights, tangent**2) + least)
             left = left - tangent @ along
         weighed = ca.diag(weights) @ left
         cross, gram = errors.T @ weighed, left.T @ weighed
         mean = ca.dot(weights, errors**2) + ca.trace(gram)
-        peaked = self.rules.reading.fourth_moment - 3.0
-        variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + peaked * ca.sumsqr(ca.diag(gram))
+        peaked = ca.DM([cause.spread.fourth_moment - 3.0 for cause, _ in rows])
+        variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + ca.dot(peaked, ca.diag(gram) ** 2)
         return _quantile(mean, variance + least**2, float(ndtri(self.share)))
 
 
@@ -127,7 +127,7 @@ class TrimRoom(Limit):
         Standard deviations of the trim that are kept free. Soft springs need more than the first order says,
         so that 2 leave room for about 93 % of them.
     rules
-        How declared spreads are read.
+        How declared spreads become deviations.
 
     Raises
     ------
@@ -162,7 +162,7 @@ class TrimRoom(Limit):
         sensitivities, weights = _Sensitivities(design), _weights(design)
         tangent = sensitivities.tangent(self.name)
         rows = _rows(design, sensitivities, self.rules)
-        along = ca.vertcat(ca.SX(0), *[ca.dot(weights, tangent * row) for row in rows])
+        along = ca.vertcat(ca.SX(0), *[ca.dot(weights, tangent * row) for _, row in rows])
         least = _LEAST * design.target.largest**2
         away = self.deviations * ca.sqrt(ca.sumsqr(along) + least**2) / (ca.dot(weights, tangent**2) + least)
         number, unit = design.parameters[self.name], design.model.variable(self.name).unit
@@ -174,10 +174,13 @@ class TrimRoom(Limit):
             yield Bound("TrimRoom", words, expression, value, upper, shown, max(abs(value), 1e-3))
 
 
-def _rows(design: DesignPoint, sensitivities: _Sensitivities, rules: SpreadRules) -> list[Expression]:
+def _rows(
+    design: DesignPoint, sensitivities: _Sensitivities, rules: SpreadRules
+) -> list[tuple[Cause, Expression]]:
+    """Return the causes that change the torque at rest, each with its change per standard deviation."""
     causes = spring_causes(design.model, design.cam.drive, rules)
-    rows = [sensitivities.row(cause) for cause in causes]
-    return [row for row in rows if not row.is_zero()]
+    rows = [(cause, sensitivities.row(cause)) for cause in causes]
+    return [(cause, row) for cause, row in rows if not row.is_zero()]
 
 
 def _weights(design: DesignPoint) -> Expression:

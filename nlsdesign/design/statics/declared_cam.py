@@ -394,7 +394,7 @@ def _dense(angles: Array, lever_arms: Array, count: int) -> tuple[Array, Array]:
 
 def _row(old: Quantity, values: Array) -> Quantity:
     """Return designed control values; the spread of those before was of another cam, made another way."""
-    return replace(old.with_value(significant(values), _SOURCE), spread=0.0)
+    return old.with_value(significant(values), _SOURCE).with_spread(0.0)
 
 
 def _jumps(wanted: Array) -> bool:

@@ -2,111 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from ...foundation.arrays import Array
 from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.spread import Spread
 
 
 def shown_unit(unit: str) -> str:
     """Return the unit in which a length, an area or a stress of a spring is shown."""
     return {"m": "mm", "m^2": "mm^2", "Pa": "MPa"}.get(unit, unit)
-
-
-@dataclass(frozen=True)
-class SpreadReading(ABC):
-    """Base of the ways to read a declared spread: as what, and how numbers with it are drawn."""
-
-    @property
-    @abstractmethod
-    def fourth_moment(self) -> float:
-        """Mean of the fourth power of a deviation in units of the standard deviation."""
-
-    @abstractmethod
-    def deviation(self, spread: float) -> float:
-        """Return the standard deviation that belongs to a spread, in the unit of the spread.
-
-        Parameters
-        ----------
-        spread
-            As declared, one-sided.
-        """
-
-    @abstractmethod
-    def drawn(self, generator: np.random.Generator, count: int) -> Array:
-        """Return deviations in units of the standard deviation, shape (count,).
-
-        Parameters
-        ----------
-        generator
-            Source of random numbers.
-        count
-            How many.
-        """
-
-    @abstractmethod
-    def at(self, shares: Array) -> Array:
-        """Return the deviations below which given shares of all lie, in units of the standard deviation.
-
-        Parameters
-        ----------
-        shares
-            Between 0 and 1, shape (n,).
-        """
-
-
-@dataclass(frozen=True)
-class NormalSpread(SpreadReading):
-    """A spread is one standard deviation of a normal distribution, as in the prior of a fit."""
-
-    @property
-    def fourth_moment(self) -> float:
-        """3."""
-        return 3.0
-
-    def deviation(self, spread: float) -> float:
-        """Return the spread itself."""
-        return spread
-
-    def drawn(self, generator: np.random.Generator, count: int) -> Array:
-        """Return standard normal numbers."""
-        return generator.standard_normal(count)
-
-    def at(self, shares: Array) -> Array:
-        """Return quantiles of the standard normal distribution."""
-        result: Array = ndtri(shares)
-        return result
-
-
-@dataclass(frozen=True)
-class UniformSpread(SpreadReading):
-    """A spread is a bound, and every number within it is equally likely.
-
-    Source: JCGM 2008, 4.3.7 (the standard deviation is the half width over √3).
-    """
-
-    @property
-    def fourth_moment(self) -> float:
-        """9/5."""
-        return 1.8
-
-    def deviation(self, spread: float) -> float:
-        """Return spread/√3."""
-        return spread / math.sqrt(3.0)
-
-    def drawn(self, generator: np.random.Generator, count: int) -> Array:
-        """Return numbers between −√3 and √3."""
-        return generator.uniform(-math.sqrt(3.0), math.sqrt(3.0), count)
-
-    def at(self, shares: Array) -> Array:
-        """Return quantiles between −√3 and √3."""
-        return math.sqrt(3.0) * (2.0 * shares - 1.0)
 
 
 @dataclass(frozen=True)
@@ -127,6 +36,8 @@ class Cause(ABC):
         Where the deviation comes from: declared, given, or assumed with a reason.
     relative
         Whether it is a share of the numbers, so that it grows with them.
+    spread
+        How the deviations are distributed.
     """
 
     name: str
@@ -135,6 +46,7 @@ class Cause(ABC):
     unit: str
     source: str
     relative: bool
+    spread: Spread
 
     @property
     def assumed(self) -> bool:
@@ -193,11 +105,14 @@ class ProfileCause(Cause):
     numbers: tuple[tuple[str, float], ...]
 
 
-def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: SpreadReading) -> Array:
+def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int) -> Array:
     """Return independent deviations in units of their standard deviations.
 
     Each cause draws from a generator of its own, seeded by the seed and its name, so that another cause more
     or less, or another design with the same names, changes no other deviation.
     """
-    columns = [reading.drawn(np.random.default_rng([seed, *cause.name.encode()]), count) for cause in causes]
+    columns = [
+        cause.spread.deviate(np.random.default_rng([seed, *cause.name.encode()]).standard_normal(count))
+        for cause in causes
+    ]
     return np.column_stack(columns) if columns else np.zeros((count, 0))

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from ...foundation.errors import unknown_name
 from ...foundation.quantity import Quantity
+from ...foundation.spread import EXACT, NormalSpread, RelativeSpread, Spread
 from ...model import FlatModel, Variable
 from ...model.roles import series_cam
 from ...model.structure import CamNames, SpringNames
@@ -22,10 +23,8 @@ from ..curves.numbers import in_si
 from .causes import (
     AnchorCause,
     Cause,
-    NormalSpread,
     NumberCause,
     ProfileCause,
-    SpreadReading,
     WaveCause,
     shown_unit,
 )
@@ -35,10 +34,15 @@ _FARTHEST = 10.0
 
 
 class _Assumed(NamedTuple):
-    """A deviation that is assumed where nothing is declared."""
+    """A standard deviation in SI that is assumed where nothing is declared."""
 
     deviation: float
     source: str
+
+    @property
+    def spread(self) -> Spread:
+        """A normal distribution of that size."""
+        return NormalSpread(self.deviation) if self.deviation > 0.0 else EXACT
 
 
 _PRETENSION = _Assumed(1e-4, "assumed: set by a screw of 0.5 mm pitch to a fifth of a turn")
@@ -92,18 +96,15 @@ class SpreadRules:
 
     Parameters
     ----------
-    reading
-        What a spread means.
     material
         How the moduli of one piece deviate.
     given
-        Spreads that replace declared and assumed ones, by name of the cause: in the unit of the number,
-        relative for rows and moduli; zero for none.
+        Spreads that replace declared and assumed ones, by name of the cause: a :class:`Spread`, or one
+        standard deviation in the unit of the number, relative for rows and moduli; zero for none.
     """
 
-    reading: SpreadReading = field(default_factory=NormalSpread)
     material: MaterialScatter = field(default_factory=OneBatch)
-    given: Mapping[str, Quantity | float] = field(default_factory=dict)
+    given: Mapping[str, Spread | Quantity | float] = field(default_factory=dict)
 
 
 def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> tuple[Cause, ...]:
@@ -114,7 +115,7 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
     cam = series_cam(model, spring)
     tie = next(each for each in model.springs if cam in each.cams)
     groups = _groups(model, tie, cam, rules.material)
-    others = _beside_the_numbers(model, cam, rules.reading)
+    others = _beside_the_numbers(model, cam)
     valid = [*groups, *others]
     for name in rules.given:
         if name not in valid:
@@ -124,7 +125,11 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
         causes += _of_numbers(name, rows, cam, rules)
     for name, assumed in others.items():
         given = rules.given.get(name)
-        size = assumed if given is None else _Assumed(_read(name, given, "m", rules.reading), "given")
+        size = (
+            assumed
+            if given is None
+            else _Assumed(_given_spread(name, given, "m").standard_error(1.0), "given")
+        )
         causes += _of_the_edge(name, size)
     return tuple(cause for cause in causes if cause.deviation > 0.0)
 
@@ -157,34 +162,36 @@ def _not_of_the_torque(cam: CamNames) -> Iterator[str]:
         yield from (cam.cable.diameter, cam.cable.breaking_force, cam.cable.bend_ratio)
 
 
-def _beside_the_numbers(model: FlatModel, cam: CamNames, reading: SpreadReading) -> dict[str, _Assumed]:
+def _beside_the_numbers(model: FlatModel, cam: CamNames) -> dict[str, _Assumed]:
     """Return what deviates besides the numbers: the edge of the cam, and the cable on it."""
     cable = _CABLE
     if cam.cable is not None:
         diameter = model.variable(cam.cable.diameter)
-        if diameter.spread > 0.0:
-            size = reading.deviation(diameter.spread) * diameter.start / 2.0
-            cable = _Assumed(size, f"declared: spread {100 * diameter.spread:g} %")
+        if diameter.spread:
+            size = diameter.spread.standard_error(diameter.start) / 2.0
+            cable = _Assumed(size, f"declared: {diameter.spread_text}")
     return {f"{cam.name}.contour": _CONTOUR, f"{cam.name}.cable_radius": cable}
 
 
 def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: SpreadRules) -> list[Cause]:
     """Return the cause of a number, or of numbers that move together."""
-    first, reading, given = rows[0], rules.reading, rules.given.get(name)
+    first, given = rows[0], rules.given.get(name)
     if name == cam.anchor_distance and first.start > _FARTHEST:
         return []
     alone = len(rows) == 1 and name == first.name and not name.endswith("]")
     if given is not None:
-        size = _read(name, given, first.unit if alone else "1", reading)
+        spread = _given_spread(name, given, first.unit if alone else "1")
+        size = spread.standard_error(first.start if alone else 1.0)
         share = size / (abs(first.start) or 1.0) if alone else size
         amounts, source, relative = [size] if alone else [share * v.start for v in rows], "given", not alone
     else:
-        share = reading.deviation(max(v.spread for v in rows))
-        amounts = [reading.deviation(v.spread) * v.start for v in rows]
-        source, relative = f"declared: spread {100 * max(v.spread for v in rows):g} %", True
+        widest = max(rows, key=lambda v: v.spread.share(v.start))
+        spread, share = widest.spread, widest.spread.standard_error(widest.start) / (abs(widest.start) or 1.0)
+        amounts = [math.copysign(v.spread.standard_error(v.start), v.start) for v in rows]
+        source, relative = f"declared: {widest.spread_text}", isinstance(spread, RelativeSpread)
         assumed = {cam.pretension: _PRETENSION, cam.anchor_distance: _ANCHOR}.get(name)
         if assumed is not None and amounts[0] == 0.0:
-            amounts, source, relative = [assumed.deviation], assumed.source, False
+            spread, amounts, source, relative = assumed.spread, [assumed.deviation], assumed.source, False
     numbers = tuple((v.name, amount) for v, amount in zip(rows, amounts, strict=True))
     # Rows and moduli are shown as relative deviations, single numbers in their own unit.
     unit = shown_unit(first.unit) if alone else "1"
@@ -192,24 +199,30 @@ def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: Sprea
     if alone and first.unit == "1":
         shown = (1.0, share)
     if name == cam.anchor_distance:
-        return [AnchorCause(name, *shown, unit, source, relative)]
+        return [AnchorCause(name, *shown, unit, source, relative, spread)]
     if name.startswith(f"{cam.name}.") and name != cam.elements:
-        return [ProfileCause(name, *shown, unit, source, relative, numbers)]
-    return [NumberCause(name, *shown, unit, source, relative, numbers)]
+        return [ProfileCause(name, *shown, unit, source, relative, spread, numbers)]
+    return [NumberCause(name, *shown, unit, source, relative, spread, numbers)]
 
 
 def _of_the_edge(name: str, whole: _Assumed) -> list[Cause]:
     """Return the causes of a contour error; one of an edge is shared equally by an offset and two waves."""
     if not name.endswith(".contour"):
-        return [WaveCause(name, 0.0, whole.deviation, "mm", whole.source, False, 0)]
+        return [WaveCause(name, 0.0, whole.deviation, "mm", whole.source, False, whole.spread, 0)]
     size = whole.deviation / math.sqrt(3.0)
     causes: list[Cause] = []
     for order, (part, scale) in enumerate(
         [("offset", 1.0), ("half_wave", math.sqrt(2)), ("wave", math.sqrt(2))]
     ):
-        causes.append(WaveCause(f"{name}.{part}", 0.0, scale * size, "mm", whole.source, False, order))
+        causes.append(
+            WaveCause(f"{name}.{part}", 0.0, scale * size, "mm", whole.source, False, whole.spread, order)
+        )
     return causes
 
 
-def _read(name: str, given: Quantity | float, unit: str, reading: SpreadReading) -> float:
-    return reading.deviation(in_si(f"spread of {name}", given, unit))
+def _given_spread(name: str, given: Spread | Quantity | float, unit: str) -> Spread:
+    """Return a spread that replaces another; a number is one standard deviation of a normal distribution."""
+    if isinstance(given, Spread):
+        return given
+    size = in_si(f"spread of {name}", given, unit)
+    return NormalSpread(size) if size > 0.0 else EXACT

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.special import ndtri
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
@@ -16,7 +17,7 @@ from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ..curves.target import Target
 from ..statics.smooth_cables import with_smooth_cables
-from .causes import NumberCause, SpreadReading, draw_deviations, shown_unit
+from .causes import NumberCause, draw_deviations, shown_unit
 from .declared_spreads import SpreadRules, spring_causes
 from .made_spring import MadeSpring, made_spring
 from .tolerance_result import SHARES, CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect, quantile
@@ -69,7 +70,7 @@ def tolerance_analysis(
     seed
         Of the draws; the same seed gives the same springs, also for another design with the same names.
     rules
-        How declared spreads are read; by default as standard deviations, the moduli of a piece together.
+        How declared spreads become deviations; by default the moduli of a piece deviate together.
     trims
         What may be set after assembly; by default the pretension. Each is tried alone.
 
@@ -109,7 +110,7 @@ def tolerance_analysis(
     everything = (*spring_causes(model, name, rules), *(column for column, _ in columns))
     made = made_spring(model, name, target=target, causes=everything, angles=_ANGLES)
     ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
-    return _analysed(made, ranges, target=target, reading=rules.reading, draws=draws, seed=seed)
+    return _analysed(made, ranges, target=target, draws=draws, seed=seed)
 
 
 def _analysed(
@@ -117,7 +118,6 @@ def _analysed(
     ranges: Sequence[tuple[str, tuple[float, float]]],
     *,
     target: Target,
-    reading: SpreadReading,
     draws: int,
     seed: int,
 ) -> ToleranceResult:
@@ -126,12 +126,12 @@ def _analysed(
     largest = np.max(np.abs(made.sensitivities), axis=1, initial=0.0)
     acting = [k for k in range(len(causes)) if largest[k] > 1e-9 * target.largest]
     deviations = np.zeros((draws, len(made.causes)))
-    deviations[:, acting] = draw_deviations([causes[k] for k in acting], draws, seed=seed, reading=reading)
+    deviations[:, acting] = draw_deviations([causes[k] for k in acting], draws, seed=seed)
     touched = made.contour.deviating(made.causes, deviations)
     torques = made.torques(deviations, touched)
     errors = made.rms(torques)
     tried, best = _tried(made, deviations, touched, ranges)
-    effects = _effects(made, _WithLess(made, deviations, (touched, torques), best), acting, reading)
+    effects = _effects(made, _WithLess(made, deviations, (touched, torques), best), acting)
     return ToleranceResult(
         target=target,
         angles=made.angles,
@@ -233,9 +233,7 @@ class _WithLess:
         return built, after
 
 
-def _effects(
-    made: MadeSpring, with_less: _WithLess, acting: Sequence[int], reading: SpreadReading
-) -> list[CauseEffect]:  # fmt: skip
+def _effects(made: MadeSpring, with_less: _WithLess, acting: Sequence[int]) -> list[CauseEffect]:
     rows = made.sensitivities
     best = with_less.best
     left = rows if best is None else _without(rows, rows[best.column], made.weights)
@@ -253,7 +251,7 @@ def _effects(
             cause=made.causes[k],
             share=shares[0],
             share_after_trim=shares[1],
-            alone=_alone(made, k, reading),
+            alone=_alone(made, k),
             halved=halved[0],
             measured=measured[0],
             halved_after_trim=halved[1],
@@ -270,9 +268,10 @@ def _without(rows: Array, tangent: Array, weights: Array) -> Array:
     return result
 
 
-def _alone(made: MadeSpring, column: int, reading: SpreadReading) -> float:
+def _alone(made: MadeSpring, column: int) -> float:
     """Return the 95 % quantile for one cause, from evenly spaced shares of its distribution."""
-    places = reading.at((np.arange(_STRATA) + 0.5) / _STRATA)
+    normal = ndtri((np.arange(_STRATA) + 0.5) / _STRATA)
+    places = made.causes[column].spread.deviate(normal)
     nodes = np.linspace(places[0], places[-1], _NODES)
     deviations = np.zeros((_NODES, len(made.causes)))
     deviations[:, column] = nodes

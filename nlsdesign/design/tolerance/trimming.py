@@ -9,6 +9,7 @@ import numpy as np
 from ...foundation.arrays import Array, Indices
 from ...foundation.errors import ArrangementError, ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity
+from ...foundation.spread import NormalSpread
 from ...model import FlatModel
 from ...model.structure import CamNames
 from ..curves.numbers import in_si
@@ -73,9 +74,14 @@ class Trim:
             )  # fmt: skip
         size = 0.1 * abs(variable.start) or 1e-3
         name, unit, source = f"trim of {self.name}", variable.unit, "set after assembly"
+        spread = NormalSpread(size)
         if self.name in anchored:
-            return AnchorCause(name, variable.start, size, unit, source, False), (ends[0], ends[1])
-        moved = NumberCause(name, variable.start, size, unit, source, False, ((self.name, size),))
+            return AnchorCause(name, variable.start, size, unit, source, False, NormalSpread(size)), (
+                ends[0],
+                ends[1],
+            )
+        spread = NormalSpread(size)
+        moved = NumberCause(name, variable.start, size, unit, source, False, spread, ((self.name, size),))
         return moved, (ends[0], ends[1])
 
 

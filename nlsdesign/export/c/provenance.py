@@ -122,7 +122,7 @@ def _number(name: str, number: Quantity) -> str:
         items = [*items[:3], "...", f"{items[-1]} ({len(items)} numbers)"]
     value = f"[{', '.join(items)}]" if isinstance(shown, tuple) else items[0]
     unit = "" if number.unit == "1" else f" {number.unit}"
-    spread = f" +- {100.0 * number.spread:g} %" if number.spread else ""
+    spread = f" {number.spread_text}".replace("±", "+-").rstrip()
     return f"{name} = {value}{unit}{spread} ({number.source})"
 
 

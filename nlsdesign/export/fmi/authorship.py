@@ -147,7 +147,7 @@ def _deck(origin: Origin) -> dict[str, Any]:
         "changed": list(origin.changed),
         "parent": _parent(origin.parent),
         "numbers": {
-            name: {"value": q.shown, "unit": q.unit, "source": q.source, "spread": q.spread}
+            name: {"value": q.shown, "unit": q.unit, "source": q.source, "spread": q.spread_data}
             for name, q in origin.numbers.items()
         },
     }

@@ -81,7 +81,7 @@ def _terminal_table(each: Terminal) -> str:
 def _table_row(each: FmuVariable) -> str:
     v = each.variable
     limits = "" if math.isinf(v.minimum) and math.isinf(v.maximum) else f"{v.minimum:g} to {v.maximum:g}"
-    spread = f" ± {100 * v.spread:g} %" if v.spread else ""
+    spread = f" {v.spread_text}" if v.spread else ""
     cells = (
         v.name,
         f"{v.start:g}{spread}" if each.has_start else "",

@@ -333,7 +333,7 @@ def _attributes(v: Variable, *, starts: bool, fixed: bool) -> str:
 
 def _evidence(v: Variable) -> str:
     source = comment(v.source) or NOT_STATED
-    return f"{source}; ± {v.spread * 100:g} %" if v.spread else source
+    return f"{source}; {v.spread_text}" if v.spread else source
 
 
 def _equations(equations: ModelicaEquations) -> Iterator[str]:

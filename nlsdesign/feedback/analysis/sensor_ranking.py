@@ -322,7 +322,7 @@ def holding_current(points: RestPoints) -> tuple[int | None, Array]:
 
 
 def spread_offsets(points: RestPoints, hold: Array) -> Array:
-    """Return what one declared spread of the numbers does to rates and outputs, in independent directions.
+    """Return what one standard deviation of the numbers does to rates and outputs, in independent directions.
 
     The items of one quantity vary together, as it has one spread. Of all numbers only what they do to rates
     and outputs counts, so their joint covariance is written in as few directions as it has.
@@ -332,8 +332,8 @@ def spread_offsets(points: RestPoints, hold: Array) -> Array:
     model = points.model
     groups: dict[str, dict[int, float]] = {}
     for i, v in enumerate(model.parameters):
-        if v.spread and v.start:
-            groups.setdefault(v.name.partition("[")[0], {})[i] = v.spread * abs(v.start)
+        if v.uncertain:
+            groups.setdefault(v.name.partition("[")[0], {})[i] = v.spread.standard_error(v.start)
     s = model.symbols()
     sizes = np.zeros((len(model.parameters), len(groups)))
     for column, group in enumerate(groups.values()):

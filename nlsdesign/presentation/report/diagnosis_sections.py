@@ -121,7 +121,7 @@ def _drawn(gap: Gap, after: str) -> Mapping[str, Any]:
 
 
 _SHAPES = 2
-_EDGE = 1.0
+_EDGE = 2.0
 """Declared spreads beyond which a number has left what was declared."""
 ROLES = {"fit": "fitted", "selection": "for selection", "held_out": "held out"}
 
@@ -296,7 +296,7 @@ def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
         (
             n.name,
             compact(n.declared),
-            f"± {100 * n.spread:.3g} %",
+            f"± {100 * n.spread:.3g} %" if isinstance(n.spread, float) else n.spread,
             with_error(n.fitted, n.standard_error),
             typeset_unit(n.unit),
             f"{n.strain:+.2f}".replace("-0.00", "0.00").replace("-", "−"),
@@ -306,7 +306,7 @@ def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
     beyond = frozenset(i for i, n in enumerate(numbers) if abs(n.strain) > _EDGE)
     caption = (
         f"Numbers that were declared with a spread, refitted {how}, with standard errors. The last column is "
-        "how far each moved, in declared spreads: beyond 1 it has left what was declared"
+        "how far each moved, in declared standard deviations: beyond 2 it is outside what was declared"
         f"{' (marked)' if beyond else '; none has'}."
     )
     columns = ("number", "declared", "spread", "refitted", "unit", "moved")

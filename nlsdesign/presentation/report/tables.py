@@ -35,7 +35,7 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
             name,
             value_in_words(q),
             typeset_unit(q.unit),
-            f"± {100 * q.spread:g} %" if q.spread else "",
+            q.spread_text,
             q.source,
         )
         for name, q in numbers.items()
@@ -43,7 +43,7 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
     share = sources(numbers)["assumed"]
     caption = (
         f"{len(numbers)} numbers, of which {100 * share:.0f} % are only assumed (marked). "
-        "The spread is one-sided and relative."
+        "The spread is one standard deviation: relative, of the logarithm; with a unit, of the number itself."
     )
     marked = frozenset(i for i, q in enumerate(numbers.values()) if q.assumed)
     columns = ("name", "value", "unit", "spread", "source")

@@ -46,6 +46,7 @@ from nlsdesign.foundation.errors import (
     ValueRangeError,
 )
 from nlsdesign.foundation.quantity import Quantity, quantity
+from nlsdesign.foundation.spread import RelativeSpread
 
 
 def rubber() -> Specimen:
@@ -104,7 +105,7 @@ def test_a_quantity_brings_its_unit_and_source_a_number_does_not() -> None:
     plain = changed.with_values({"spring.rubber.rest_length": 0.014}).quantities()[
         "spring.rubber.rest_length"
     ]
-    assert (plain.number, plain.unit, plain.spread) == (0.014, "mm", 0.01)
+    assert (plain.number, plain.unit, plain.spread) == (0.014, "mm", RelativeSpread(0.01))
 
 
 @pytest.mark.parametrize(

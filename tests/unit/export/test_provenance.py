@@ -79,7 +79,7 @@ def test_the_header_lists_every_number_of_the_deck_with_unit_and_source(name: st
             assert shown == pytest.approx([v / factor for v in number.values], rel=1e-11)
         after = text[found.end() :]
         unit = "" if number.unit == "1" else f"{number.unit} "
-        spread = f"+- {100.0 * number.spread:g} % " if number.spread else ""
+        spread = f"+- {100.0 * number.spread.share(1.0):g} % " if number.spread else ""
         assert after.startswith(f"{unit}{spread}({' '.join(number.source.split())})"), full
 
 

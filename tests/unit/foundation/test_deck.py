@@ -14,6 +14,7 @@ import pytest
 from nlsdesign.components.assembly.deck_writer import deck_problems, declare
 from nlsdesign.foundation.deck import Deck, deck_names, load_deck, read_deck
 from nlsdesign.foundation.errors import DeckError, NlsError, UnitError, UnknownNameError, ValueRangeError
+from nlsdesign.foundation.spread import RelativeSpread
 
 SOUND = """\
 [deck]
@@ -81,7 +82,7 @@ def test_the_sound_deck_is_sound() -> None:
     assert numbers["motor.inertia"].number == pytest.approx(5.97e-4, rel=1e-15)
     assert numbers["spring.rubber.stiff.knots"].values == pytest.approx((0.0, 0.016), rel=1e-15)
     assert numbers["spring.rubber.area"].source == "drawing"
-    assert numbers["motor.inertia"].spread == 0.1
+    assert numbers["motor.inertia"].spread == RelativeSpread(0.1)
 
 
 # what is replaced, by what (§ marks the place that the message must name), error, said, nearest, next step

@@ -164,11 +164,13 @@ def test_ends_of_a_spring() -> None:
 
 def test_spreads_in_per_cent_are_refused_or_named() -> None:
     text = load_template("cam-actuator").text
-    with pytest.raises(Exception, match=r"motor.inertia: spread = 15: means ± 1500 %") as caught:
+    with pytest.raises(
+        Exception, match=r"motor.inertia: spread = 15: means a factor of 16 up or down"
+    ) as caught:
         declare(read_deck(text.replace("spread = 0.15", "spread = 15"), Path("own.toml")))
     assert "write spread = 0.15 if 15 % was meant" in str(caught.value)
     (said,) = slips("spread = 0.15", "spread = 3")
-    assert said.startswith("motor.inertia: spread = 3 means ± 300 %")
+    assert said.startswith("motor.inertia: spread = 3 means a factor of 4")
     assert slips("spread = 0.15", "spread = 1.5") == [], "an assumed order of magnitude"
 
 

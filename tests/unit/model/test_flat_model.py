@@ -49,6 +49,7 @@ from nlsdesign.foundation.errors import (
     ValueRangeError,
 )
 from nlsdesign.foundation.quantity import Quantity, quantity
+from nlsdesign.foundation.spread import RelativeSpread
 from nlsdesign.foundation.symbolic import Expression
 from nlsdesign.model import FlatModel, Table, Variable, flatten
 
@@ -162,7 +163,7 @@ def test_numbers_travel_with_source_and_spread() -> None:
         2e-3,
         "N*m*s/rad",
         "run-down",
-        0.3,
+        RelativeSpread(0.3),
     )
 
 

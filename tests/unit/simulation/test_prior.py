@@ -31,7 +31,7 @@ def two(correlation: float = 0.0) -> Prior:
 
 def test_a_spread_is_a_factor_of_one_standard_deviation(model: FlatModel) -> None:
     prior = declared_prior(model)
-    declared = {v.name: v.spread for v in model.parameters if v.spread > 0.0 and v.start != 0.0}
+    declared = {v.name: v.spread.share(v.start) for v in model.parameters if v.spread and v.start != 0.0}
     assert prior.spreads() == pytest.approx(declared)
     drawn = prior.draws(20_000, seed=1)
     for name in (AREA, CONSTANT, FRICTION):

@@ -25,6 +25,7 @@ from ....components import (
 )
 from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity
+from ....foundation.spread import RelativeSpread
 from ..fitting import Continuation, Plain
 from .effect import Edit, Effect, Form, Unknown, free_name, number, wrapped
 from .friction import tied
@@ -129,7 +130,9 @@ def _gravity(assembly: Assembly, body: str) -> Iterator[Edit]:
 
 def _reduced(whole: Quantity, share: float, spread: float) -> Quantity:
     """Return what is left of an inertia of which a part is put elsewhere, with at least a spread."""
-    return replace(whole.with_value(share * whole.number, whole.source), spread=max(whole.spread, spread))
+    least = RelativeSpread(spread)
+    wider = whole.spread if whole.spread.share(whole.number) > spread else least
+    return replace(whole.with_value(share * whole.number, whole.source), spread=wider)
 
 
 def _shaft(

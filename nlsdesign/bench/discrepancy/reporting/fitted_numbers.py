@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ....components.assembly.named_parts import Assembly
-from ....foundation.quantity import to_resolution
+from ....foundation.quantity import to_resolution, with_unit
 from ....model.derived_deck import named_by_content
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter
@@ -24,10 +24,9 @@ class FittedNumber(NamedTuple):
     declared, fitted, standard_error
         In SI.
     strain
-        How far it went, in declared ranges (spreads): 1 is the edge of what was declared, 2 where the fit
-        stops.
+        How far it went, in declared standard deviations; the fit stops at 3.
     spread
-        Declared spread, one-sided and relative: 0.15 means ± 15 %.
+        As declared: 0.15 means ± 15 %; with its unit where it is not relative.
     """
 
     name: str
@@ -36,28 +35,31 @@ class FittedNumber(NamedTuple):
     fitted: float
     standard_error: float
     strain: float
-    spread: float = 0.0
+    spread: float | str = 0.0
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the fit stopped at the end of what was declared, where an error says nothing."""
+        return not math.isfinite(self.standard_error)
 
 
 def fitted_numbers(fits: Sequence[Fit]) -> tuple[FittedNumber, ...]:
     """Return the refitted numbers of which something was declared, in the order of the fits."""
-    return tuple(_number(fit, p) for fit in fits for p in fit.parameters if math.isfinite(p.sigma))
+    return tuple(_number(fit, p) for fit in fits for p in fit.parameters if p.known)
 
 
 def _number(fit: Fit, parameter: Parameter) -> FittedNumber:
     value = fit.values[parameter.name]
     moved = parameter.inward(value) - parameter.inward(parameter.centre)
-    # The prior of a range of half width w has the standard deviation w/√3.
-    width = math.sqrt(3.0) * parameter.sigma
     error = fit.standard_error(parameter.name)
     return FittedNumber(
         parameter.name,
         parameter.unit,
         parameter.centre,
         to_resolution(value, error),
-        error,
-        moved / width,
-        math.expm1(width) if parameter.scale == "log" else width,
+        math.nan if parameter.at_end(value) else error,
+        moved / (parameter.sigma if math.isfinite(parameter.sigma) else 1.0),
+        parameter.spread.data(lambda v: with_unit(f"{v:.4g}", parameter.unit)),
     )
 
 

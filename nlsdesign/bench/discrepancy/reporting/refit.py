@@ -114,8 +114,6 @@ def _without_sensors(model: FlatModel, record: Record, wiring: Wiring) -> Record
 
 _FROM_SPREAD = 0.8
 """Share of the variance of a declared spread above which the records have added next to nothing."""
-_AT_END = 1.96
-"""Declared ranges from the declared value; a refit is stopped at two."""
 
 
 class BlockError(NamedTuple):
@@ -161,15 +159,15 @@ class Refit:
     def words(self) -> tuple[str, ...]:
         """Return what the records cannot tell, what is at the end of its range, and what is suspect."""
         stuck = [
-            f"{n.name} stands at the end of its range, {n.strain:+.1f} declared spreads away: the declared "
-            "value, its spread or the structure is wrong; ask `nlsdesign diagnose` what is missing."
+            f"{n.name} stands at the end of its range, {n.strain:+.1f} standard deviations away: the "
+            "declared value, its spread or the structure is wrong; ask `nlsdesign diagnose` what is missing."
             for n in self.numbers
-            if abs(n.strain) >= _AT_END
+            if n.at_end
         ]
         unknown = [
             f"The records say next to nothing of {name}: what is given as its error is its declared spread."
             for name, share in self._known_by_spread().items()
-            if share > _FROM_SPREAD
+            if share > _FROM_SPREAD and name not in {n.name for n in self.numbers if n.at_end}
         ]
         return (*[f"suspect: {f}" for f in self.findings], *stuck, *unknown, *more_excitation(self.fits))
 
@@ -179,6 +177,7 @@ class Refit:
             p.name: float(fit.covariance[i, i]) / p.sigma**2
             for fit in self.fits
             for i, p in enumerate(fit.parameters)
+            if math.isfinite(p.sigma)
         }
 
     def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
@@ -230,7 +229,7 @@ def refit(
     Parameters
     ----------
     actuator
-        As declared; the spreads are priors, and the fit stops at twice the range they stand for.
+        As declared; the spreads are priors, and the fit stops at three standard deviations.
     records
         Bench records with their roles; those held out are only judged on.
     window

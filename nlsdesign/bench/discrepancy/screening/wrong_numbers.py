@@ -2,10 +2,10 @@
 
 A refit stops at twice the declared range. Where a number stands there and something is left over, the number
 may have been declared wrongly, alone or beside a missing effect. It is then fitted as if nothing were known
-of it, and that is kept only if the numbers end far outside their declared ranges and explain enough.
+of it, and that is kept only if the numbers end far outside their declared values and explain enough.
 
 A missing effect leaves most declared numbers where they are. Of another rig of the same structure the numbers
-lie far outside their declared ranges and, let go, explain the records without any effect.
+lie far outside their declared values and, let go, explain the records without any effect.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from ..selection.criteria import Change, Criteria, is_complete
 from ..selection.hypothesis import Hypothesis, excesses
 from ..selection.measures import DECLARED, Excesses, standing_of
 
-AT_END = 3.4
-"""Prior standard deviations at which a refit is stopped: twice the declared range is 3.46."""
-_OUTSIDE = 2.0
-"""Declared ranges from the declared value beyond which a number was declared wrongly; a refit stops there."""
+AT_END = 2.97
+"""Declared standard deviations at which a number stands at its end: a refit stops at three."""
+_OUTSIDE = 3.0
+"""Declared standard deviations beyond which a number was declared wrongly; a refit stops there."""
 _CERTAIN = 2.0
 """Standard errors by which it must lie beyond."""
 
@@ -42,7 +42,7 @@ def with_numbers_let_go(
     """Return a hypothesis with the numbers let go at whose ends a refit was stopped, if they explain enough.
 
     Result: refitted; nothing where no block is open or no number stands at its end, where letting go explains
-    less than an effect would have to, or where the numbers end near their declared ranges.
+    less than an effect would have to, or where the numbers end near their declared values.
     """
     stuck, every = stuck_numbers(hypothesis), excesses(hypothesis, comparison.bench, criteria)
     if not stuck or is_complete(every):
@@ -79,14 +79,14 @@ def wrong_numbers(hypothesis: Hypothesis) -> list[str]:
         for p in fit.parameters:
             if p.name not in hypothesis.released:
                 continue
-            width = math.log1p(hypothesis.assembly.quantities()[p.name.partition("[")[0]].spread)
+            width = hypothesis.assembly.quantities()[p.name.partition("[")[0]].spread.deviation
             moved, error = math.log(fit.values[p.name] / p.centre), fit.standard_error(p.name)
             if abs(moved) - _CERTAIN * error / fit.values[p.name] <= _OUTSIDE * width:
                 continue
             numbers = [with_unit(f"{each:.4g}", p.unit) for each in (p.centre, fit.values[p.name])]
             words.append(
                 f"{p.name} is declared as {numbers[0]}, but the records say {numbers[1]}, "
-                f"{abs(moved) / width:.1f} declared spreads away"
+                f"{abs(moved) / width:.1f} standard deviations away"
             )
     return words
 
@@ -117,7 +117,7 @@ def sentence_of(hypothesis: Hypothesis) -> str:
 
 
 _FAR = 4.0
-"""Declared ranges from the declared value beyond which a number is none of this rig; a refit stops at two."""
+"""Declared standard deviations beyond which a number is none of this rig; a refit stops at three."""
 _SHARE = 0.98
 """Share of the excess that numbers let go must explain: of an effect that the catalogue does not know they
 may take up most, but not all."""
@@ -187,24 +187,20 @@ def _left(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> float:
 
 
 def _far_numbers(free: Hypothesis, base: Hypothesis) -> list[str]:
-    """Return in words the numbers that lie far outside their declared ranges, furthest first."""
+    """Return in words the numbers that lie far outside their declared values, furthest first."""
     far = []
     for fit in free.fits.values():
         for p in fit.parameters:
             value = fit.values[p.name]
             if p.scale != "log" or value <= 0.0:
                 continue
-            width = math.log1p(_spread(base, p.name))
+            width = base.assembly.quantities()[p.name.partition("[")[0]].spread.deviation
             moved, error = math.log(value / p.centre), fit.standard_error(p.name) / value
             if abs(moved) - 2.0 * error > _FAR * width:
                 number = with_unit(f"{value:.3g}", p.unit)
-                words = f"{p.name} is {number}, {abs(moved) / width:.0f} declared spreads away"
+                words = f"{p.name} is {number}, {abs(moved) / width:.0f} standard deviations away"
                 far.append((abs(moved) / width, words))
     return [words for _, words in sorted(far, key=lambda pair: -pair[0])][:3]
-
-
-def _spread(base: Hypothesis, name: str) -> float:
-    return float(base.assembly.quantities()[name.partition("[")[0]].spread)
 
 
 def out_of_reach(actuator: Assembly, records: RecordSet) -> list[Finding]:

@@ -387,7 +387,7 @@ def _renamed(fit: Fit, renamed: Callable[[str], str]) -> Fit:
 def _refittable(parameters: Sequence[Variable]) -> list[Variable]:
     """Return the numbers with a spread; long rows are tables of a shape, not refitted point by point."""
     lengths = Counter(v.name.partition("[")[0] for v in parameters)
-    return [v for v in parameters if v.spread > 0.0 and lengths[v.name.partition("[")[0]] <= _LONGEST_ROW]
+    return [v for v in parameters if v.uncertain and lengths[v.name.partition("[")[0]] <= _LONGEST_ROW]
 
 
 def _groups(blocks: Sequence[FreeBlock]) -> list[list[FreeBlock]]:

@@ -311,6 +311,10 @@ def safe_inputs(model: FlatModel, prior: Prior) -> dict[str, float]:
         motor = body.motor
         if motor is not None and motor.command is not None and motor.current_limit is not None:
             name = motor.current_limit
-            spread = float(prior.deviations[prior.place(name)]) if name in prior.names else 0.0
-            safe[motor.command] = model.values[name] * math.exp(-2.0 * spread)
+            safe[motor.command] = model.values[name]
+            if name in prior.names:
+                k = prior.place(name)
+                safe[motor.command] = float(
+                    prior.kinds[k].number(model.values[name], -2.0 * prior.deviations[k])
+                )
     return safe

@@ -325,8 +325,8 @@ def _features(form: AngleForm, points: OperatingPoints, prior: Prior, root: Arra
     for k in range(root.shape[1]):
         effects = []
         for sign in (1.0, -1.0):
-            factors = np.exp(sign * STEP * root[:, k])
-            changed = form.with_values(dict(zip(prior.names, prior.values * factors, strict=True)))
+            shifted = prior.numbers(sign * STEP * root[:, k])
+            changed = form.with_values(dict(zip(prior.names, shifted, strict=True)))
             effects.append(_effects(changed, points))
         up, down = effects
         columns.append([(a - b) / (2.0 * STEP) for a, b in zip(up, down, strict=True)])

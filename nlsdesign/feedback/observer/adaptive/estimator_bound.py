@@ -113,13 +113,12 @@ def _variational(model: FlatModel, prior: Prior, sensed: SensedTorque) -> tuple[
     xi = ca.SX.sym("xi", len(prior.names))
     values, vectors = np.linalg.eigh(prior.covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    factors = ca.exp(ca.mtimes(ca.DM(root), xi))
-    p = ca.vertcat(
-        *[
-            v.start * (factors[prior.names.index(v.name)] if v.name in prior.names else 1.0)
-            for v in model.parameters
-        ]
-    )
+    moved = ca.mtimes(ca.DM(root), xi)
+    shifted = {
+        name: spread.expression(model.values[name], moved[k])
+        for k, (name, spread) in enumerate(zip(prior.names, prior.kinds, strict=True))
+    }
+    p = ca.vertcat(*[shifted.get(v.name, ca.SX(v.start)) for v in model.parameters])
     n, count = len(model.states), len(prior.names)
     rate, estimate = (ca.substitute(e, s.parameter, p) for e in (s.derivative, expressions[sensed.estimate]))
     slopes = ca.SX.sym("slopes", n, count)

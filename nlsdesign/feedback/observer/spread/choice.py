@@ -211,7 +211,8 @@ class DesignedObserver:
             raise ArrangementError(
                 f"observer of kind '{self.kind}'", "cannot be certified", next_step="take --kind certified"
             )
-        spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if with_spread else {}
+        uncertain = [v for v in plant.parameters if v.uncertain] if with_spread else []
+        spreads = {v.name: v.spread.share(v.start) for v in uncertain}
         declared = declared_assumptions(plant, self.design)
         assumed = replace(declared, spreads=spreads, real=real, **(ranges or {}))
         return certify(plant, self.design, assumptions=assumed, decay=decay, deck=deck)

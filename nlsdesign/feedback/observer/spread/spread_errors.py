@@ -260,9 +260,9 @@ def observer_errors(
     known = relevant(prior or declared_prior(bench.model), bench)
     shifts = _shifts(known)
     values = {name: [v, v] for name, v in zip(known.names, known.values.tolist(), strict=True)}
-    for _, factors in shifts:
-        for name, value, factor in zip(known.names, known.values, factors, strict=True):
-            values[name].append(float(value * factor))
+    for _, shifted in shifts:
+        for name, value in zip(known.names, shifted.tolist(), strict=True):
+            values[name].append(value)
     drawn = known.draws(draws, seed)
     rows = {f"{PLANT}.{name}": np.concatenate([values[name], drawn[name]]) for name in known.names}
     runs = 2 + len(shifts) + draws
@@ -327,7 +327,7 @@ def errors_beside(
     ArrangementError
         If no number of the deck has a spread.
     """
-    if not any(v.spread > 0.0 for v in plant.parameters):
+    if not any(v.uncertain for v in plant.parameters):
         raise ArrangementError(
             f"model '{plant.name}'", "declares no spread, so there are no errors over it",
             next_step="give numbers a spread, or leave out --errors",
@@ -361,7 +361,7 @@ def relevant(prior: Prior, bench: ObserverBench) -> Prior:
 
 
 def _shifts(prior: Prior) -> list[tuple[str, Array]]:
-    """Return, for each number or row, the factors of all numbers one deviation up and down each direction."""
+    """Return, for each number or row, all numbers one deviation up and down each direction."""
     groups: dict[str, list[int]] = {}
     for i, name in enumerate(prior.names):
         groups.setdefault(name.partition("[")[0], []).append(i)
@@ -372,9 +372,9 @@ def _shifts(prior: Prior) -> list[tuple[str, Array]]:
             if value <= 1e-12 * max(float(values[-1]), 1e-300):
                 continue
             for sign in (1.0, -1.0):
-                factors = np.ones(len(prior.names))
-                factors[places] = np.exp(sign * math.sqrt(value) * vector)
-                shifts.append((name, factors))
+                x = np.zeros(len(prior.names))
+                x[places] = sign * math.sqrt(value) * vector
+                shifts.append((name, prior.numbers(x)))
     return shifts
 
 

@@ -274,7 +274,9 @@ def test_the_deck_says_what_was_calibrated_when_from_what(weighed: Estimate, tmp
     assert constant.source.startswith(
         "calibrated 2026-03-04 from hung_weight (declared 55 mN·m/A ± 10 %: n*kT = 0.220"
     )
-    assert constant.spread == pytest.approx(weighed.after.spreads()["motor.torque_constant"], rel=5e-3)
+    assert constant.spread.share(1.0) == pytest.approx(
+        weighed.after.spreads()["motor.torque_constant"], rel=5e-3
+    )
     assert constant.number == pytest.approx(
         float(weighed.after.values[weighed.after.place("motor.torque_constant")]), rel=1e-4
     )
@@ -299,7 +301,7 @@ def test_a_row_takes_the_largest_spread_of_its_numbers(weighed: Estimate) -> Non
         told_by={before.names[place]: "hung weight"},
     )
     result = calibrated(actuator, found)
-    assert result.actuator.quantities()["spring.rubber.stiff.modulus"].spread == pytest.approx(0.1)
+    assert result.actuator.quantities()["spring.rubber.stiff.modulus"].spread.share(1.0) == pytest.approx(0.1)
     assert [n.name for n in result.numbers] == ["spring.rubber.stiff.modulus[2]"]
 
 

@@ -28,6 +28,7 @@ from nlsdesign.feedback.observer.adaptive.duty_and_directions import Duty
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
+from nlsdesign.foundation.spread import EXACT
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation.prior import declared_prior
 from tests.renamed import nested, renamed
@@ -64,7 +65,7 @@ def test_the_adaptive_one_is_taken_where_it_expects_less(linear: FlatModel) -> N
 
 
 def test_without_spreads_the_cascade_is_taken_and_the_reason_is_said(linear: FlatModel) -> None:
-    exact = replace(linear, parameters=tuple(replace(v, spread=0.0) for v in linear.parameters))
+    exact = replace(linear, parameters=tuple(replace(v, spread=EXACT) for v in linear.parameters))
     found = choose_observer(exact)
     assert isinstance(found.design, ObserverDesign)
     assert "no uncertain numbers" in found.reason
