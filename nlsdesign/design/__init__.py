@@ -1,5 +1,6 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
+from ..foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
 from .curves.compliance import OddSpring, OneSidedSpring, SpringSymmetry, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.shapes import PolynomialTorque, TabulatedStiffness, TorqueBand
@@ -114,6 +115,7 @@ __all__ = [
     "MinimumRadiusOfCurvature",
     "MotorAndGear",
     "MotorCycle",
+    "NormalSpread",
     "NumberRange",
     "OddSpring",
     "OneBatch",
@@ -126,10 +128,12 @@ __all__ = [
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
+    "RelativeSpread",
     "RestLengthRange",
     "RubberStock",
     "SeparateModuli",
     "SmoothContour",
+    "Spread",
     "SpreadRules",
     "SpringLimits",
     "SpringSymmetry",
@@ -150,6 +154,7 @@ __all__ = [
     "Trim",
     "TrimRoom",
     "TwoBranchSpring",
+    "UniformSpread",
     "UnmakeablePart",
     "WrittenDesign",
     "cam_from_profile",

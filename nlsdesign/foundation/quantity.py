@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from .errors import UnitError, ValueRangeError, nearest, visible
-from .spread import EXACT, Spread, as_spread
+from .spread import EXACT, NormalSpread, Spread, as_spread
 
 NOT_SI = {
     "psi": "6.895 kPa for one psi", "bar": "100 kPa for one bar", "atm": "101.325 kPa for one atm",
@@ -367,7 +367,7 @@ def quantity(
     unit: str,
     *,
     source: str = "not stated",
-    spread: Spread | float = EXACT,
+    spread: Spread | Quantity | float = EXACT,
 ) -> Quantity:
     """Return a quantity from a value in the given unit.
 
@@ -380,15 +380,27 @@ def quantity(
     source
         Where the number comes from.
     spread
-        How far the true number may lie from this one; a bare 0.06 is a relative spread of ± 6 %.
+        How far the true number may lie from this one: a bare 0.06 is a relative spread of ± 6 %, a quantity
+        one standard deviation in its unit, for a number that may be zero or change its sign.
+
+    Raises
+    ------
+    UnitError
+        If the spread is given in a unit of something else.
 
     Examples
     --------
+    >>> quantity(0.0, "N*m", spread=quantity(30.0, "mN*m")).spread_text
+    '± 0.03 N·m'
     >>> quantity(0.58, "MPa", source="Austin 2015, Table I").number
     580000.0
     """
     factor, plain = parse_unit(unit).factor, _plain(value)
     converted = tuple(item * factor for item in plain) if isinstance(plain, tuple) else plain * factor
+    if isinstance(spread, Quantity):
+        if not same_dimension(spread.unit, unit):
+            raise UnitError(f"spread {spread}", f"is not of the dimension of '{unit}'")
+        spread = NormalSpread(spread.number)
     return Quantity(converted, unit, source, as_spread(spread))
 
 

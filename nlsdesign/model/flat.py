@@ -13,7 +13,7 @@ import numpy as np
 from ..foundation.arrays import Array
 from ..foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..foundation.quantity import Quantity, changed_source, same_dimension, with_unit
-from ..foundation.spread import EXACT, Spread
+from ..foundation.spread import EXACT, Spread, as_spread
 from ..foundation.symbolic import Expression
 from .notebook_view import model_html
 from .origin import Origin
@@ -60,6 +60,9 @@ class Variable:
     source: str = ""
     spread: Spread = EXACT
     plausibility: Plausibility | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "spread", as_spread(self.spread))
 
     @property
     def uncertain(self) -> bool:

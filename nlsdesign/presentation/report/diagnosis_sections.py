@@ -122,7 +122,7 @@ def _drawn(gap: Gap, after: str) -> Mapping[str, Any]:
 
 _SHAPES = 2
 _EDGE = 2.0
-"""Declared spreads beyond which a number has left what was declared."""
+"""Declared standard deviations beyond which a number has left what was declared."""
 ROLES = {"fit": "fitted", "selection": "for selection", "held_out": "held out"}
 
 
@@ -283,13 +283,13 @@ def _with_unit_of(abscissa: str, model: FlatModel) -> str:
 
 
 def _numbers(verdict: Verdict) -> list[Section]:
-    """Return the declared numbers after the refit, those that left their declared range highlighted."""
+    """Return the declared numbers after the refit, those that left what was declared highlighted."""
     numbers = fitted_numbers(verdict.fits)
     return fitted_table(numbers, f"{'with' if verdict.effects else 'without'} what was added")
 
 
 def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
-    """Return the table of refitted numbers, highlighted those that left their declared range."""
+    """Return the table of refitted numbers, highlighted those that left what was declared."""
     if not numbers:
         return []
     rows = tuple(

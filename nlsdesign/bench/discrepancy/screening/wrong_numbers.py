@@ -1,6 +1,6 @@
 """Declared numbers that the records contradict, some of them or all: let go, they explain what is left.
 
-A refit stops at twice the declared range. Where a number stands there and something is left over, the number
+A refit stops at three standard deviations. Where a number stands there and something is left over, the number
 may have been declared wrongly, alone or beside a missing effect. It is then fitted as if nothing were known
 of it, and that is kept only if the numbers end far outside their declared values and explain enough.
 

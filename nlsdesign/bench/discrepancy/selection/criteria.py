@@ -117,7 +117,7 @@ class Criteria:
         return mean_square > 1.0 + max(self.least_excess, scatter)
 
     def is_beyond_prior(self, squares: float, expected: float) -> bool:
-        """Tell whether refitted numbers lie outside their declared ranges, taken together.
+        """Tell whether refitted numbers lie outside their declared spreads, taken together.
 
         Noise alone gives the expected sum of squares: one for each number, more where the noise is coloured.
         """

@@ -214,7 +214,7 @@ def test_records_are_of_another_rig_if_far_numbers_explain_all_that_no_effect_do
     decides, words = asked(base, base)
     assert decides
     assert "explains 100 % of the excess" in words
-    assert "spring.stiffness is 5.97 N·m/rad, 6 declared spreads away" in words
+    assert "spring.stiffness is 5.97 N·m/rad, 6 standard deviations away" in words
 
 
 def test_numbers_at_their_ends_are_mentioned_where_they_do_not_decide() -> None:
@@ -223,7 +223,7 @@ def test_numbers_at_their_ends_are_mentioned_where_they_do_not_decide() -> None:
     assert not decides, "numbers let go explain 97 % only"
     assert words.startswith("2 of 2 refitted numbers stand at the end of what their declared spread allows")
     near = fitted(spring_stiffness=1.2**3)
-    assert not asked(base, base, free=near)[0], "three declared spreads away are none of another rig"
+    assert not asked(base, base, free=near)[0], "three standard deviations away are none of another rig"
     unsure = fitted(0.5, spring_stiffness=1.2**6)
     assert not asked(base, base, free=unsure)[0], "six with an error of three are none either"
 

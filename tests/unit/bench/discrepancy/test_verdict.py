@@ -87,8 +87,8 @@ def test_shares_are_said_in_percent() -> None:
 # --- refit ----------------------------------------------------------------------------------------
 
 
-def number(name: str, strain: float) -> FittedNumber:
-    return FittedNumber(name, "N/m", 1.0, 1.0, 0.1, strain)
+def number(name: str, strain: float, *, error: float = 0.1) -> FittedNumber:
+    return FittedNumber(name, "N/m", 1.0, 1.0, error, strain)
 
 
 def test_the_error_of_a_refit_is_per_block_and_role_over_all_samples() -> None:
@@ -106,7 +106,11 @@ def test_the_error_of_a_refit_is_per_block_and_role_over_all_samples() -> None:
 
 
 def test_a_number_at_either_end_of_its_range_is_named() -> None:
-    numbers = (number("low", -1.97), number("middle", 1.9), number("high", 2.0))
+    numbers = (
+        number("low", -3.0, error=math.nan),
+        number("middle", 2.9),
+        number("high", 3.0, error=math.nan),
+    )
     said = Refit(BLANK, (), numbers, GAPS, ()).words()
     assert [text.partition(" stands")[0] for text in said] == ["low", "high"]
-    assert "-2.0 declared spreads" in said[0]
+    assert "-3.0 standard deviations" in said[0]

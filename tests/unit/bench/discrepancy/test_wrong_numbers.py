@@ -38,7 +38,7 @@ def test_a_single_wrong_number_is_named_with_its_value(tmp_path: Path, factor: f
     assert found.effects == ()
     (sentence,) = [each for each in found.where if "a declared number is probably wrong" in each]
     assert MODULUS in sentence
-    assert "declared spreads away" in sentence
+    assert "standard deviations away" in sentence
     values = {v.name: v.start for v in flatten(found.actuator).parameters}
     true = ACTUATORS["arm"].rubber.k
     # The rig is built within 6 % of what its makers declare.

@@ -256,8 +256,8 @@ def test_prior_z_scores_say_how_far_the_numbers_have_left_their_declaration() ->
     )
     evidence = bench_of([record], block).evidence(driven, [record], block.model.values)
     scores = fit(evidence, [declared_parameter(block.model.variable(n)) for n in FREE]).prior_z_scores()
-    # The prior's deviation is ln(1.2)/√3.
-    assert scores[FREE[0]] == pytest.approx(np.log(1.15) * np.sqrt(3.0) / np.log(1.2), abs=0.1)
+    # The prior's deviation is ln(1.2).
+    assert scores[FREE[0]] == pytest.approx(np.log(1.15) / np.log(1.2), abs=0.1)
     assert abs(scores[FREE[1]]) < 0.3
 
 
