@@ -52,7 +52,7 @@ def by_hand(angle: float, largest: float, *, rows: tuple[str, ...], spread: bool
     """States θ, ω, error of the current; then stiffness, torque constant, friction in units of a spread."""
     hold = STIFF * angle / (RATIO * CONSTANT)
     most = STIFF * largest / (RATIO * CONSTANT)
-    offset = np.array([-0.1 * STIFF * angle, 0.05 * STIFF * angle, -0.5 * LEVEL]) / J
+    offset = np.array([-np.log(1.1) * STIFF * angle, np.log(1.05) * STIFF * angle, -np.log(1.5) * LEVEL]) / J
     a = block_diag(np.array([[0.0, 1.0], [-STIFF / J, -DAMPING / J]]), -1.0 / GIVEN.current_time)
     a[1, 2] = RATIO * CONSTANT / J
     torque = np.array([STIFF, 0.0, 0.0])
@@ -61,7 +61,7 @@ def by_hand(angle: float, largest: float, *, rows: tuple[str, ...], spread: bool
     if spread:
         a = block_diag(a, -np.eye(3) / GIVEN.wander)
         a[1, 3:] = offset
-        torque = np.append(torque, [0.1 * STIFF * angle, 0.0, 0.0])
+        torque = np.append(torque, [np.log(1.1) * STIFF * angle, 0.0, 0.0])
         density += [2.0 / GIVEN.wander] * 3
     n, step = len(a), 1e-3
     whole = expm(np.block([[-a, np.diag(density)], [np.zeros((n, n)), a.T]]) * step)

@@ -116,8 +116,8 @@ def test_a_number_at_the_end_of_its_range_is_not_passed_over(bench: Path) -> Non
     wrong = deck.with_values({"motor.inertia": replace(inertia, value=2.0 * inertia.number)})
     found = refit(wrong, load_records(bench / "records", flatten(wrong)))
     (number,) = [n for n in found.numbers if n.name == "motor.inertia"]
-    assert number.strain == pytest.approx(-2.0, abs=0.01)
-    assert any("motor.inertia stands at the end of its range, -2.0 declared" in w for w in found.words())
+    assert number.strain == pytest.approx(-3.0, abs=0.01)
+    assert any("motor.inertia stands at the end of its range, -3.0 standard" in w for w in found.words())
 
 
 def test_a_deck_that_leaves_nothing_free_is_refused(bench: Path) -> None:

@@ -44,17 +44,19 @@ def result() -> ToleranceResult:
 
 def test_declared_spreads_are_standard_deviations() -> None:
     causes = published()
-    assert causes["spring.rubber.area"].deviation == pytest.approx(0.05e-4)
-    assert causes["spring.rubber.rest_length"].deviation == pytest.approx(0.04 * 12.5e-3)
+    assert causes["spring.rubber.area"].deviation == pytest.approx(np.log(1.05) * 1e-4)
+    assert causes["spring.rubber.rest_length"].deviation == pytest.approx(np.log(1.04) * 12.5e-3)
     anchor = causes["spring.cam.anchor_distance"]
     assert isinstance(anchor, AnchorCause)
-    assert (anchor.deviation, anchor.source) == (pytest.approx(0.2 * 25e-3), "declared: spread 20 %")
+    assert (anchor.deviation, anchor.source) == (pytest.approx(np.log(1.2) * 25e-3), "declared: ± 20 %")
     # Rows move together, relative to their own size.
     moduli = causes["spring.rubber.moduli"]
     assert isinstance(moduli, NumberCause)
-    assert dict(moduli.numbers)["spring.rubber.stiff.modulus[2]"] == pytest.approx(0.1 * 1.479e6)
-    assert dict(moduli.numbers)["spring.rubber.relaxing.spring.modulus"] == pytest.approx(0.1 * 1.479e6)
-    assert str(moduli) == "spring.rubber.moduli ± 10 % (declared: spread 10 %)"
+    assert dict(moduli.numbers)["spring.rubber.stiff.modulus[2]"] == pytest.approx(np.log(1.1) * 1.479e6)
+    assert dict(moduli.numbers)["spring.rubber.relaxing.spring.modulus"] == pytest.approx(
+        np.log(1.1) * 1.479e6
+    )
+    assert str(moduli) == "spring.rubber.moduli ± 9.53 % (declared: ± 10 %)"
     assert "spring.cam.last_angle" not in causes  # no spread is declared
 
 
@@ -70,8 +72,8 @@ def test_what_no_deck_declares_is_assumed_with_a_reason() -> None:
 
 def test_the_declared_cable_deviates_as_it_is_declared() -> None:
     cable = published()["spring.cam.cable_radius"]
-    assert cable.deviation == pytest.approx(0.5 * 0.9e-3 * 0.05)
-    assert cable.source == "declared: spread 5 %"
+    assert cable.deviation == pytest.approx(0.5 * 0.9e-3 * np.log(1.05))
+    assert cable.source == "declared: ± 5 %"
     rules = SpreadRules()
     (other,) = (
         cause
@@ -210,6 +212,6 @@ def test_a_pulley_deviates_in_its_radius() -> None:
     model = flatten(machine.with_part("spring", Through(cam=wheel, behind=spring.behind)))
     result = tolerance_analysis(model, target=TARGET, draws=20, trims=[])
     radius = next(each for each in result.causes if each.cause.name == "spring.cam.radius")
-    # One hundredth of 10 mm against an edge within ± 0.05 mm.
+    # A factor of 1.01 on 10 mm against an edge within ± 0.05 mm.
     offset = next(each for each in result.causes if each.cause.name == "spring.cam.contour.offset")
-    assert radius.share / offset.share == pytest.approx((1e-4 / (5e-5 / 3)) ** 2, rel=1e-3)
+    assert radius.share / offset.share == pytest.approx((np.log(1.01) * 1e-2 / (5e-5 / 3)) ** 2, rel=1e-3)
