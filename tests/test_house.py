@@ -301,6 +301,9 @@ def test_growth_needs_a_row_that_says_what_for() -> None:
     assert list(budget.unargued(figures, table + oldest)) != []
     assert list(budget.unargued(figures, table + newest.replace("Another law.", ""))) != []
     assert list(budget.unargued(figures, table + newest.replace("low", "high"))) != []
+    whole = {budget.WHOLE: {"classes": 3}}
+    assert list(budget.unargued(whole, table + "| the whole: classes | 3 | Forms of a spread. |\n")) == []
+    assert list(budget.unargued(whole, table + "| the whole: classes | 2 | Forms of a spread. |\n")) != []
 
 
 def test_figures_that_are_written_anew_do_not_rise() -> None:

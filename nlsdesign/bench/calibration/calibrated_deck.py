@@ -211,7 +211,9 @@ def _calibrated_row(
         error = after.spread_of(names[k]).standard_error(float(after.values[k])) / factor
         values[index] = Written(repr(to_resolution(value, error))).times(factor)
     members = [n for n in names if n.partition("[")[0] == name]
-    spread = max((after.spread_of(n) for n in members), key=lambda each: each.share(1.0)).rounded(3)
+    spread = max((after.spread_of(n) for n in members), key=lambda each: each.share(1.0))
+    if isinstance(spread, RelativeSpread):
+        spread = RelativeSpread(float(f"{spread.relative:.3g}"))
     short = len(values) <= 4
     was = str(old) if short else f"{len(values)} numbers in {typeset_unit(old.unit)}"
     declared = f"{was} {old.spread_text}: {old.source}"
