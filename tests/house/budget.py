@@ -97,7 +97,9 @@ def unargued(budget: Figures, changelog: str) -> Iterator[str]:
 def lowered(found: Figures, budget: Figures) -> dict[str, dict[str, int]]:
     """Return the figures of today, but the budget's where it is lower and no row can argue for more."""
     return {
-        title: {k: v if k in _MAY_RISE else min(v, budget.get(title, {}).get(k, v)) for k, v in figures.items()}
+        title: {
+            k: v if k in _MAY_RISE else min(v, budget.get(title, {}).get(k, v)) for k, v in figures.items()
+        }
         for title, figures in found.items()
     }
 
