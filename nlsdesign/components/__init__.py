@@ -66,7 +66,7 @@ from .mechanics.friction import (
     QuadraticDrag,
     StribeckFriction,
 )
-from .mechanics.gear import Gear, LossyGear
+from .mechanics.gear import Coupling, Gear, LossyGear, Rack, Screw
 from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
@@ -109,6 +109,7 @@ __all__ = [
     "ConstantLoad",
     "Controller",
     "CoulombFriction",
+    "Coupling",
     "CurrentDrivenMotor",
     "CurrentSensor",
     "DamageByMotion",
@@ -170,6 +171,7 @@ __all__ = [
     "Pulley",
     "QuadraticDrag",
     "QuasilinearRelaxation",
+    "Rack",
     "RateFeedback",
     "ReadingLimits",
     "Regularised",
@@ -179,6 +181,7 @@ __all__ = [
     "Rising",
     "Rounded",
     "SampleAndHold",
+    "Screw",
     "SelfHeating",
     "Sensor",
     "Series",
