@@ -66,7 +66,7 @@ from .mechanics.friction import (
     QuadraticDrag,
     StribeckFriction,
 )
-from .mechanics.gear import Coupling, Gear, LossyGear, Rack, Screw
+from .mechanics.gear import Gear, LossyGear, Rack, Screw, Transmission
 from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
@@ -109,7 +109,6 @@ __all__ = [
     "ConstantLoad",
     "Controller",
     "CoulombFriction",
-    "Coupling",
     "CurrentDrivenMotor",
     "CurrentSensor",
     "DamageByMotion",
@@ -204,6 +203,7 @@ __all__ = [
     "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
+    "Transmission",
     "TransportDelay",
     "Turned",
     "TwoSidedCam",

@@ -15,7 +15,7 @@ import casadi as ca
 from ..components.assembly.named_parts import Assembly
 from ..components.core.element import Scope
 from ..components.mechanics.bodies import Free, Motion
-from ..components.mechanics.gear import Coupling, LossyGear
+from ..components.mechanics.gear import LossyGear, Transmission
 from ..components.transmission.stretchy_cable import newton_root
 from ..foundation.symbolic import Expression, depends, solve_monotone, symbol
 
@@ -28,7 +28,7 @@ class Joint:
     """
 
     name: str
-    gear: Coupling
+    gear: Transmission
     outward: bool
     behind: Wheel
 
@@ -56,7 +56,7 @@ class Wheel:
 
 def trains(assembly: Assembly) -> dict[str, Wheel]:
     """Return each train of two or more bodies by the name of its leading body, the one written first."""
-    gears = [(name, part) for name, part in assembly.parts if isinstance(part, Coupling)]
+    gears = [(name, part) for name, part in assembly.parts if isinstance(part, Transmission)]
     leading: dict[str, Wheel] = {}
     taken: set[str] = set()
     for name, part in assembly.parts:
@@ -65,7 +65,7 @@ def trains(assembly: Assembly) -> dict[str, Wheel]:
     return leading
 
 
-def _wheel(assembly: Assembly, name: str, gears: list[tuple[str, Coupling]], taken: set[str]) -> Wheel:
+def _wheel(assembly: Assembly, name: str, gears: list[tuple[str, Transmission]], taken: set[str]) -> Wheel:
     taken.add(name)
     body = assembly[name]
     assert isinstance(body, Free)

@@ -10,7 +10,6 @@ from nlsdesign.components import (
     Body,
     Cam,
     Controller,
-    Coupling,
     DrivePart,
     Element,
     Encoder,
@@ -23,6 +22,7 @@ from nlsdesign.components import (
     Sensor,
     Spring,
     Tie,
+    Transmission,
     specimen,
     through,
     tie,
@@ -56,7 +56,7 @@ def around(part: Part) -> Assembly:
     if isinstance(part, DrivePart):
         motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055, chain=(("part", part),))
         return assembly("bench", motor=motor, spring=tie(Spring(stiffness=3.4, domain=ROTATION), "motor"))
-    if isinstance(part, Coupling):
+    if isinstance(part, Transmission):
         kinds = {ROTATION: Inertia(inertia=6e-4), TRANSLATION: Mass(mass=0.4)}
         bodies = {name: kinds[domain] for name, domain in zip(part.between, part.joins, strict=True)}
         return assembly("bench", **bodies, part=part)

@@ -30,7 +30,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.components.mechanics.gear import Coupling
+from nlsdesign.components.mechanics.gear import Transmission
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.foundation.quantity import quantity
@@ -43,7 +43,7 @@ RACK = Rack(between=("motor", "carriage"), radius=RADIUS)
 SCREW = Screw(between=("motor", "carriage"), lead=LEAD)
 
 
-def machine(joint: Coupling, *, from_carriage: bool = False) -> Assembly:
+def machine(joint: Transmission, *, from_carriage: bool = False) -> Assembly:
     """A carriage on a spring and a damper, driven by a motor; its parts in one order or the other."""
     motor = CurrentDrivenMotor(
         inertia=ROTOR, torque_constant=CONSTANT, resistance=0.5, current_limit=20.0, voltage_limit=1000.0
@@ -69,7 +69,9 @@ def swung(made: Assembly, times: np.ndarray) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize(("joint", "travel"), [(RACK, RADIUS), (SCREW, LEAD / (2.0 * math.pi))])
 @pytest.mark.parametrize("from_carriage", [False, True])
-def test_a_carriage_moves_as_one_reflected_mass(joint: Coupling, travel: float, from_carriage: bool) -> None:
+def test_a_carriage_moves_as_one_reflected_mass(
+    joint: Transmission, travel: float, from_carriage: bool
+) -> None:
     times = np.linspace(0.0, 1.0, 401)
 
     def rate(time: float, state: np.ndarray) -> list[float]:
@@ -86,7 +88,7 @@ def test_a_carriage_moves_as_one_reflected_mass(joint: Coupling, travel: float, 
 
 
 @pytest.mark.parametrize("joint", [RACK, SCREW])
-def test_what_the_motor_gives_is_stored_or_lost(joint: Coupling) -> None:
+def test_what_the_motor_gives_is_stored_or_lost(joint: Transmission) -> None:
     times = np.linspace(0.0, 1.0, 4001)
     run = swung(machine(joint), times)
     given = run["motor.drive_torque"] * run["motor.speed"]
@@ -126,7 +128,7 @@ def test_the_deck_of_an_axis_is_read_back_as_the_same_machine(tmp_path: Path) ->
         (RACK, Inertia(inertia=1.0), Fixed(domain=TRANSLATION), "is prescribed"),
     ],
 )
-def test_what_cannot_be_joined_is_said(joint: Coupling, first: object, second: object, says: str) -> None:
+def test_what_cannot_be_joined_is_said(joint: Transmission, first: object, second: object, says: str) -> None:
     with pytest.raises(NlsError) as error:
         assembly("wrong", motor=first, carriage=second, joint=joint)
     assert says in str(error.value)

@@ -13,7 +13,7 @@ from ..core.element import Element, Parallel
 from ..core.part import LONGEST, Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, Fixed
-from ..mechanics.gear import Coupling, coupling_problems
+from ..mechanics.gear import Transmission, transmission_problems
 from ..sensing.sensors import Sensor
 from .circuit_picture import NotebookCircuits
 from .circuit_text import draw
@@ -238,7 +238,7 @@ def arrangement_problems(
         if isinstance(part, Tie):
             if not set(unreadable) & set(part.between):
                 yield from ((name, error) for error in _tie_problems(name, part, bodies))
-        elif not isinstance(part, Body | Sensor | Coupling):
+        elif not isinstance(part, Body | Sensor | Transmission):
             yield (
                 name,
                 ArrangementError(
@@ -247,7 +247,7 @@ def arrangement_problems(
                     next_step="tie an element to bodies with tie(element, 'motor', 'load')",
                 ),
             )
-    yield from coupling_problems(parts, unreadable)
+    yield from transmission_problems(parts, unreadable)
     yield from chain_problems(parts)
     yield from _twofold(parts)
 

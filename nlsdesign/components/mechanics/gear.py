@@ -20,7 +20,7 @@ from .bodies import Body, Free
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coupling(Part):
+class Transmission(Part):
     """Base of what joins two bodies rigidly: x₁ = n·x₂ and, without loss, e₂ = n·e₁.
 
     e₁ is the effort that the first body gives, e₂ that which the second gets. The two bodies are one state
@@ -44,8 +44,8 @@ class Coupling(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        kind = type(self).__name__.lower()
         if len(self.between) != 2:
-            kind = type(self).__name__.lower()
             raise ArrangementError(
                 kind, f"has {len(self.between)} ends; a {kind} has two", next_step="name two bodies"
             )
@@ -76,7 +76,7 @@ class Coupling(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gear(Coupling):
+class Gear(Transmission):
     """Rigid gear without loss: θ₁ = n·θ₂, T₂ = n·T₁.
 
     A rigid shaft is a gear of n = 1. A negative n turns the sense.
@@ -108,7 +108,7 @@ class Gear(Coupling):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rack(Coupling):
+class Rack(Transmission):
     """Pinion and rack, or pulley and belt, rigid and without loss: x₂ = r·θ₁, F₂ = T₁/r.
 
     The first body turns, the second moves along a line. A negative r turns the sense. Valid as long as teeth
@@ -141,7 +141,7 @@ class Rack(Coupling):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Screw(Coupling):
+class Screw(Transmission):
     """Screw and nut, rigid and without loss: x₂ = (l/2π)·θ₁, F₂ = (2π/l)·T₁.
 
     The first body turns, the second moves along the axis. A left-handed thread has a negative lead. Its
@@ -210,67 +210,67 @@ class LossyGear(Gear):
         return ca.if_else(effort * rate > 0, forward, backward)
 
 
-def coupling_problems(
+def transmission_problems(
     parts: Sequence[tuple[str, Part]], unsure: Sequence[str] = ()
 ) -> Iterator[tuple[str, NlsError]]:
-    """Yield what is wrong with the couplings between bodies, with the name of the coupling."""
+    """Yield what is wrong with the transmissions between bodies, with the name of the transmission."""
     bodies = {name: part for name, part in parts if isinstance(part, Body)}
     train = {name: name for name in bodies}
-    for name, coupling in parts:
-        if not isinstance(coupling, Coupling) or set(unsure) & set(coupling.between):
+    for name, transmission in parts:
+        if not isinstance(transmission, Transmission) or set(unsure) & set(transmission.between):
             continue
-        problems = list(_end_problems(name, coupling, bodies))
+        problems = list(_end_problems(name, transmission, bodies))
         yield from ((name, error) for error in problems)
         if problems:
             continue
-        one, other = (train[end] for end in coupling.between)
+        one, other = (train[end] for end in transmission.between)
         if one == other:
-            first, second = coupling.between
+            first, second = transmission.between
             rule = f"'{first}' and '{second}' are geared to each other already: over-constrained"
-            yield name, ArrangementError(_named(name, coupling), rule, next_step="take one of them out")
+            yield name, ArrangementError(_named(name, transmission), rule, next_step="take one of them out")
         train = {end: (one if root == other else root) for end, root in train.items()}
 
 
-def _named(name: str, coupling: Coupling) -> str:
-    """Return the kind and the name of a coupling, as errors begin."""
-    kind = Gear if isinstance(coupling, Gear) else type(coupling)
+def _named(name: str, transmission: Transmission) -> str:
+    """Return the kind and the name of a transmission, as errors begin."""
+    kind = Gear if isinstance(transmission, Gear) else type(transmission)
     return f"{kind.__name__.lower()} '{name}'"
 
 
-def _end_problems(name: str, coupling: Coupling, bodies: Mapping[str, Body]) -> Iterator[NlsError]:
-    missing = [end for end in coupling.between if end not in bodies]
+def _end_problems(name: str, transmission: Transmission, bodies: Mapping[str, Body]) -> Iterator[NlsError]:
+    missing = [end for end in transmission.between if end not in bodies]
     if missing:
         yield from (unknown_name(f"'{name}': body", end, bodies) for end in missing)
         return
-    stiff = [end for end in coupling.between if not isinstance(bodies[end], Free)]
+    stiff = [end for end in transmission.between if not isinstance(bodies[end], Free)]
     if len(stiff) == 2:
         yield ArrangementError(
-            _named(name, coupling),
+            _named(name, transmission),
             f"the motions of '{stiff[0]}' and '{stiff[1]}' are both prescribed, so it is over-constrained",
             next_step="let one of them move freely, or put a spring between them",
         )
     elif stiff:
-        other = next(end for end in coupling.between if end != stiff[0])
+        other = next(end for end in transmission.between if end != stiff[0])
         yield ArrangementError(
-            _named(name, coupling),
+            _named(name, transmission),
             f"the motion of '{stiff[0]}' is prescribed, so nothing is left to move '{other}'",
             next_step=f"prescribe '{other}' itself, or put a spring between them",
         )
-    domains = tuple(bodies[end].domain for end in coupling.between)
-    if domains == coupling.joins:
+    domains = tuple(bodies[end].domain for end in transmission.between)
+    if domains == transmission.joins:
         return
     fitting = [kind for kind in (Gear, Rack, Screw) if kind.joins == domains]
-    wanted = " and ".join(_MOTIONS[domain] for domain in coupling.joins)
+    wanted = " and ".join(_MOTIONS[domain] for domain in transmission.joins)
     given = " and ".join(
-        f"'{end}' has {_MOTIONS[d]}" for end, d in zip(coupling.between, domains, strict=True)
+        f"'{end}' has {_MOTIONS[d]}" for end, d in zip(transmission.between, domains, strict=True)
     )
-    if domains == coupling.joins[::-1]:
-        step = f'write between = ["{coupling.between[1]}", "{coupling.between[0]}"]'
+    if domains == transmission.joins[::-1]:
+        step = f'write between = ["{transmission.between[1]}", "{transmission.between[0]}"]'
     elif fitting:
         step = f"take {' or '.join(kind.__name__ for kind in fitting)}"
     else:
         step = "tie the two with a spring"
-    yield ArrangementError(_named(name, coupling), f"joins {wanted}; {given}", next_step=step)
+    yield ArrangementError(_named(name, transmission), f"joins {wanted}; {given}", next_step=step)
 
 
 _MOTIONS = {ROTATION: "an angle", TRANSLATION: "a position"}
