@@ -83,7 +83,9 @@ def pushes(missing: Missing, time: np.ndarray) -> np.ndarray:
 
 def eccentric(place: float, missing: Missing) -> float:
     """Return what an encoder with its disc off the shaft shows."""
-    return place + missing.eccentricity * float(np.sin(place + missing.disc_phase) - np.sin(missing.disc_phase))
+    return place + missing.eccentricity * float(
+        np.sin(place + missing.disc_phase) - np.sin(missing.disc_phase)
+    )
 
 
 def run(

@@ -80,9 +80,10 @@ def write_kind_case(
     """
     folder.mkdir(parents=True, exist_ok=True)
     if kind == "specimen":
-        truth = _write_strip(folder, effects, strength, seed, condition)
+        _write_strip(folder, effects, strength, seed, condition)
     else:
-        truth = _write_machine(folder, KINDS[kind], effects, strength, seed, condition)
+        _write_machine(folder, KINDS[kind], effects, strength, seed, condition)
+    truth = truth_of(kind, effects, strength, seed, condition=condition)
     shown = asdict(truth) | {"sizes": {".".join(key): size for key, size in truth.sizes.items()}}
     (folder / "truth.json").write_text(json.dumps(shown, indent=1), encoding="utf-8")
     return truth
@@ -90,11 +91,11 @@ def write_kind_case(
 
 def _write_machine(
     folder: Path, kind: Kind, effects: tuple[str, ...], strength: float, seed: int, condition: str
-) -> Truth:
+) -> None:
     if kind.declarable:
         raise ValueError(f"no deck can declare {kind.name}: {kind.declarable}")
     plant, missing = built(kind, effects, strength, seed)
-    logger, names = conditioned(kind, condition), NAMES[seed % len(NAMES)]
+    logger, names = conditioned(kind, condition), names_of(kind.name, seed)
     (folder / "deck.toml").write_text(deck_of(kind, effects, names, logger), encoding="utf-8")
     (folder / "records.toml").write_text(mapping_of(kind, names, logger), encoding="utf-8")
     for number, (name, ticks) in enumerate(simulated(kind, plant, missing, seed, logger.quantum).items()):
@@ -102,11 +103,39 @@ def _write_machine(
         table = logged(ticks, logger, missing, draw, disc_on_motor=kind.sides == 1)
         heads = ["time", "place", *(["load_place"] if kind.sides == 2 else []), "current"]
         _write_table(folder / f"{name}.csv", table, [names[head] for head in heads])
-    return Truth(
-        kind.name, effects, strength, seed, condition,
-        {key: size for key, size in _sizes(plant, missing).items() if key[0] in effects},
-        _numbers(kind, plant, effects, names),
-    )  # fmt: skip
+
+
+def names_of(kind: str, seed: int) -> Mapping[str, str]:
+    """Return the names that the parts of a machine have in its deck, by what they are.
+
+    Parameters
+    ----------
+    kind, seed
+        Of the case.
+    """
+    if kind == "specimen":
+        roles = ("grip", "clamp", "strip", "cell")
+        return dict(zip(roles, _STRIP_NAMES[seed % len(_STRIP_NAMES)], strict=True))
+    return NAMES[seed % len(NAMES)]
+
+
+def truth_of(
+    kind: str, effects: tuple[str, ...], strength: float, seed: int, *, condition: str = "plain"
+) -> Truth:
+    """Return what is behind the records of a case, without making them.
+
+    Parameters
+    ----------
+    kind, effects, strength, seed, condition
+        As of :func:`write_kind_case`.
+    """
+    names = names_of(kind, seed)
+    if kind == "specimen":
+        sizes, numbers = _of_strip(effects, strength, seed, names["strip"])
+    else:
+        plant, missing = built(KINDS[kind], effects, strength, seed)
+        sizes, numbers = _sizes(plant, missing, effects), _numbers(KINDS[kind], plant, effects, names)
+    return Truth(kind, effects, strength, seed, condition, sizes, numbers)
 
 
 def simulated(
@@ -158,10 +187,12 @@ def conditioned(kind: Kind, condition: str) -> Logger:
     return logger
 
 
-def _sizes(plant: Plant, missing: Missing) -> dict[tuple[str, str], float]:
-    return {
-        ("coulomb_friction", "sliding_effort"): missing.friction,
-        ("joint_coulomb_friction", "sliding_effort"): missing.joint_friction,
+def _sizes(plant: Plant, missing: Missing, effects: tuple[str, ...]) -> dict[tuple[str, str], float]:
+    """Return true sizes; friction of both bodies at once has none, since its name does not say which."""
+    frictions = (
+        [missing.friction or missing.joint_friction] if missing.friction * missing.joint_friction == 0 else []
+    )
+    sizes = {
         ("stribeck_friction", "sliding_effort"): missing.friction,
         ("load_dependent_friction", "ratio"): missing.load_friction,
         ("quadratic_drag", "drag"): missing.drag,
@@ -177,9 +208,15 @@ def _sizes(plant: Plant, missing: Missing) -> dict[tuple[str, str], float]:
         ("angle_sensor_bias", "bias"): missing.encoder_bias,
         ("angle_sensor_delay", "delay"): missing.encoder_delay,
     }
+    found = {key: size for key, size in sizes.items() if key[0] in effects}
+    if {"coulomb_friction", "joint_coulomb_friction"} & set(effects) and frictions:
+        found[("coulomb_friction", "sliding_effort")] = frictions[0]
+    return found
 
 
-def _numbers(kind: Kind, plant: Plant, effects: tuple[str, ...], names: Mapping[str, str]) -> dict[str, float]:
+def _numbers(
+    kind: Kind, plant: Plant, effects: tuple[str, ...], names: Mapping[str, str]
+) -> dict[str, float]:
     """Return true values of what the deck declares, but for what a hidden coupling divides."""
     motor = names["motor"]
     if "screw" in kind.name:
@@ -212,10 +249,10 @@ def _write_table(file: Path, table: np.ndarray, heads: list[str]) -> None:
     np.savetxt(file, table, fmt="%.9g", delimiter=",", header=",".join(heads), comments="")
 
 
-def _write_strip(folder: Path, effects: tuple[str, ...], strength: float, seed: int, condition: str) -> Truth:
-    names = _STRIP_NAMES[seed % len(_STRIP_NAMES)]
+def _write_strip(folder: Path, effects: tuple[str, ...], strength: float, seed: int, condition: str) -> None:
+    names = names_of("specimen", seed)
+    strip, cell = names["strip"], names["cell"]
     (folder / "deck.toml").write_text(specimens.strip_deck(names), encoding="utf-8")
-    _, _, strip, cell = names
     quantum = 1e-4 if condition == "coarse" else specimens.QUANTUM
     (folder / "records.toml").write_text(
         f'[time]\ncolumn = "t"\nunit = "s"\n\n[columns.way]\nsignal = "{strip}.extension"\nunit = "m"\n'
@@ -224,7 +261,12 @@ def _write_strip(folder: Path, effects: tuple[str, ...], strength: float, seed: 
     )
     for name, table in specimens.strip_records(effects, strength, seed, condition).items():
         _write_table(folder / f"{name}.csv", table, ["t", "way", "pull"])
-    built_strip, missing = specimens.built_strip(effects, strength, seed)
+
+
+def _of_strip(
+    effects: tuple[str, ...], strength: float, seed: int, strip: str
+) -> tuple[dict[tuple[str, str], float], dict[str, float]]:
+    plain, missing = specimens.built_strip(effects, strength, seed)
     sizes = {
         ("force_sensor_bias", "bias"): missing.bias,
         ("force_sensor_delay", "delay"): missing.delay,
@@ -232,15 +274,12 @@ def _write_strip(folder: Path, effects: tuple[str, ...], strength: float, seed: 
         ("coulomb_friction", "sliding_effort"): missing.grip_friction,
         ("second_relaxation", "modulus"): missing.second,
     }
-    return Truth(
-        "specimen", effects, strength, seed, condition,
-        {key: size for key, size in sizes.items() if key[0] in effects},
-        {
-            f"{strip}.elastic.modulus": built_strip.modulus,
-            f"{strip}.relaxing.spring.modulus": built_strip.branch,
-            f"{strip}.relaxing.dashpot.viscosity": built_strip.viscosity,
-        },
-    )  # fmt: skip
+    numbers = {
+        f"{strip}.elastic.modulus": plain.modulus,
+        f"{strip}.relaxing.spring.modulus": plain.branch,
+        f"{strip}.relaxing.dashpot.viscosity": plain.viscosity,
+    }
+    return {key: size for key, size in sizes.items() if key[0] in effects}, numbers
 
 
 def main() -> None:
@@ -254,7 +293,11 @@ def main() -> None:
     parser.add_argument("--condition", choices=CONDITIONS, default="plain")
     given = parser.parse_args()
     effects = () if given.effect == "nothing" else tuple(given.effect.split("+"))
-    print(write_kind_case(given.folder, given.kind, effects, given.strength, given.seed, condition=given.condition))
+    print(
+        write_kind_case(
+            given.folder, given.kind, effects, given.strength, given.seed, condition=given.condition
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -126,7 +126,10 @@ def _motor(kind: Kind, motor: str) -> str:
 def _sensors(kind: Kind, names: Names, logger: Logger) -> list[str]:
     tables = [
         _table(
-            names["encoder"], "Encoder", of=f'"{names["motor"]}.angle"', quantum=_number(logger.quantum, "rad")
+            names["encoder"],
+            "Encoder",
+            of=f'"{names["motor"]}.angle"',
+            quantum=_number(logger.quantum, "rad"),
         ),
         _table(
             names["ammeter"],

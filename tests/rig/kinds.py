@@ -109,7 +109,7 @@ ELASTIC_JOINT = replace(
     coarse=3.8e-4,
     effects=(
         *_FRICTION, "joint_coulomb_friction", "load_dependent_friction", *_DRIVE, "backlash",
-        "drivetrain_resonance", "gravity_load", "angle_sensor_eccentricity", "spring_damping",
+        "drivetrain_resonance", "gravity_load", "joint_eccentricity", "spring_damping",
         "angle_sensor_bias", "angle_sensor_delay",
     ),
     pairs=(
@@ -162,7 +162,7 @@ BELT_AXIS = replace(
     coarse=7.7e-4,
     effects=(
         *_FRICTION, "joint_coulomb_friction", "load_dependent_friction", *_DRIVE, "backlash",
-        "spring_damping", "angle_sensor_bias", "angle_sensor_delay", "angle_sensor_eccentricity",
+        "spring_damping", "angle_sensor_bias", "angle_sensor_delay", "joint_eccentricity",
     ),
     pairs=(
         ("coulomb_friction", "joint_coulomb_friction"), ("backlash", "coulomb_friction"),
@@ -184,8 +184,10 @@ SCREW_CARRIAGE = replace(
     coarse=2e-5,
     effects=(*_FRICTION, *_DRIVE, "constant_force", "drivetrain_resonance", "backlash"),
     pairs=(
-        ("coulomb_friction", "constant_force"), ("viscous_friction", "coulomb_friction"),
-        ("coulomb_friction", "torque_ripple"), ("drive_delay", "coulomb_friction"),
+        ("coulomb_friction", "constant_force"),
+        ("viscous_friction", "coulomb_friction"),
+        ("coulomb_friction", "torque_ripple"),
+        ("drive_delay", "coulomb_friction"),
     ),
     not_listed=("external_push", "periodic_disturbance", "amplifier_dead_zone", "hardening_stop"),
 )
@@ -275,6 +277,7 @@ def sizes(kind: Kind, draw: np.random.Generator) -> dict[str, dict[str, float]]:
         "constant_torque": {"constant_effort": 0.06 * effort},
         "constant_force": {"constant_effort": 0.06 * effort},
         "angle_sensor_eccentricity": {"eccentricity": 0.02, "disc_phase": phase[2]},
+        "joint_eccentricity": {"eccentricity": 0.02, "disc_phase": phase[2]},
         "angle_sensor_bias": {"encoder_bias": 0.3 * twist},
         "angle_sensor_delay": {"encoder_delay": 3.0 * period},
         "drivetrain_resonance": {"tail_share": 0.5, "tail_frequency": 0.06 * kind.bandwidth * 1.2 ** u}
@@ -348,7 +351,11 @@ def _reshaped(kind: Kind, plant: Plant, effects: tuple[str, ...], strength: floa
         stiffness = load * own**2 if resonance else load * (1.0 - share) * own**2
         damping = (0.08 if resonance else 0.3) * (stiffness * load) ** 0.5
         plant = replace(
-            plant, inertia=plant.inertia - load, load_inertia=load, stiffness=stiffness, spring_damping=damping
+            plant,
+            inertia=plant.inertia - load,
+            load_inertia=load,
+            stiffness=stiffness,
+            spring_damping=damping,
         )
     return plant
 
@@ -359,7 +366,9 @@ def wanted(kind: Kind, draw: np.random.Generator) -> dict[str, Wanted]:
     made = {}
     for amplitude, frequency, duration in kind.sines:
         time = np.arange(round(duration * kind.rate)) * period
-        made[f"sine_{frequency:g}Hz"] = _ramped(time, np.array([amplitude]), np.array([frequency]), np.zeros(1))
+        made[f"sine_{frequency:g}Hz"] = _ramped(
+            time, np.array([amplitude]), np.array([frequency]), np.zeros(1)
+        )
     time = np.arange(round(1.4 * len(kind.holds) * kind.rate)) * period
     place, before = np.zeros_like(time), 0.0
     for i, target in enumerate(kind.holds):

@@ -81,7 +81,9 @@ def _body(
     if joint_text:
         rod += rotor
     if rotor < 0.0:
-        raise ValueError(f"{name}: a weight of {weight} N·m on an arm of {arm} m has more inertia than {inertia}")
+        raise ValueError(
+            f"{name}: a weight of {weight} N·m on an arm of {arm} m has more inertia than {inertia}"
+        )
     where = f"0 0 {-arm}" if weight else "0 0 0"
     rod += 0.0 if weight else own
     return (

@@ -103,7 +103,9 @@ def strains(draw: np.random.Generator) -> Mapping[str, np.ndarray]:
     made = {}
     for frequency, duration in ((0.1, 14.0), (0.4, 8.0), (1.5, 5.0)):
         time = np.arange(round(duration / STEP)) * STEP
-        made[f"cycles_{frequency:g}Hz"] = _pulled(time, 0.5 * (1.0 - np.cos(2.0 * np.pi * frequency * (time - 0.3))))
+        made[f"cycles_{frequency:g}Hz"] = _pulled(
+            time, 0.5 * (1.0 - np.cos(2.0 * np.pi * frequency * (time - 0.3)))
+        )
     time = np.arange(round(12.0 / STEP)) * STEP
     rise = np.clip((time[:, None] - np.array([0.3, 4.0, 7.0, 9.5])) / 0.4, 0.0, 1.0)
     made["hold"] = _pulled(time, (rise * rise * (3.0 - 2.0 * rise)) @ np.array([0.5, 0.45, -0.6, 0.3]))
@@ -132,7 +134,11 @@ def force_of(strip: Strip, missing: MissingInStrip, way: np.ndarray) -> np.ndarr
     for i, stretch in enumerate((way / REST_LENGTH).tolist()):
         if missing.slips and stretch * REST_LENGTH > 0.98 * top:
             slipped = missing.slips
-        strain = max(stretch - (missing.slack + slipped) / REST_LENGTH, 0.0) if missing.slack or slipped else stretch
+        strain = (
+            max(stretch - (missing.slack + slipped) / REST_LENGTH, 0.0)
+            if missing.slack or slipped
+            else stretch
+        )
         change, before = strain - before, strain
         stress = strip.modulus * strain
         if missing.stiffening:
@@ -155,7 +161,9 @@ def force_of(strip: Strip, missing: MissingInStrip, way: np.ndarray) -> np.ndarr
     return forces
 
 
-def strip_records(effects: tuple[str, ...], strength: float, seed: int, condition: str) -> dict[str, np.ndarray]:
+def strip_records(
+    effects: tuple[str, ...], strength: float, seed: int, condition: str
+) -> dict[str, np.ndarray]:
     """Return the tables of a set: time (s), way (m), force (N)."""
     strip, missing = built_strip(effects, strength, seed)
     every = 20 if condition == "slow" else 5
@@ -181,9 +189,9 @@ def strip_records(effects: tuple[str, ...], strength: float, seed: int, conditio
     return made
 
 
-def strip_deck(names: tuple[str, str, str, str]) -> str:
+def strip_deck(names: Mapping[str, str]) -> str:
     """Return what its makers declare; names of grip, clamp, strip and load cell."""
-    grip, clamp, strip, cell = names
+    grip, clamp, strip, cell = (names[role] for role in ("grip", "clamp", "strip", "cell"))
     plain, by = Strip(), 'source = "declared by its makers"'
     return f"""\
 [deck]
