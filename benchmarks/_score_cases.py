@@ -187,7 +187,10 @@ def sample(pool: Sequence[Case], count: int) -> list[Case]:
     """
     draw = np.random.default_rng(2026)
     queues = []
-    groups = [(case.tier, case.machine if case.tier in KIND_TIERS else "") for case in pool]
+    groups = [
+        (case.tier, case.machine if case.tier in KIND_TIERS and case.machine not in ACTUATORS else "")
+        for case in pool
+    ]
     for group in dict.fromkeys(groups):
         own = [case for case, of in zip(pool, groups, strict=True) if of == group]
         times: Counter[tuple[str, ...]] = Counter()

@@ -1,4 +1,4 @@
-"""Digest of the code that decides a diagnosis: of syntax trees, so that comments and docstrings do not count."""
+"""Digest of the code that decides a diagnosis: of syntax trees, without comments and docstrings."""
 
 from __future__ import annotations
 

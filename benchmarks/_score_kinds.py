@@ -7,13 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from benchmarks._score_cases import HALF, KIND_TIERS, STRONG, Case
+from benchmarks._score_cases import CATALOGUE, HALF, KIND_TIERS, NOISES, PAIRS, STRONG, Case, known_effects
 from benchmarks._score_table import Result, describes, diagnosis, exact, share
-from tests.rig import specimens
+from tests.rig import ACTUATORS, OUTSIDE_ANY_CATALOGUE, specimens
 from tests.rig.kind_cases import ALL_KINDS, names_of
 from tests.rig.kinds import KINDS
 
 _AT_LOAD = ("load", "load_encoder", "load_bearing", "arm")
+_FINE = ("torque_ripple", "angle_sensor_delay", "angle_sensor_bias")
 _READ = ("plain", "coarse", "coloured")
 
 
@@ -35,24 +36,58 @@ def kind_cases(seeds: Iterable[int], kinds: Sequence[str]) -> list[Case]:
 
 def declared_kinds() -> list[str]:
     """Return the kinds that a deck can declare."""
-    return [name for name in ALL_KINDS if not (name in KINDS and KINDS[name].declarable)]
+    return ["cam", *(name for name in ALL_KINDS if not (name in KINDS and KINDS[name].declarable))]
 
 
 def _of_kind(name: str, seed: int) -> Iterator[Case]:
+    if name == "cam":
+        yield from _of_cam(seed)
+        return
     effects = specimens.EFFECTS if name == "specimen" else KINDS[name].effects
     pairs = specimens.PAIRS if name == "specimen" else KINDS[name].pairs
     others = specimens.NOT_LISTED if name == "specimen" else KINDS[name].not_listed
 
-    def read(number: int) -> str:
-        return _READ[(seed + number) % len(_READ)]
+    def read(number: int, *hidden: str) -> str:
+        # A coarse encoder does not see the way that a ripple of the motor makes behind its gear.
+        condition = _READ[(seed + number) % len(_READ)]
+        return "plain" if condition == "coarse" and set(hidden) & set(_FINE) else condition
+
+    def hiding(tier: str, strength: float, number: int, *hidden: str) -> Case:
+        return Case(tier, name, hidden, strength, seed, read(number, *hidden))
 
     clean, single, half, pair, other = KIND_TIERS
     yield Case(clean, name, (), 0.0, seed, (*_READ, "slow")[seed % 4])
     for i in range(2):
-        yield Case(single, name, (effects[(2 * seed + i) % len(effects)],), STRONG, seed, read(i))
-    yield Case(half, name, (effects[(seed + 3) % len(effects)],), HALF, seed, read(2))
-    yield Case(pair, name, pairs[seed % len(pairs)], STRONG, seed, read(3))
-    yield Case(other, name, (others[seed % len(others)],), STRONG, seed, read(4))
+        yield hiding(single, STRONG, i, effects[(2 * seed + i) % len(effects)])
+    yield hiding(half, HALF, 2, effects[(seed + 3) % len(effects)])
+    yield hiding(pair, STRONG, 3, *pairs[seed % len(pairs)])
+    yield hiding(other, STRONG, 4, others[seed % len(others)])
+
+
+def _of_cam(seed: int) -> Iterator[Case]:
+    """Yield the same tiers on the cam actuators, under the noises of their own score."""
+    known, noises, actuators = known_effects(), list(NOISES), list(ACTUATORS)
+    others = [effect for effect in OUTSIDE_ANY_CATALOGUE if effect not in CATALOGUE]
+    hidden = (
+        (), (known[(2 * seed) % len(known)],), (known[(2 * seed + 1) % len(known)],),
+        (known[(seed + 3) % len(known)],), PAIRS[seed % len(PAIRS)], (others[seed % len(others)],),
+    )  # fmt: skip
+    clean, single, half, pair, other = KIND_TIERS
+    for i, (tier, effects) in enumerate(zip((clean, single, single, half, pair, other), hidden, strict=True)):
+        strength = 0.0 if tier == clean else HALF if tier == half else STRONG
+        actuator, noise = actuators[(seed + i) % len(actuators)], noises[(seed + i) % len(noises)]
+        yield Case(tier, actuator, effects, strength, seed, noise)
+
+
+def kind_of(machine: str) -> str:
+    """Return the kind of a machine: all actuators with a cam are one.
+
+    Parameters
+    ----------
+    machine
+        Of a case.
+    """
+    return "cam" if machine in ACTUATORS else machine
 
 
 def named_with_place(case: Case, effect: str, location: str) -> str:
@@ -97,8 +132,8 @@ def kind_table(results: Sequence[Result]) -> list[str]:
 
 def _rows(title: str, results: Sequence[Result]) -> list[str]:
     lines = [f"**{title}**", "", "| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    names = dict.fromkeys(r["machine"] for r in results)
-    lines += [_row(name, [r for r in results if r["machine"] == name]) for name in names]
+    names = dict.fromkeys(kind_of(r["machine"]) for r in results)
+    lines += [_row(name, [r for r in results if kind_of(r["machine"]) == name]) for name in names]
     return [*lines, _row("all", results)] if len(names) > 1 else lines
 
 
@@ -154,7 +189,7 @@ def _misses(results: Sequence[Result]) -> list[str]:
         right = answer is not None and (exact(r, r["named"]) if listed else not r["named"])
         if not right:
             said = "failed: " + r["error"][:60] if answer is None else " + ".join(answer) or "none"
-            counts[(r["machine"], " + ".join(hidden) or "(nothing)", said.replace("|", "/"))] += 1
+            counts[(kind_of(r["machine"]), " + ".join(hidden) or "(nothing)", said.replace("|", "/"))] += 1
     rows = sorted(counts.items(), key=lambda row: (-row[1], row[0]))
     return [*lines, *(f"| {k} | {h} | {s} | {n} |" for (k, h, s), n in rows)]
 

@@ -10,10 +10,10 @@ counted once.
     python -m benchmarks.discrepancy_score --out score.jsonl --table docs/discrepancy.md
     python -m benchmarks.discrepancy_score --kinds all --seeds 0:20 --out kinds.jsonl --table docs/scores.md
 
-With ``--kinds`` the machines are those of ``tests/rig/kinds.py``, under a digital loop that holds its current,
-some of them in MuJoCo. Each result is one line of JSON, written as soon as it is there; a run goes on where it
-was interrupted. A line that was counted with other code is no result any more: its case is run again. A case
-that fails is a line with the reason. Every case runs in one process.
+With ``--kinds`` the machines are those of ``tests/rig/kinds.py``, under a digital loop that holds its
+current, some of them in MuJoCo. Each result is one line of JSON, written as soon as it is there; a run goes
+on where it was interrupted. A line that was counted with other code is no result any more: its case is run
+again. A case that fails is a line with the reason. Every case runs in one process.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ def main() -> None:
             number += 1
             rest = (time.perf_counter() - begin) / number * (len(todo) - number) / 60.0
             print(
-                f"{number}/{len(todo)} {result['case']}: {outcome} ({result['seconds']:.0f} s; {rest:.0f} min left)",
+                f"{number}/{len(todo)} {result['case']}: {outcome} "
+                f"({result['seconds']:.0f} s; {rest:.0f} min left)",
                 flush=True,
             )
     text = page(results)
@@ -119,7 +120,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def seeds_of(text: str) -> list[int]:
-    """Return the seeds that a text like ``200-202,7`` or ``0:20`` means; behind a colon the last is left out.
+    """Return the seeds that a text like ``200-202,7`` or ``0:20`` means; the latter is without 20.
 
     Parameters
     ----------
@@ -175,7 +176,8 @@ def _lost(case: Case, outcome: PointOutcome) -> dict[str, Any]:
     return {
         "case": case.name, "tier": case.tier, "machine": case.machine, "hidden": list(case.effects),
         "strength": case.strength, "seed": case.seed, "noise": case.noise,
-        "code": digest(), "seconds": outcome.seconds, "cpu_seconds": outcome.seconds, "error": outcome.reason, "trace": "",
+        "code": digest(), "seconds": outcome.seconds, "cpu_seconds": outcome.seconds,
+        "error": outcome.reason, "trace": "",
     }  # fmt: skip
 
 

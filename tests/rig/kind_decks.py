@@ -22,7 +22,8 @@ NAMES: tuple[Names, ...] = (
         "load_place": "q_out", "current": "i_q",
     },
     {
-        "motor": "axis_1", "bearing": "seal", "load": "table_side", "load_bearing": "guide", "spring": "coupling",
+        "motor": "axis_1", "bearing": "seal", "load": "table_side", "load_bearing": "guide",
+        "spring": "coupling",
         "spring_damping": "coupling_loss", "arm": "boom", "encoder": "scale", "load_encoder": "scale_2",
         "ammeter": "amplifier_reading", "time": "clock", "place": "pos_1", "load_place": "pos_2",
         "current": "amps",

@@ -261,7 +261,8 @@ def sizes(kind: Kind, draw: np.random.Generator) -> dict[str, dict[str, float]]:
         "coulomb_friction": {"friction": 0.12 * effort},
         "joint_coulomb_friction": {"joint_friction": 0.10 * effort},
         "stribeck_friction": {
-            "friction": 0.08 * effort, "breakaway": 0.12 * effort, "stribeck_speed": 0.12 * about[0] * fastest,
+            "friction": 0.08 * effort, "breakaway": 0.12 * effort,
+            "stribeck_speed": 0.12 * about[0] * fastest,
         },
         "load_dependent_friction": {"load_friction": 0.12},
         "position_dependent_friction": {"place_friction": 0.10 * effort, "place_phase": phase[0]},
@@ -299,7 +300,8 @@ def sizes(kind: Kind, draw: np.random.Generator) -> dict[str, dict[str, float]]:
 
 _SHAPES = frozenset({
     "stribeck_speed", "place_phase", "ripple_order", "ripple_phase", "disc_phase", "disturbance_frequency",
-    "disturbance_phase", "push_place", "tail_frequency", "push_time", "stop_place", "soft_width", "wave_phase",
+    "disturbance_phase", "push_place", "tail_frequency", "push_time", "stop_place", "soft_width",
+    "wave_phase",
 })  # fmt: skip
 """What an effect changes in shape rather than in size: the strength leaves these alone."""
 

@@ -88,21 +88,20 @@ class TwoBodies:
         self.speed = self.load_speed = 0.0
         self.tail_place, self.tail_speed = self.load_place, 0.0
 
-    def twist(self, lead: float, rate: float, place: float) -> float:
-        """Effort of the connection, on the second body."""
+    def twist(self, lead: float, place: float) -> tuple[float, float]:
+        """Elastic effort of the connection on the second body, and its damping."""
         plant, missing = self.plant, self.missing
-        damping = plant.spring_damping
         if missing.gap:
             half = 0.5 * missing.gap
             if abs(lead) <= half:
-                return 0.0
+                return 0.0, 0.0
             lead = lead - half if lead > 0.0 else lead + half
         stiffness = plant.stiffness
         if missing.soft_centre:
             stiffness *= 1.0 - missing.soft_centre * exp(-((lead / missing.soft_width) ** 2))
         if missing.stiffness_wave:
             stiffness *= 1.0 + missing.stiffness_wave * sin(2.0 * place + missing.wave_phase)
-        return stiffness * lead + damping * rate
+        return stiffness * lead, plant.spring_damping
 
     def level(self, speed: float, place: float, carried: float) -> float:
         """Level of dry friction of the driven body."""
@@ -166,6 +165,7 @@ class TwoBodies:
         load_inertia = plant.load_inertia - tail
         turn = 2.0 * pi * self.missing.tail_frequency
         drag, load_drag = half * plant.damping / inertia, half * plant.load_damping / load_inertia
+        mobility = 1.0 / (inertia * (1.0 + drag)) + 1.0 / (load_inertia * (1.0 + load_drag))
         weight, hanging = plant.weight + payload, plant.hanging_angle
         joint_friction = step * self.missing.joint_friction / load_inertia
         plain = not (self.missing.ripple or self.missing.drag or self.missing.stop)
@@ -173,14 +173,20 @@ class TwoBodies:
         for effort in efforts:
             place += half * speed
             load_place += half * load_speed
-            twist = self.twist(place - load_place, speed - load_speed, place)
+            twist, damping = self.twist(place - load_place, place)
             push = effort - twist if plain else effort - twist + self._own(place, speed)
             free = ((1.0 - drag) * speed + step * push / inertia) / (1.0 + drag)
             pull = twist - (weight * sin(load_place - hanging) if weight else 0.0)
             if tail:
                 pull += tail * self._tail(load_place, load_speed, turn)
             load_free = ((1.0 - load_drag) * load_speed + step * pull / load_inertia) / (1.0 + load_drag)
-            speed = prox(free, step * self.level(speed, place, twist) / inertia)
+            # The damper acts by the mean of its rate before and after the step, which it changes itself.
+            rate, coupled = speed - load_speed, half * damping
+            impulse = coupled * (rate + free - load_free) / (1.0 + coupled * mobility)
+            free -= impulse / (inertia * (1.0 + drag))
+            load_free += impulse / (load_inertia * (1.0 + load_drag))
+            carried = twist + damping * rate
+            speed = prox(free, step * self.level(speed, place, carried) / inertia)
             load_speed = prox(load_free, joint_friction) if joint_friction else load_free
             place += half * speed
             load_place += half * load_speed
