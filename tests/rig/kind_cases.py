@@ -17,7 +17,7 @@ import numpy as np
 
 from . import specimens
 from .digital_loop import Logger, Ticks, logged, run
-from .kind_decks import NAMES, deck_of, mapping_of
+from .kind_decks import NAMES, SLIDE_SHARE, deck_of, mapping_of
 from .kinds import COMMAND, KINDS, NOISE, Kind, built, stream, wanted
 from .two_bodies import Missing, Plant, TwoBodies
 
@@ -76,7 +76,7 @@ def write_kind_case(
     Raises
     ------
     ValueError
-        If the kind has no such effect, or no deck can declare it.
+        If the kind has no such effect.
     """
     folder.mkdir(parents=True, exist_ok=True)
     if kind == "specimen":
@@ -92,8 +92,6 @@ def write_kind_case(
 def _write_machine(
     folder: Path, kind: Kind, effects: tuple[str, ...], strength: float, seed: int, condition: str
 ) -> None:
-    if kind.declarable:
-        raise ValueError(f"no deck can declare {kind.name}: {kind.declarable}")
     plant, missing = built(kind, effects, strength, seed)
     logger, names = conditioned(kind, condition), names_of(kind.name, seed)
     (folder / "deck.toml").write_text(deck_of(kind, effects, names, logger), encoding="utf-8")
@@ -101,6 +99,8 @@ def _write_machine(
     for number, (name, ticks) in enumerate(simulated(kind, plant, missing, seed, logger.quantum).items()):
         draw = stream(seed, NOISE, number)
         table = logged(ticks, logger, missing, draw, disc_on_motor=kind.sides == 1)
+        if kind.radius:
+            table[:, 1] /= kind.radius
         heads = ["time", "place", *(["load_place"] if kind.sides == 2 else []), "current"]
         _write_table(folder / f"{name}.csv", table, [names[head] for head in heads])
 
@@ -135,6 +135,10 @@ def truth_of(
     else:
         plant, missing = built(KINDS[kind], effects, strength, seed)
         sizes, numbers = _sizes(plant, missing, effects), _numbers(KINDS[kind], plant, effects, names)
+        if KINDS[kind].radius:
+            # Friction of the motor may be stated in N·m or in N: only what has one unit has a true size.
+            alike = ("drive_delay", "current_sensor_bias", "angle_sensor_delay", "spring_damping")
+            sizes = {key: size for key, size in sizes.items() if key[0] in alike}
     return Truth(kind, effects, strength, seed, condition, sizes, numbers)
 
 
@@ -225,6 +229,14 @@ def _numbers(
             f"{motor}.force_constant": plant.effort_per_ampere,
             f"{names['bearing']}.damping": plant.damping,
         }
+    elif kind.radius:
+        turning = (1.0 - SLIDE_SHARE) * plant.inertia
+        numbers = {
+            f"{motor}.inertia": turning * kind.radius**2,
+            f"{motor}.torque_constant": plant.effort_per_ampere * kind.radius,
+            f"{names['bearing']}.damping": plant.damping,
+            f"{names['load']}.mass": plant.load_inertia,
+        }
     else:
         numbers = {
             f"{motor}.inertia": plant.inertia,
@@ -241,7 +253,7 @@ def _numbers(
         }
     divided = {f"{motor}.inertia", f"{motor}.mass"} if kind.sides == 1 and plant.load_inertia else set()
     if "drivetrain_resonance" in effects and kind.sides == 2:
-        divided = {f"{names['load']}.inertia"}
+        divided = {f"{names['load']}.inertia", f"{names['load']}.mass"}
     return {name: value for name, value in numbers.items() if name not in divided}
 
 
