@@ -56,7 +56,7 @@ def _of_kind(name: str, seed: int) -> Iterator[Case]:
         return Case(tier, name, hidden, strength, seed, read(number, *hidden))
 
     clean, single, half, pair, other = KIND_TIERS
-    yield Case(clean, name, (), 0.0, seed, (*_READ, "slow")[seed % 4])
+    yield Case(clean, name, (), 0.0, seed, (*_READ, "slow", "averaged")[seed % 5])
     for i in range(2):
         yield hiding(single, STRONG, i, effects[(2 * seed + i) % len(effects)])
     yield hiding(half, HALF, 2, effects[(seed + 3) % len(effects)])

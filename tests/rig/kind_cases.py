@@ -21,7 +21,7 @@ from .kind_decks import NAMES, SLIDE_SHARE, deck_of, mapping_of
 from .kinds import COMMAND, KINDS, NOISE, Kind, built, stream, wanted
 from .two_bodies import Missing, Plant, TwoBodies
 
-CONDITIONS = ("plain", "coarse", "coloured", "slow")
+CONDITIONS = ("plain", "coarse", "coloured", "slow", "averaged")
 ALL_KINDS = (*KINDS, "specimen")
 _STRIP_NAMES = (
     ("grip", "clamp", "strip", "load_cell"),
@@ -54,8 +54,9 @@ class Truth:
 
 
 def write_kind_case(
-    folder: Path, kind: str, effects: tuple[str, ...], strength: float, seed: int, *, condition: str = "plain"
-) -> Truth:
+    folder: Path, kind: str, effects: tuple[str, ...], strength: float, seed: int, *,
+    condition: str = "plain", says_held: bool = False,
+) -> Truth:  # fmt: skip
     """Write a case and return the truth behind it, which is written beside the records too.
 
     Parameters
@@ -72,6 +73,8 @@ def write_kind_case(
         Fixes machine, names of parts, motion and noise.
     condition
         One of :data:`CONDITIONS`.
+    says_held
+        Whether `records.toml` says that the current is held from row to row, where it is.
 
     Raises
     ------
@@ -82,7 +85,8 @@ def write_kind_case(
     if kind == "specimen":
         _write_strip(folder, effects, strength, seed, condition)
     else:
-        _write_machine(folder, KINDS[kind], effects, strength, seed, condition)
+        told = says_held and condition not in ("slow", "averaged")
+        _write_machine(folder, KINDS[kind], effects, strength, seed, condition, says_held=told)
     truth = truth_of(kind, effects, strength, seed, condition=condition)
     shown = asdict(truth) | {"sizes": {".".join(key): size for key, size in truth.sizes.items()}}
     (folder / "truth.json").write_text(json.dumps(shown, indent=1), encoding="utf-8")
@@ -90,12 +94,15 @@ def write_kind_case(
 
 
 def _write_machine(
-    folder: Path, kind: Kind, effects: tuple[str, ...], strength: float, seed: int, condition: str
-) -> None:
+    folder: Path, kind: Kind, effects: tuple[str, ...], strength: float, seed: int, condition: str, *,
+    says_held: bool,
+) -> None:  # fmt: skip
     plant, missing = built(kind, effects, strength, seed)
     logger, names = conditioned(kind, condition), names_of(kind.name, seed)
     (folder / "deck.toml").write_text(deck_of(kind, effects, names, logger), encoding="utf-8")
-    (folder / "records.toml").write_text(mapping_of(kind, names, logger), encoding="utf-8")
+    (folder / "records.toml").write_text(
+        mapping_of(kind, names, logger, says_held=says_held), encoding="utf-8"
+    )
     for number, (name, ticks) in enumerate(simulated(kind, plant, missing, seed, logger.quantum).items()):
         draw = stream(seed, NOISE, number)
         table = logged(ticks, logger, missing, draw, disc_on_motor=kind.sides == 1)
@@ -186,6 +193,8 @@ def conditioned(kind: Kind, condition: str) -> Logger:
         return replace(logger, quantum=kind.coarse, load_quantum=kind.coarse if kind.sides == 2 else 0.0)
     if condition == "coloured":
         return replace(logger, coloured=1.5)
+    if condition == "averaged":
+        return replace(logger, averaged=True)
     if condition == "slow":
         return replace(logger, every=max(round(kind.rate / 100.0), 1))
     return logger
@@ -303,13 +312,14 @@ def main() -> None:
     parser.add_argument("seed", type=int)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--condition", choices=CONDITIONS, default="plain")
+    parser.add_argument("--says-held", action="store_true", help='write between_samples = "held"')
     given = parser.parse_args()
     effects = () if given.effect == "nothing" else tuple(given.effect.split("+"))
-    print(
-        write_kind_case(
-            given.folder, given.kind, effects, given.strength, given.seed, condition=given.condition
-        )
-    )
+    truth = write_kind_case(
+        given.folder, given.kind, effects, given.strength, given.seed,
+        condition=given.condition, says_held=given.says_held,
+    )  # fmt: skip
+    print(truth)
 
 
 if __name__ == "__main__":

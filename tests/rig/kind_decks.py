@@ -181,23 +181,28 @@ def _sensors(kind: Kind, names: Names, logger: Logger) -> list[str]:
     return tables
 
 
-def mapping_of(kind: Kind, names: Names, logger: Logger) -> str:
+def mapping_of(kind: Kind, names: Names, logger: Logger, *, says_held: bool = False) -> str:
     """Return `records.toml`: which column shows which signal of the deck.
 
     Parameters
     ----------
     kind, names, logger
         As of :func:`deck_of`.
+    says_held
+        Whether it says that the current is held from each row to the next.
     """
+    held = ['between_samples = "held"'] if says_held else []
     if "screw" in kind.name:
         columns = [
             _column(names["place"], f"{names['motor']}.position", "m", f"quantum = {logger.quantum:g}"),
-            _column(names["current"], f"{names['motor']}.voltage", "V", f"noise = {logger.current_noise:g}"),
+            _column(
+                names["current"], f"{names['motor']}.voltage", "V", f"noise = {logger.current_noise:g}", *held
+            ),
         ]
     else:
         columns = [
             _column(names["place"], f"{names['encoder']}.reading", "rad"),
-            _column(names["current"], f"{names['ammeter']}.reading", "A"),
+            _column(names["current"], f"{names['ammeter']}.reading", "A", *held),
         ]
         if kind.sides == 2:
             columns.append(

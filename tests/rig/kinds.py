@@ -87,7 +87,7 @@ GEARED_JOINT = Kind(
     coarse=1.5e-3,
     effects=(
         *_FRICTION, "load_dependent_friction", "position_dependent_friction", *_DRIVE, "backlash",
-        "drivetrain_resonance", "gravity_load", "angle_sensor_eccentricity",
+        "drivetrain_resonance", "gravity_load",
     ),
     pairs=(
         ("coulomb_friction", "gravity_load"), ("coulomb_friction", "torque_ripple"),
@@ -222,7 +222,7 @@ MUJOCO_MOTOR = replace(
     name="mujoco_motor",
     simulator="mujoco",
     deck="geared_joint",
-    effects=(*_IN_MUJOCO, "drivetrain_resonance", "angle_sensor_eccentricity"),
+    effects=(*_IN_MUJOCO, "drivetrain_resonance"),
     pairs=_PAIRS_IN_MUJOCO,
     not_listed=("payload_change", "periodic_disturbance", "external_push", "amplifier_dead_zone"),
 )

@@ -151,7 +151,7 @@ def test_a_log_is_slow_coarse_averaged_late_and_biased() -> None:
     assert table[2:, 2] == pytest.approx(2.0 * (time[::4] - 0.05)[2:] + 0.2)
     assert table[:, 3] == pytest.approx(np.arange(0.0, 40.0, 4.0) + 0.5)
     mean = logged(ticks, replace(plain, averaged=True), Missing(), draw)
-    assert mean[:-1, 3] == pytest.approx(np.arange(0.0, 36.0, 4.0) + 1.5)
+    assert mean[1:, 3] == pytest.approx(np.arange(4.0, 40.0, 4.0) - 2.5), "of the four ticks before the row"
 
 
 def test_a_strip_relaxes_as_its_branch_does() -> None:
@@ -200,6 +200,7 @@ def test_conditions_change_the_log_and_not_the_machine() -> None:
         assert kind.rate / slow.every <= 130.0
         assert conditioned(kind, "coarse").quantum > 10.0 * kind.logger.quantum
         assert conditioned(kind, "coloured").coloured > 0.0
+        assert conditioned(kind, "averaged").averaged
         assert conditioned(kind, "plain") == kind.logger
 
 

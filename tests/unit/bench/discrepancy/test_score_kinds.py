@@ -16,7 +16,7 @@ from benchmarks._score_kinds import all_kinds, kind_cases, kind_of, kind_table, 
 from benchmarks._score_table import exact
 from benchmarks._score_truth import true_numbers
 from tests.rig import ACTUATORS
-from tests.rig.kind_cases import names_of
+from tests.rig.kind_cases import CONDITIONS, names_of
 from tests.rig.kinds import KINDS
 
 CLEAN, SINGLE, HALF, PAIR, OTHER = KIND_TIERS
@@ -41,7 +41,7 @@ def test_cases_go_round_over_effects_conditions_and_kinds() -> None:
         assert {c.effects[0] for c in own if c.tier == HALF} == set(kind.effects)
         assert {c.effects for c in own if c.tier == PAIR} == set(kind.pairs)
         assert {c.effects[0] for c in own if c.tier == OTHER} == set(kind.not_listed)
-        assert {c.noise for c in own if c.tier == CLEAN} == {"plain", "coarse", "coloured", "slow"}
+        assert {c.noise for c in own if c.tier == CLEAN} == set(CONDITIONS)
         assert not any(c.noise == "coarse" and "torque_ripple" in c.effects for c in own)
     few = sample(pool, len(KIND_TIERS) * len(all_kinds()))
     assert {(c.tier, kind_of(c.machine)) for c in few} == {(c.tier, kind_of(c.machine)) for c in pool}
