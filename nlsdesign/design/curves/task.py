@@ -12,8 +12,8 @@ from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError, ValueRangeError, unknown_name
 from ...foundation.locations import folder
 from ...foundation.quantity import Quantity, same_dimension
-from .columns import ReadColumns, read_columns
 from .numbers import in_si
+from .target_files import ReadColumns, read_columns
 
 _WORST_MISFIT = 0.05
 """Largest misfit of a record that passes as periodic, rms over its range; noise and rounding are below."""

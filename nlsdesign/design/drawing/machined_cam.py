@@ -14,10 +14,8 @@ from ...foundation.quantity import Quantity, quantity
 from ..curves.numbers import in_si, plain
 from ..statics.contour import Contour
 from .arc_path import ArcPath
-from .cam_outline import one_sided_outline, two_sided_outlines
-from .cam_part import CamPart, Hole
-from .lip_edge import LipEdge, lip_edge
-from .machinability import check_machinable
+from .cam_outline import LipEdge, lip_edge, one_sided_outline, two_sided_outlines
+from .cam_part import CamPart, Hole, check_machinable
 
 _CLEARANCE = quantity(0.1, "mm", source="assumed: a braided cable of this size passes a gap so much wider")
 _OVER_TRAVEL = quantity(10.0, "deg", source="assumed: room for a stop behind the last angle")

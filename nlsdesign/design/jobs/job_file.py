@@ -21,8 +21,7 @@ from ..curves.target import Target
 from ..curves.target_files import read_band, read_target
 from ..curves.task_curve import TaskGoal
 from ..optimisation.goals import Goal
-from ..optimisation.limits import Limit
-from ..optimisation.limits_of_use import TorqueWithin
+from ..optimisation.limits import Limit, TorqueWithin
 from ..optimisation.settings import DesignSettings
 from ..optimisation.solve import GOALS
 from ..optimisation.stock import RubberStock, Stock, StockChoice

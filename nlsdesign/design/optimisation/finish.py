@@ -23,12 +23,12 @@ from ..statics.smooth_cables import with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
 from .checks import torque_check
+from .conflict import Remedies, find_remedies
 from .defaults import safe_limits
 from .design_search import Search, carried_over
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Solution
-from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
 from .size_ranges import size_ranges
 

@@ -17,7 +17,7 @@ from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from ..tolerance.tolerance_result import ToleranceResult
-from .remedies import Remedies
+from .conflict import Remedies
 from .size_ranges import SizeRange
 
 

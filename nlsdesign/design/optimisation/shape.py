@@ -20,8 +20,7 @@ from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
-from .program import Rows
-from .variables import DesignVariable
+from .program import DesignVariable, Rows
 
 INTERVALS = 40
 """Intervals of the contour; the number moves the results by less than their last digit shown."""

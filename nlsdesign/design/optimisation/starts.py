@@ -8,8 +8,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from .program import DesignVariable, scaled
 from .shape import ContourVariables
-from .variables import DesignVariable, scaled
 
 _ALWAYS = ((0.5, 0.3), (0.8, 0.1), (0.3, 0.6), (0.6, 0.9))
 """Share of the size that is first slope, and share of the stretch that is pretension."""

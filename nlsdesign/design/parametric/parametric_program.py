@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
-from ..optimisation.limit_kinds import limit_kinds
+from ..optimisation.limits import limit_kinds
 from ..optimisation.program import PROVED_INFEASIBLE
 from ..optimisation.starts import start_values, starts
 from .cam_question import CamQuestion

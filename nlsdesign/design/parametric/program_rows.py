@@ -21,8 +21,8 @@ from ...foundation.symbolic import Expression
 from ..curves.target import TabulatedTorque, Target
 from ..optimisation.limits import Bound
 from ..optimisation.problem import SymbolicTarget, design_problem
+from ..optimisation.program import DesignVariable, VariableScale, scale_of, scaled
 from ..optimisation.solve import GOALS
-from ..optimisation.variables import DesignVariable, VariableScale, scale_of, scaled
 from ..statics.equilibrium import elastic_law
 from ..statics.rounding import has_corners
 from .cam_question import CamQuestion
