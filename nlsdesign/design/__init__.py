@@ -84,10 +84,9 @@ from .optimisation.stock import RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import cam_from_profile, contour_of_cam
+from .statics.energy import UnmakeablePart, unmakeable_parts
 from .statics.equilibrium import elastic_law, equilibrium_torque
-from .statics.unmakeable import UnmakeablePart, unmakeable_parts
-from .tolerance.causes import Cause
-from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
+from .tolerance.causes import Cause, MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
 from .tolerance.trimming import Trim

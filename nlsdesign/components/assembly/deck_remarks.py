@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from ...foundation.quantity import Quantity
 from ...foundation.spread import RelativeSpread
-from ..core.tie import Tie
+from ..core.element import Tie
 from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
 from ..mechanics.motor import ElectricMotor

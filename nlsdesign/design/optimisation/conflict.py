@@ -1,4 +1,10 @@
-"""Why no design keeps all limits: the smallest changes of limits and sizes that would let one be."""
+"""Why no design keeps all limits: which are in conflict, how much each would have to give, what to free.
+
+One program answers all such questions. Every number that a designer could free is a variable of it, every
+limit has a slack relative to its size, and the torque error is one more limit. A question is which numbers
+may move and which slacks may open; the rest is held by the bounds of the variables. What is made small is the
+sum of the slacks.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +25,7 @@ from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
 from .problem import contour_names
 from .program import PROVED_INFEASIBLE, DesignVariable, Program, Solution, scaled
-from .starts import starts
+from .shape import starts
 
 FEASIBLE = 1e-6
 """Relative give below which a limit counts as kept."""

@@ -16,13 +16,12 @@ from ...foundation.errors import NlsError
 from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.derived_deck import derived
+from ..curves.target import Target
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam
-from ..statics.equilibrium import cam_function
-from ..statics.smooth_cables import with_smooth_cables
+from ..statics.equilibrium import cam_function, torque_function, with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
-from .checks import torque_check
 from .conflict import Remedies, find_remedies
 from .defaults import safe_limits
 from .design_search import Search, carried_over
@@ -390,3 +389,17 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
     return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active)
+
+
+_ANGLES = 801
+
+
+def torque_check(model: FlatModel, *, target: Target, spring: str | None = None) -> TorqueCheck:
+    """Return the equilibrium torque of a model against a target.
+
+    ``spring``: path of the spring; decided from the structure if it is left out.
+    """
+    angles = np.linspace(0.0, target.last_angle, _ANGLES)
+    torque = torque_function(model, spring)(angles.reshape(1, -1), model.start(model.parameters))
+    values = np.array(torque, dtype=float).ravel()
+    return TorqueCheck(angles, values, target.torque(angles), target.weight(angles))

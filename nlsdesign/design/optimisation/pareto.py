@@ -28,8 +28,8 @@ from .limits import Limit, MaximumTorqueError
 from .program import Program, Rows, Solution
 from .result import CamDesign
 from .settings import DesignSettings
+from .shape import starts
 from .solve import USUAL, Wanted
-from .starts import starts
 
 _SHOWN_IN = {"m": "mm", "m^2": "mm^2"}
 

@@ -21,8 +21,7 @@ from ..statics.energy import closed_form
 from ..statics.equilibrium import ElasticLaw, elastic_law
 from .design_point import DesignPoint, Stretched
 from .program import DesignVariable, Rows, scalar
-from .shape import ContourVariables, Shape, given, parallel, through_centre
-from .starts import Start, StartSizes, start_values
+from .shape import ContourVariables, Shape, Start, StartSizes, given, parallel, start_values, through_centre
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""

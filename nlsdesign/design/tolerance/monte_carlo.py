@@ -16,9 +16,8 @@ from ...foundation.processes import parallel_map
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ..curves.target import Target
-from ..statics.smooth_cables import with_smooth_cables
-from .causes import NumberCause, draw_deviations, shown_unit
-from .declared_spreads import SpreadRules, spring_causes
+from ..statics.equilibrium import with_smooth_cables
+from .causes import NumberCause, SpreadRules, draw_deviations, shown_unit, spring_causes
 from .made_spring import MadeSpring, made_spring
 from .tolerance_result import SHARES, CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect, quantile
 from .trimming import Trim, Trimmed, trimmed
