@@ -1,4 +1,4 @@
-"""The law of a spring at rest and while it relaxes, from the flat model alone, sharp and with round corners."""
+"""The law of a spring at rest and while it relaxes, of the flat model, sharp or with round corners."""
 
 from __future__ import annotations
 
