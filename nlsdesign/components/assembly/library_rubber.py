@@ -43,7 +43,11 @@ def with_library_rubber(deck: Deck, path: str, table: Mapping[str, Any]) -> dict
         law = _law(deck, path, table)
     except NlsError as error:
         raise error.at(deck.place(f"{path}.{MATERIAL}")) from None
-    return _merged(_tables(law), own)
+    # The fields and tables of a piece of that rubber, as a deck has them, without its sizes.
+    piece = specimen(rest_length=0.01, area=1e-4, section=None, strength=law.strength, **dict(law.members))
+    tables = tomllib.loads("\n".join(part_lines("piece", piece)), parse_float=Written)["piece"]
+    known = {key: raw for key, raw in tables.items() if key not in ("component", "rest_length", "area")}
+    return _merged(known, own)
 
 
 def _law(deck: Deck, path: str, table: Mapping[str, Any]) -> MaterialLaw:
@@ -57,13 +61,6 @@ def _law(deck: Deck, path: str, table: Mapping[str, Any]) -> MaterialLaw:
         step = f'write "{_KNOWN}" for what is known of the rubber, or a number with unit "1" and source'
         raise DeckError(LOSS, rule, next_step=step)
     return relaxing_law_of(named, using=using, loss_tangent=deck.number(f"{path}.{LOSS}", table[LOSS]).number)
-
-
-def _tables(law: MaterialLaw) -> dict[str, Any]:
-    """Return the fields and tables of a piece of that rubber, as a deck has them, without its sizes."""
-    piece = specimen(rest_length=0.01, area=1e-4, section=None, strength=law.strength, **dict(law.members))
-    tables = tomllib.loads("\n".join(part_lines("piece", piece)), parse_float=Written)["piece"]
-    return {key: raw for key, raw in tables.items() if key not in ("component", "rest_length", "area")}
 
 
 def _merged(known: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:

@@ -135,23 +135,19 @@ def _check_edges(part: CamPart) -> None:
         gap = float(distance_to(lower, upper).min())
         if gap < 2.0 * part.number("cable_radius") - part.number("channel_width"):
             raise ArrangementError("halves of the cam", "overlap", next_step="take a smaller over_travel")
-        _check_backs(part, lower)
-
-
-def _check_backs(part: CamPart, lower: Array) -> None:
-    """The material between channel and back, on the y axis where the channel is closest to it."""
-    heights = [
-        y0 + (y1 - y0) * x0 / (x0 - x1)
-        for (x0, y0), (x1, y1) in itertools.pairwise(lower)
-        if (x0 <= 0.0) != (x1 <= 0.0)
-    ]
-    depth, wall = max(heights) - min(heights), part.number("minimum_wall")
-    if depth < wall:
-        raise ValueRangeError(
-            f"half of the cam, {MM * depth:.4g} mm between channel and back",
-            f"is thinner than minimum_wall {MM * wall:.4g} mm",
-            next_step="take a larger body_radius",
-        )
+        # The material between channel and back, on the y axis where the channel is closest to it.
+        heights = [
+            y0 + (y1 - y0) * x0 / (x0 - x1)
+            for (x0, y0), (x1, y1) in itertools.pairwise(lower)
+            if (x0 <= 0.0) != (x1 <= 0.0)
+        ]
+        depth, wall = max(heights) - min(heights), part.number("minimum_wall")
+        if depth < wall:
+            raise ValueRangeError(
+                f"half of the cam, {MM * depth:.4g} mm between channel and back",
+                f"is thinner than minimum_wall {MM * wall:.4g} mm",
+                next_step="take a larger body_radius",
+            )
 
 
 def _check_tool(part: CamPart) -> None:

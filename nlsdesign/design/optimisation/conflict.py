@@ -117,7 +117,15 @@ class Loosened:
     def __init__(
         self, search: Search, free: Sequence[str], *, largest_error: float | None, best: Array | None
     ) -> None:
-        self.free, self.candidates = tuple(free), _candidates(search, free)
+        # The names that a designer could free besides: sizes, not the material.
+        cam = search.problem.law.cam
+        sizes = [cam.pretension]
+        for piece in cam.specimens:
+            sizes += [*piece.section, piece.rest_length]
+        if cam.anchor_distance is not None and any(name in free for name in contour_names(cam)):
+            sizes.append(cam.anchor_distance)
+        self.free = tuple(free)
+        self.candidates = tuple(dict.fromkeys(name for name in sizes if name not in free))
         self.open = search.question.search([*free, *self.candidates], search.rounding)
         bounds = self.open.bounds
         if largest_error is not None:
@@ -207,17 +215,6 @@ class Loosened:
             lengths = [model.values[piece.rest_length] for piece in cam.specimens]
             return scaled(variable, 0.0), scaled(variable, max([now, *lengths]))
         return scaled(variable, now / _RANGE), scaled(variable, now * _RANGE)
-
-
-def _candidates(search: Search, free: Sequence[str]) -> tuple[str, ...]:
-    """Return the names that a designer could free besides: sizes, not the material."""
-    cam = search.problem.law.cam
-    sizes = [cam.pretension]
-    for piece in cam.specimens:
-        sizes += [*piece.section, piece.rest_length]
-    if cam.anchor_distance is not None and any(name in free for name in contour_names(cam)):
-        sizes.append(cam.anchor_distance)
-    return tuple(dict.fromkeys(name for name in sizes if name not in free))
 
 
 _ENOUGH = 1.0 + 1e-3
@@ -372,28 +369,8 @@ def feasible_point(search: Search, free: Sequence[str]) -> Array:
         if outcome.solved and outcome.cost <= FEASIBLE * len(loose.bounds)
     ]
     together = [give for give in (loose.give(i, best) for i in involved) if give.amount > 0.0]
-    raise InfeasibleError(
-        "limits " + ", ".join(names_of(loose.bounds[i] for i in involved)),
-        "contradict each other" if len(involved) > 1 else "cannot be kept with what is free",
-        next_step="; ".join(_advice(gives, together, cures=cures, hopeless=hopeless, undecided=undecided)),
-    )
-
-
-def names_of(bounds: Iterable[Bound]) -> list[str]:
-    """Return the names of the limits of some bounds, each once."""
-    return list(dict.fromkeys(bound.limit for bound in bounds))
-
-
-def _advice(
-    alone: Sequence[Give],
-    together: Sequence[Give],
-    *,
-    cures: Sequence[Freed],
-    hopeless: Sequence[str],
-    undecided: Sequence[str],
-) -> list[str]:
-    sensible = [give for give in alone if give.sensible]
-    no_use = [*hopeless, *names_of(give.bound for give in alone if not give.sensible)]
+    sensible = [give for give in gives if give.sensible]
+    no_use = [*hopeless, *names_of(give.bound for give in gives if not give.sensible)]
     sentences = []
     if sensible:
         sentences.append("one of these is enough: " + "; or ".join(str(give) for give in sensible))
@@ -409,4 +386,13 @@ def _advice(
         sentences.append(f"whether a give of {listed} alone is enough the solver could not decide")
     if not (sensible or cures):
         sentences.append("ask for a smaller torque or angle, more elements or another rubber")
-    return sentences
+    raise InfeasibleError(
+        "limits " + ", ".join(names_of(loose.bounds[i] for i in involved)),
+        "contradict each other" if len(involved) > 1 else "cannot be kept with what is free",
+        next_step="; ".join(sentences),
+    )
+
+
+def names_of(bounds: Iterable[Bound]) -> list[str]:
+    """Return the names of the limits of some bounds, each once."""
+    return list(dict.fromkeys(bound.limit for bound in bounds))

@@ -138,7 +138,8 @@ class SolvedSearch:
     @cached_property
     def check(self) -> TorqueCheck:
         """Its torque against the target."""
-        spring = _spring_of(self.model, self.search.problem.law.cam.name)
+        cam = self.search.problem.law.cam.name
+        spring = next(each.name for each in self.model.springs for inside in each.cams if inside.name == cam)
         return torque_check(self.model, target=self.search.problem.design.target, spring=spring)
 
 
@@ -168,6 +169,16 @@ def finished(solved: SolvedSearch) -> CamDesign:
     settings, design = search.question.settings, problem.design
     limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
     tolerance, remarks = _tolerance(solved)
+    cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
+    sentences = []
+    if "MaximumCableTension" not in kinds:
+        sentences.append(
+            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
+        )
+    if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
+        sentences.append(
+            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
+        )
     return CamDesign(
         target=design.target,
         changes=tuple(solved.changes.items()),
@@ -188,7 +199,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         if settings.look_for_size_ranges
         else (),
         miss=_miss(solved, limits),
-        remarks=(*_remarks(search), *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
+        remarks=(*sentences, *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
         drive=problem.law.cam.drive,
     )
 
@@ -307,20 +318,6 @@ def _blocks(solved: SolvedSearch) -> Iterator[str]:
             )
 
 
-def _remarks(search: Search) -> tuple[str, ...]:
-    cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
-    sentences = []
-    if "MaximumCableTension" not in kinds:
-        sentences.append(
-            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
-        )
-    if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
-        sentences.append(
-            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
-        )
-    return tuple(sentences)
-
-
 def _curves(problem: DesignProblem, point: Array) -> DesignCurves:
     design = problem.design
     columns = [
@@ -350,10 +347,6 @@ def _upper(search: Search, name: str) -> Iterator[Bound]:
     variable = search.question.model.variable(name)
     yield Bound("", name, ca.SX(0), variable.maximum, True, variable.unit, 1.0)
     yield from (each for each in search.bounds if each.upper and each.of in (name, "pretension"))
-
-
-def _spring_of(model: FlatModel, cam: str) -> str:
-    return next(each.name for each in model.springs for inside in each.cams if inside.name == cam)
 
 
 def _designed(old: Quantity, value: float, source: str) -> Quantity:

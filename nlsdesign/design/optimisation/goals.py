@@ -199,18 +199,15 @@ class LeastMass(Goal):
 
     def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the mass."""
-        plates = plain(self.plate_density) * plain(self.plate_thickness) * _plate_area(design)
+        # The area of the sectors below the contour, with p and ρ linear between nodes.
+        p, rho, phi = design.lever_arms, design.radii_of_curvature, design.directions
+        steps = phi[1:] - phi[:-1]
+        middle = (p[1:] + p[:-1]) * (rho[1:] + rho[:-1])
+        products = (p[1:] * rho[1:] + p[:-1] * rho[:-1] + middle) / 6.0
+        halves = 2.0 if design.through_centre else 1.0
+        area = halves * ca.dot(products, steps) / 2.0
+        plates = plain(self.plate_density) * plain(self.plate_thickness) * area
         return GoalMeasure("mass", plain(self.rubber_density) * design.rubber_volume + plates, "g")
-
-
-def _plate_area(design: DesignPoint) -> Expression:
-    """Return the area of the sectors below the contour, with p and ρ linear between nodes."""
-    p, rho, phi = design.lever_arms, design.radii_of_curvature, design.directions
-    steps = phi[1:] - phi[:-1]
-    middle = (p[1:] + p[:-1]) * (rho[1:] + rho[:-1])
-    products = (p[1:] * rho[1:] + p[:-1] * rho[:-1] + middle) / 6.0
-    halves = 2.0 if design.through_centre else 1.0
-    return halves * ca.dot(products, steps) / 2.0
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,16 @@ class ParetoFront:
         ExportError
             If the file cannot be written.
         """
-        head, rows = self._table()
+        first = self.points[0]
+        units = [_SHOWN_IN.get(unit, unit) for unit in first.units]
+        head = [f"{goal} [{unit}]" for goal, unit in zip(self.goals, self.units, strict=True)]
+        head += [f"{name} [{unit}]" for (name, _), unit in zip(first.numbers, units, strict=True)]
+        rows = []
+        for point, shown in zip(self.points, self.shown, strict=True):
+            numbers = [v / parse_unit(u).factor for (_, v), u in zip(point.numbers, units, strict=True)]
+            row = [f"{value:.9g}" for value in (*shown, *numbers)]
+            rows.append([*row, "; ".join(point.binding)])
+        head.append("binding limits")
         write_table(path, [head, *rows])
 
     def to_frame(self) -> Any:
@@ -153,18 +162,6 @@ class ParetoFront:
         columns["binding limits"] = ["; ".join(point.binding) for point in self.points]
         numbers = {name: unit for (name, _), unit in zip(first.numbers, first.units, strict=True)}
         return data_frame(columns, units=units | numbers, index=Axis("point", "", range(len(self.points))))
-
-    def _table(self) -> tuple[list[str], list[list[str]]]:
-        first = self.points[0]
-        units = [_SHOWN_IN.get(unit, unit) for unit in first.units]
-        head = [f"{goal} [{unit}]" for goal, unit in zip(self.goals, self.units, strict=True)]
-        head += [f"{name} [{unit}]" for (name, _), unit in zip(first.numbers, units, strict=True)]
-        rows = []
-        for point, shown in zip(self.points, self.shown, strict=True):
-            numbers = [v / parse_unit(u).factor for (_, v), u in zip(point.numbers, units, strict=True)]
-            row = [f"{value:.9g}" for value in (*shown, *numbers)]
-            rows.append([*row, "; ".join(point.binding)])
-        return [*head, "binding limits"], rows
 
     def __str__(self) -> str:
         heads = [
@@ -348,21 +345,18 @@ class _Ladder:
             for each in parallel_map(tried, len(begin)):
                 outcomes.append(each)
                 self.search.question.settings.progress()
-            reached.append(self._best(goal, outcomes))
+            solved = [each for each in outcomes if each.outcome.solved]
+            if not solved:
+                start = feasible_point(self.search, self.free)
+                solved = [self._solved(start, goal, [np.inf] * (len(self.goals) - 1))]
+            if not solved[-1].outcome.solved:
+                raise ConvergenceError(
+                    f"pareto: {type(self.goals[goal]).__name__} alone",
+                    f"IPOPT stopped with '{solved[-1].outcome.status}'",
+                    next_step="free one number more, or bound the sizes, for instance with RestLengthRange",
+                )
+            reached.append(min(solved, key=lambda each: each.outcome.cost))
         return reached
-
-    def _best(self, goal: int, outcomes: Sequence[_Tried]) -> _Tried:
-        solved = [each for each in outcomes if each.outcome.solved]
-        if not solved:
-            start = feasible_point(self.search, self.free)
-            solved = [self._solved(start, goal, [np.inf] * (len(self.goals) - 1))]
-        if not solved[-1].outcome.solved:
-            raise ConvergenceError(
-                f"pareto: {type(self.goals[goal]).__name__} alone",
-                f"IPOPT stopped with '{solved[-1].outcome.status}'",
-                next_step="free one number more, or bound the sizes, for instance with RestLengthRange",
-            )
-        return min(solved, key=lambda each: each.outcome.cost)
 
     def between(self, ends: list[_Tried], lowest: Array, highest: Array, points: int) -> list[_Tried]:
         """Return the best of the first goal for each combination of bounds on the others."""

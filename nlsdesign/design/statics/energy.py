@@ -231,14 +231,14 @@ def unmakeable_parts(
         (sharp, f"the contour is sharper than {least}"),
     ):
         result += [
-            UnmakeablePart(float(theta[a]), float(theta[b]), _with_radius(reason, rho[a : b + 1]))
+            UnmakeablePart(
+                float(theta[a]),
+                float(theta[b]),
+                f"{reason} (radius of curvature down to {1e3 * float(rho[a : b + 1].min()):.3g} mm)",
+            )
             for a, b in _runs(where)
         ]
     return tuple(sorted(result, key=lambda part: part.first))
-
-
-def _with_radius(reason: str, radii: Array) -> str:
-    return f"{reason} (radius of curvature down to {1e3 * float(radii.min()):.3g} mm)"
 
 
 def _runs(where: Mask) -> list[tuple[int, int]]:

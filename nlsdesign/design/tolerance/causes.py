@@ -21,7 +21,7 @@ from ...foundation.quantity import Quantity, parse_unit, with_unit
 from ...foundation.spread import EXACT, NormalSpread, RelativeSpread, Spread
 from ...model import FlatModel, Variable
 from ...model.roles import series_cam
-from ...model.structure import CamNames, SpringNames
+from ...model.structure import CamNames
 from ..curves.numbers import in_si
 
 
@@ -215,8 +215,28 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
     """
     cam = series_cam(model, spring)
     tie = next(each for each in model.springs if cam in each.cams)
-    groups = _groups(model, tie, cam, rules.material)
-    others = _beside_the_numbers(model, cam)
+    # The numbers of the spring that move together, by name.
+    inside = set(tie.parameters) - set(_not_of_the_torque(cam))
+    groups: dict[str, list[Variable]] = {}
+    for variable in model.parameters:
+        if variable.name in inside:
+            groups.setdefault(variable.name.partition("[")[0], []).append(variable)
+    for piece in cam.specimens:
+        moduli = {
+            name: row
+            for name, row in groups.items()
+            if name.startswith(f"{piece.name}.") and row[0].unit == "Pa" and any(v.spread for v in row)
+        }
+        grouped = rules.material.grouped(piece.name, moduli)
+        groups = {name: row for name, row in groups.items() if name not in moduli} | grouped
+    # What deviates besides the numbers: the edge of the cam, and the cable on it.
+    cable = _CABLE
+    if cam.cable is not None:
+        diameter = model.variable(cam.cable.diameter)
+        if diameter.spread:
+            of_radius = diameter.spread.standard_error(diameter.start) / 2.0
+            cable = _Assumed(of_radius, f"declared: {diameter.spread_text}")
+    others = {f"{cam.name}.contour": _CONTOUR, f"{cam.name}.cable_radius": cable}
     valid = [*groups, *others]
     for name in rules.given:
         if name not in valid:
@@ -235,43 +255,12 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
     return tuple(cause for cause in causes if cause.deviation > 0.0)
 
 
-def _groups(
-    model: FlatModel, tie: SpringNames, cam: CamNames, material: MaterialScatter
-) -> dict[str, list[Variable]]:
-    """Return the numbers of the spring that move together, by name."""
-    inside = set(tie.parameters) - set(_not_of_the_torque(cam))
-    rows: dict[str, list[Variable]] = {}
-    for variable in model.parameters:
-        if variable.name in inside:
-            rows.setdefault(variable.name.partition("[")[0], []).append(variable)
-    for piece in cam.specimens:
-        moduli = {
-            name: row
-            for name, row in rows.items()
-            if name.startswith(f"{piece.name}.") and row[0].unit == "Pa" and any(v.spread for v in row)
-        }
-        grouped = material.grouped(piece.name, moduli)
-        rows = {name: row for name, row in rows.items() if name not in moduli} | grouped
-    return rows
-
-
 def _not_of_the_torque(cam: CamNames) -> Iterator[str]:
     """Yield the numbers of strength and cable, of which only the diameter does anything to the torque."""
     for piece in cam.specimens:
         yield from (name for name in (piece.tensile_strength, piece.elongation_at_break) if name is not None)
     if cam.cable is not None:
         yield from (cam.cable.diameter, cam.cable.breaking_force, cam.cable.bend_ratio)
-
-
-def _beside_the_numbers(model: FlatModel, cam: CamNames) -> dict[str, _Assumed]:
-    """Return what deviates besides the numbers: the edge of the cam, and the cable on it."""
-    cable = _CABLE
-    if cam.cable is not None:
-        diameter = model.variable(cam.cable.diameter)
-        if diameter.spread:
-            size = diameter.spread.standard_error(diameter.start) / 2.0
-            cable = _Assumed(size, f"declared: {diameter.spread_text}")
-    return {f"{cam.name}.contour": _CONTOUR, f"{cam.name}.cable_radius": cable}
 
 
 def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: SpreadRules) -> list[Cause]:

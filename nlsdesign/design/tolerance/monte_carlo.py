@@ -109,18 +109,7 @@ def tolerance_analysis(
     everything = (*spring_causes(model, name, rules), *(column for column, _ in columns))
     made = made_spring(model, name, target=target, causes=everything, angles=_ANGLES)
     ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
-    return _analysed(made, ranges, target=target, draws=draws, seed=seed)
-
-
-def _analysed(
-    made: MadeSpring,
-    ranges: Sequence[tuple[str, tuple[float, float]]],
-    *,
-    target: Target,
-    draws: int,
-    seed: int,
-) -> ToleranceResult:
-    """Return the analysis of springs whose last causes are trims with these names and ranges."""
+    # The last causes of these springs are the trims.
     causes = made.causes[: len(made.causes) - len(ranges)]
     largest = np.max(np.abs(made.sensitivities), axis=1, initial=0.0)
     acting = [k for k in range(len(causes)) if largest[k] > 1e-9 * target.largest]
