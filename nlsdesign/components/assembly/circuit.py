@@ -11,7 +11,7 @@ from typing import TypeAlias
 from ..core.element import Combination, Element, Tie
 from ..core.part import Part
 from ..core.series import Series
-from ..mechanics.gear import Gear
+from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
 
@@ -135,7 +135,7 @@ def draw(title: str, parts: Sequence[tuple[str, Part]], *, width: int | None = N
                 drawn = [f"    {line}" for line in circuit_lines(circuit, *_ends(part))]
                 lines += drawn if width is None else _broken(drawn, max(width, _NARROWEST))
             lines += _branches(part.element, "    ")
-        elif isinstance(part, Gear):
+        elif isinstance(part, Transmission):
             lines.append(f"  {part.between[0]} ══ [{name}] ══ {part.between[1]}   {part.title()}")
         elif isinstance(part, Sensor):
             lines.append(f"  {name} ◁ {part.of}   {part.title()}")

@@ -8,7 +8,7 @@ from ...foundation.quantity import Quantity
 from ...foundation.spread import RelativeSpread
 from ..core.element import Tie
 from ..mechanics.bodies import Body, GearedMotor
-from ..mechanics.gear import Gear
+from ..mechanics.gear import Gear, Transmission
 from ..mechanics.motor import ElectricMotor
 from .named_parts import Assembly
 
@@ -65,7 +65,7 @@ def _ends(machine: Assembly) -> Iterator[str]:
     bodies = [name for name, part in machine.parts if isinstance(part, Body)]
     # The bodies that a motor turns, directly or through gears.
     driven = {name for name, part in machine.parts if isinstance(part, GearedMotor | ElectricMotor)}
-    gears = [part.between for _, part in machine.parts if isinstance(part, Gear)]
+    gears = [part.between for _, part in machine.parts if isinstance(part, Transmission)]
     for _ in gears:
         driven |= {end for pair in gears if set(pair) & driven for end in pair}
     for name, part in machine.parts:
