@@ -14,7 +14,7 @@ from ..components.core.switches import Jump, Kink, StictionConstraint
 from ..foundation.errors import ArrangementError
 from ..foundation.symbolic import Expression, depends, symbol
 from .flat import Variable
-from .owners import number_names
+from .structure import number_names
 
 TYPICAL_SIZE = {"m": 1e-2, "m/s": 0.1, "N": 10.0, "Pa": 1e5}
 """Nominal size of a state by its unit, where one of the unit is far off; for tolerances and scaling."""

@@ -15,9 +15,8 @@ import casadi as ca
 
 from ..foundation.errors import ArrangementError, unknown_name
 from ..foundation.symbolic import Expression, depends
-from .flat import FlatModel, Symbols, Variable
+from .flat import FlatModel, Switching, Symbols, Variable
 from .structure import ModelParts
-from .switching import Switching
 
 
 def named(model: FlatModel, symbols: Symbols) -> dict[str, Expression]:
