@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from ..components.assembly.named_parts import Assembly
-from ..components.core.element import Domain
+from ..components.core.element import Domain, Tie
 from ..components.core.part import Part, walk
 from ..components.core.part_numbers import templates
-from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen, Strength
 from ..components.transmission.cam import Cable, Cam
 from ..components.transmission.cam_drive import Through

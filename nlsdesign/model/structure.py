@@ -9,8 +9,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
-from ..components.core.element import MATERIAL, Domain, Element
-from ..components.core.tie import Tie
+from ..components.core.element import MATERIAL, Domain, Element, Tie
 from ..components.mechanics.bodies import Body, Free, GearedMotor, Inertia, Mass
 from ..components.mechanics.motor import ElectricMotor
 from .gear_train import trains
