@@ -38,8 +38,8 @@ from nlsdesign.design import DesignSettings
 from nlsdesign.design.optimisation.design_search import Search
 from nlsdesign.design.optimisation.limits import Limit
 from nlsdesign.design.optimisation.program import Rows
+from nlsdesign.design.optimisation.shape import starts
 from nlsdesign.design.optimisation.solve import GOALS, USUAL, Wanted
-from nlsdesign.design.optimisation.starts import starts
 from nlsdesign.export.compilation.cross_compiler import BASELINE
 from nlsdesign.foundation.arrays import Array
 

@@ -19,7 +19,7 @@ from nlsdesign.design import (
     curve_for_task,
     tolerance_analysis,
 )
-from nlsdesign.design.optimisation.front import FrontPoint
+from nlsdesign.design.optimisation.pareto import FrontPoint
 from nlsdesign.feedback.analysis import Chart
 from nlsdesign.feedback.control import (
     LoopMargins,

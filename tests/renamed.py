@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from nlsdesign.components import Assembly
+from nlsdesign.components.core.element import Tie
 from nlsdesign.components.core.part import Part
-from nlsdesign.components.core.tie import Tie
 from nlsdesign.components.mechanics.gear import Gear
 from nlsdesign.components.sensing.sensors import Sensor
 

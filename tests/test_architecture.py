@@ -57,8 +57,8 @@ ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
     "design.jobs.written_design": ("components.assembly.deck_writer",),
-    "design.statics.smooth_cables": ("components.core.element",),
-    "design.optimisation.stock": ("components.assembly.other_rubber", "components.materials.library"),
+    "design.statics.equilibrium": ("components.core.element",),
+    "design.optimisation.stock": ("components.assembly.library_rubber", "components.materials.library"),
     "export.exported_files": ("components.assembly.deck_writer",),
     "bench.discrepancy": (ASSEMBLY,),
     "simulation.measure": (ASSEMBLY,),

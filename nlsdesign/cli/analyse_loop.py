@@ -120,8 +120,8 @@ def _loops(
     deck_name: str, law: dict[str, Any], delay: int, sample_time: float
 ) -> tuple[ClosedLoop, ClosedLoop]:
     """Return the loop with the load fixed, and with the load moved; one observer and controller for both."""
+    from ..components.assembly.changed_copies import with_moved_load
     from ..components.assembly.deck_writer import declare
-    from ..components.assembly.moved_load import with_moved_load
     from ..feedback.control import encoder_loop, torque_controller
     from ..feedback.observer import CascadeGain, design_observer
     from ..foundation.deck import load_deck

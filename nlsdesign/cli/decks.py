@@ -149,7 +149,7 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
             raise click.UsageError("--toml and --json exclude each other; give one")
         click.echo(load_deck(deck_name).path.read_text(encoding="utf-8-sig"), nl=False)
         return
-    from ..components.assembly.circuit_text import draw
+    from ..components.assembly.circuit import draw
     from ..components.assembly.deck_writer import declare
 
     assembly = declare(load_deck(deck_name))

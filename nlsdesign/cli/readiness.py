@@ -89,7 +89,7 @@ class _Machine:
 
     def loop(self) -> None:
         """Do what the evaluation of the torque loop does before it simulates."""
-        from ..components.assembly.moved_load import with_moved_load
+        from ..components.assembly.changed_copies import with_moved_load
         from ..feedback.control import torque_controller
         from ..model import flatten
 

@@ -178,7 +178,7 @@ _COLUMNS = ("signal", "smallest", "largest", "rms", "at the end", "unit")
 
 def _read_as_asked(actuator: Assembly, friction: str) -> Assembly:
     """Return the machine with the reading of friction that is asked for."""
-    from ..components.assembly.smooth_form import sharpened, smoothed
+    from ..components.assembly.changed_copies import sharpened, smoothed
 
     if friction == "sharp":
         return sharpened(actuator)

@@ -2,20 +2,19 @@
 
 from typing import TYPE_CHECKING
 
+from .assembly.changed_copies import smoothed
 from .assembly.deck_reader import component_classes
+from .assembly.library_rubber import with_rubber
 from .assembly.named_parts import Assembly, assembly
-from .assembly.other_rubber import with_rubber
 from .assembly.renamed import renamed
-from .assembly.smooth_form import smoothed
 from .core.contacts import Regularised, Rounded, Sharp
 from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
-from .core.element import Element, Parallel, parallel
+from .core.element import Element, Parallel, Tie, parallel, tie
 from .core.part import Part
 from .core.part_numbers import NotDeclared
 from .core.series import Series, series
 from .core.springs import FittedRange, LinearElastic, Spring, StrainStiffening
-from .core.tie import Tie, tie
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring

@@ -3,8 +3,15 @@
 from ..foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
 from .curves.compliance import OddSpring, OneSidedSpring, SpringSymmetry, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
-from .curves.shapes import PolynomialTorque, TabulatedStiffness, TorqueBand
-from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
+from .curves.target import (
+    ExponentialTorque,
+    PolynomialTorque,
+    PowerTorque,
+    TabulatedStiffness,
+    TabulatedTorque,
+    Target,
+    TorqueBand,
+)
 from .curves.target_files import read_band, read_target
 from .curves.task import Task, read_task, walking_task
 from .curves.task_curve import (
@@ -28,23 +35,32 @@ from .drawing.machined_cam import (
     MachinedTwoSidedCam,
 )
 from .jobs.job_file import DesignJob, job_of, read_job
-from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
 from .jobs.written_design import (
     DESIGN_FILES,
     PicturesOfDesign,
     WrittenDesign,
     design_summary,
+    machined_cam,
     write_design,
     write_part,
 )
-from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
-from .optimisation.front import ParetoFront
-from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
+from .optimisation.goals import (
+    BothStrokes,
+    EnergyLost,
+    Goal,
+    InsensitiveStiffness,
+    LeastMass,
+    LeastRubber,
+    LeastSize,
+    SmoothContour,
+    TorqueError,
+)
 from .optimisation.limits import (
     AnchorDistance,
     AreaRange,
+    AtMost,
     Limit,
     MaximumCableTension,
     MaximumCamRadius,
@@ -54,24 +70,23 @@ from .optimisation.limits import (
     MinimumRadiusOfCurvature,
     NumberRange,
     OneNumber,
+    OverTravel,
     PositiveStiffness,
     PretensionRange,
     RestLengthRange,
+    TorqueWithin,
 )
-from .optimisation.limits_of_use import AtMost, OverTravel, TorqueWithin
-from .optimisation.pareto import pareto
+from .optimisation.pareto import ParetoFront, pareto
 from .optimisation.result import CamDesign, LimitState
 from .optimisation.settings import DesignSettings
-from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import cam_from_profile, contour_of_cam
+from .statics.energy import UnmakeablePart, unmakeable_parts
 from .statics.equilibrium import elastic_law, equilibrium_torque
-from .statics.unmakeable import UnmakeablePart, unmakeable_parts
-from .tolerance.causes import Cause
-from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
+from .tolerance.causes import Cause, MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
 from .tolerance.trimming import Trim

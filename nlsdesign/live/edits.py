@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from ..components.assembly.other_rubber import with_rubber
+from ..components.assembly.library_rubber import with_rubber
 from ..components.materials.library import material
-from ..design.optimisation.limit_kinds import limit_kinds
+from ..design.optimisation.limits import limit_kinds
 from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView

@@ -13,7 +13,7 @@ from typing import Any
 from ..components.assembly.deck_writer import deck_text
 from ..components.assembly.named_parts import Assembly
 from ..design import Contour, write_drawings
-from ..design.jobs.machined import declared_edge
+from ..design.jobs.written_design import declared_edge
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import measured_motion, series_spring

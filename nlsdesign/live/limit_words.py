@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from ..design.optimisation.limit_kinds import limit_kinds
+from ..design.optimisation.limits import limit_kinds
 from ..design.parametric.cam_question import LimitNumber
 from .answers import LimitMargin
 from .question import LiveQuestion

@@ -14,7 +14,7 @@ import numpy as np
 from ..components.assembly.deck_writer import deck_text, declare
 from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_of
 from ..design.curves.numbers import plain
-from ..design.optimisation.limit_kinds import limit_kinds
+from ..design.optimisation.limits import limit_kinds
 from ..design.parametric.cam_question import ChosenMachine, TargetPoint
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, ValueRangeError

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..components.materials.library import materials
 from ..components.materials.material_law import missing_law
-from ..design.optimisation.limit_kinds import limit_kinds
+from ..design.optimisation.limits import limit_kinds
 from ..foundation.errors import NlsError
 from .answers import LiveAnswer, to_json
 from .gallery import gallery_cards

@@ -8,9 +8,8 @@ from dataclasses import replace
 import casadi as ca
 
 from ..components.assembly.named_parts import Assembly
-from ..components.core.element import UNBOUNDED, Range
+from ..components.core.element import UNBOUNDED, Range, Tie
 from ..components.core.switches import Jump, Kink, StictionConstraint
-from ..components.core.tie import Tie
 from ..foundation.errors import ArrangementError
 from ..foundation.symbolic import Expression, depends, symbol
 from .flat import Variable

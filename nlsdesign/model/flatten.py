@@ -15,8 +15,7 @@ import casadi as ca
 
 from ..components.assembly.named_parts import Assembly
 from ..components.assembly.sensor_chains import source_problems
-from ..components.core.element import observed_effort
-from ..components.core.tie import Tie
+from ..components.core.element import Tie, observed_effort
 from ..components.mechanics.bodies import Body, Motion
 from ..components.sensing.sensors import Sensor
 from ..foundation.errors import ArrangementError, UnitError, nearest, unknown_name

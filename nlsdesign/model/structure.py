@@ -9,10 +9,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
-from ..components.core.element import MATERIAL, Domain, Element
+from ..components.core.element import MATERIAL, Domain, Element, Tie
 from ..components.core.part import Part, walk
 from ..components.core.part_numbers import templates
-from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen, Strength
 from ..components.mechanics.bodies import Body, Free, GearedMotor, Inertia, Mass
 from ..components.mechanics.motor import ElectricMotor

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from ..components import material, with_rubber
 from ..components.assembly.named_parts import Assembly
-from ..components.core.tie import Tie
+from ..components.core.element import Tie
 from ..components.materials.specimen import Specimen
 from ..foundation.errors import unknown_name
 

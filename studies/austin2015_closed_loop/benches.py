@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import nlsdesign as nls
-from nlsdesign.components.assembly.moved_load import with_moved_load
+from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.export import natively
 from nlsdesign.feedback.control import (
     ClosedLoop,

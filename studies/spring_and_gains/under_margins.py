@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.components.assembly.moved_load import with_moved_load
+from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.feedback.analysis.rest import rest_states
 from nlsdesign.feedback.control import (
     ClosedLoop,

@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.components.assembly.moved_load import with_moved_load
 from nlsdesign.export import natively
 from nlsdesign.feedback.control import ClosedLoop, TorqueGains, encoder_loop, torque_controller, zero_torque
 from nlsdesign.feedback.observer import CascadeGain, design_observer

@@ -32,7 +32,7 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.design import BothStrokes, EnergyLost, ExponentialTorque, Goal, TorqueError
 from nlsdesign.design.optimisation.problem import DesignProblem, design_problem
-from nlsdesign.design.optimisation.starts import Start
+from nlsdesign.design.optimisation.shape import Start
 from nlsdesign.model import flatten
 from tests.cam_cases import CONCAVE
 

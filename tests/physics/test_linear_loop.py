@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
+from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.components.assembly.moved_load import with_moved_load
 from nlsdesign.design import equilibrium_torque
 from nlsdesign.export import natively
 from nlsdesign.feedback.control import (

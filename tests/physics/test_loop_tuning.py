@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.components.assembly.moved_load import with_moved_load
 from nlsdesign.export import natively
 from nlsdesign.feedback.control import (
     ClosedLoop,

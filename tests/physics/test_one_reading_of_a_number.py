@@ -15,8 +15,7 @@ from nlsdesign import declare, flatten, quantity
 from nlsdesign.bench.calibration.estimate import prior_of
 from nlsdesign.bench.identification.parameters import declared_parameter, free_parameter
 from nlsdesign.design import SpreadRules
-from nlsdesign.design.tolerance.causes import draw_deviations
-from nlsdesign.design.tolerance.declared_spreads import spring_causes
+from nlsdesign.design.tolerance.causes import draw_deviations, spring_causes
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread

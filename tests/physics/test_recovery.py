@@ -17,7 +17,7 @@ import pytest
 
 import nlsdesign as nls
 from nlsdesign.components import Encoder, ReadingLimits
-from nlsdesign.components.assembly.moved_load import with_moved_load
+from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_JUMPED,

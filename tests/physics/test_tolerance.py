@@ -35,9 +35,8 @@ from nlsdesign.design import (
     equilibrium_torque,
     tolerance_analysis,
 )
-from nlsdesign.design.optimisation.checks import torque_check
-from nlsdesign.design.tolerance.causes import draw_deviations
-from nlsdesign.design.tolerance.declared_spreads import spring_causes
+from nlsdesign.design.optimisation.finish import torque_check
+from nlsdesign.design.tolerance.causes import draw_deviations, spring_causes
 from nlsdesign.design.tolerance.made_spring import MadeSpring, made_spring
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.foundation.spread import UniformSpread

@@ -27,7 +27,7 @@ from nlsdesign.design import (
     tolerance_analysis,
 )
 from nlsdesign.design.optimisation.problem import design_problem
-from nlsdesign.design.tolerance.declared_spreads import spring_causes
+from nlsdesign.design.tolerance.causes import spring_causes
 from nlsdesign.design.tolerance.made_spring import made_spring
 from nlsdesign.foundation.errors import ArrangementError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from ...components.assembly.named_parts import Assembly
 from ...components.core.contacts import Regularised, WithFriction
-from ...components.core.tie import Tie, tie
+from ...components.core.element import Tie, tie
 from ...components.mechanics.bodies import Fixed
 from ...components.mechanics.loads import ConstantLoad
 from ...components.sensing.sensors import TorqueSensor

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
+from ..core.element import Tie
 from ..core.part import Part
-from ..core.tie import Tie
 from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from .circuit import Circuit, Leaf, Row, circuit_of

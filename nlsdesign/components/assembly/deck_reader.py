@@ -17,10 +17,9 @@ from ...foundation.errors import ArrangementError, DeckError, NlsError, brief, n
 from ...foundation.extensions import extension_modules
 from ...foundation.quantity import Quantity
 from ..core.domain import Domain
-from ..core.element import Combination, Element
+from ..core.element import Combination, Element, Tie
 from ..core.part import Part
 from ..core.part_numbers import ParameterInfo, Reading, domain_by_units, readings, templates
-from ..core.tie import Tie
 from ..mechanics.bodies import Body, Free
 from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor

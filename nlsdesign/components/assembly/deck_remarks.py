@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from ...foundation.quantity import Quantity
 from ...foundation.spread import RelativeSpread
-from ..core.tie import Tie
+from ..core.element import Tie
 from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear, Transmission
 from ..mechanics.motor import ElectricMotor
@@ -63,7 +63,11 @@ def _exact_rubber(numbers: Mapping[str, Quantity]) -> Iterator[str]:
 
 def _ends(machine: Assembly) -> Iterator[str]:
     bodies = [name for name, part in machine.parts if isinstance(part, Body)]
-    driven = _driven(machine)
+    # The bodies that a motor turns, directly or through gears.
+    driven = {name for name, part in machine.parts if isinstance(part, GearedMotor | ElectricMotor)}
+    gears = [part.between for _, part in machine.parts if isinstance(part, Transmission)]
+    for _ in gears:
+        driven |= {end for pair in gears if set(pair) & driven for end in pair}
     for name, part in machine.parts:
         if not isinstance(part, Tie) or not part.element.restores:
             continue
@@ -80,15 +84,6 @@ def _ends(machine: Assembly) -> Iterator[str]:
                 f"{name}: its angle is that of '{part.between[0]}' minus that of '{part.between[1]}', so a "
                 f"drive that turns forward gives a negative torque -> write {swapped} for a positive one"
             )
-
-
-def _driven(machine: Assembly) -> set[str]:
-    """Return the bodies that a motor turns, directly or through gears."""
-    names = {name for name, part in machine.parts if isinstance(part, GearedMotor | ElectricMotor)}
-    gears = [part.between for _, part in machine.parts if isinstance(part, Transmission)]
-    for _ in gears:
-        names |= {end for pair in gears if set(pair) & names for end in pair}
-    return names
 
 
 def _ratios(machine: Assembly) -> Iterator[str]:

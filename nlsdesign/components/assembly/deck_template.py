@@ -129,14 +129,11 @@ class DeckTemplate:
         try:
             declare(read_deck(text, Path(f"{name}.toml")))
         except NlsError as error:
-            raise self._unwritten(error, name) from None
+            # An error without the line of a file that is not there yet.
+            thing = re.sub(rf"^{re.escape(name)}\.toml(:\d+)*: ", "", error.thing)
+            words = {"did_you_mean": error.did_you_mean, "next_step": error.next_step}
+            raise type(error)(f"template {self.name}: {thing}", error.rule, **words) from None
         return text
-
-    def _unwritten(self, error: NlsError, name: str) -> NlsError:
-        """Return an error without the line of a file that is not there yet."""
-        thing = re.sub(rf"^{re.escape(name)}\.toml(:\d+)*: ", "", error.thing)
-        words = {"did_you_mean": error.did_you_mean, "next_step": error.next_step}
-        return type(error)(f"template {self.name}: {thing}", error.rule, **words)
 
 
 def load_template(name: str) -> DeckTemplate:

@@ -11,9 +11,8 @@ from ...foundation.deck import Deck, ParentDeck
 from ...foundation.errors import DeckError, NlsError, nearest
 from ...foundation.quantity import Quantity
 from ...foundation.text_files import write_text
-from ..core.element import Element
+from ..core.element import Element, Tie
 from ..core.part import Part
-from ..core.tie import Tie
 from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from .deck_reader import Builder

@@ -7,11 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...foundation.deck import Deck, Written
-from ...foundation.errors import DeckError, NlsError
-from ..materials.library import material
+from ...foundation.errors import ArrangementError, DeckError, NlsError, unknown_name
+from ..core.element import Tie
+from ..materials.library import Material, material
+from ..materials.loss_tangent import Relaxation
 from ..materials.material_law import MaterialLaw, law_of
 from ..materials.relaxing_rubber import relaxing_law_of
 from ..materials.specimen import Specimen, specimen
+from .named_parts import Assembly
 from .part_text import part_lines
 
 MATERIAL, USING, LOSS = FIELDS = ("material", "using", "loss_tangent")
@@ -40,7 +43,11 @@ def with_library_rubber(deck: Deck, path: str, table: Mapping[str, Any]) -> dict
         law = _law(deck, path, table)
     except NlsError as error:
         raise error.at(deck.place(f"{path}.{MATERIAL}")) from None
-    return _merged(_tables(law), own)
+    # The fields and tables of a piece of that rubber, as a deck has them, without its sizes.
+    piece = specimen(rest_length=0.01, area=1e-4, section=None, strength=law.strength, **dict(law.members))
+    tables = tomllib.loads("\n".join(part_lines("piece", piece)), parse_float=Written)["piece"]
+    known = {key: raw for key, raw in tables.items() if key not in ("component", "rest_length", "area")}
+    return _merged(known, own)
 
 
 def _law(deck: Deck, path: str, table: Mapping[str, Any]) -> MaterialLaw:
@@ -54,13 +61,6 @@ def _law(deck: Deck, path: str, table: Mapping[str, Any]) -> MaterialLaw:
         step = f'write "{_KNOWN}" for what is known of the rubber, or a number with unit "1" and source'
         raise DeckError(LOSS, rule, next_step=step)
     return relaxing_law_of(named, using=using, loss_tangent=deck.number(f"{path}.{LOSS}", table[LOSS]).number)
-
-
-def _tables(law: MaterialLaw) -> dict[str, Any]:
-    """Return the fields and tables of a piece of that rubber, as a deck has them, without its sizes."""
-    piece = specimen(rest_length=0.01, area=1e-4, section=None, strength=law.strength, **dict(law.members))
-    tables = tomllib.loads("\n".join(part_lines("piece", piece)), parse_float=Written)["piece"]
-    return {key: raw for key, raw in tables.items() if key not in ("component", "rest_length", "area")}
 
 
 def _merged(known: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
@@ -78,3 +78,67 @@ def _merged(known: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
 def takes_material(kind: type) -> bool:
     """Tell whether a component can be made of a rubber of the library."""
     return issubclass(kind, Specimen)
+
+
+def with_rubber(
+    actuator: Assembly,
+    material: Material,
+    *,
+    piece: str | None = None,
+    using: str | None = None,
+    loss_tangent: float | Relaxation | None = None,
+) -> Assembly:
+    """Return a copy whose rubber is one of the library: other laws and strength, the same sizes.
+
+    Parameters
+    ----------
+    actuator
+        With a piece of rubber.
+    material
+        Of the library, for instance ``material("Dragon_Skin_30")``.
+    piece
+        Path of the piece, for instance ``"spring.rubber"``; not needed where there is but one.
+    using
+        As for :func:`~nlsdesign.components.law_of`.
+    loss_tangent
+        If given, the rubber relaxes with it, as for :func:`~nlsdesign.components.relaxing_law_of`; what the
+        library knows of it is ``loss_of(material)``.
+
+    Raises
+    ------
+    ArrangementError
+        If the assembly has no piece of rubber, or several and none is named, or if nothing that is known of
+        the rubber gives an elastic law.
+    UnknownNameError
+        If there is no such piece.
+    ValueRangeError
+        If the loss tangent is not above 0 and at most 2.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import material
+    >>> from nlsdesign.components.assembly.deck_writer import declare
+    >>> from nlsdesign.foundation.deck import load_deck
+    >>> published = declare(load_deck("austin2015_as_printed"))
+    >>> softer = with_rubber(published, material("Dragon_Skin_30"))
+    >>> [quantity.source[:24] for name, quantity in softer.quantities().items() if name.endswith("modulus")]
+    ['fitted to Dragon_Skin_30']
+    """
+    inner = ((path, part.element if isinstance(part, Tie) else part) for path, part in actuator.walk())
+    pieces = {path: part for path, part in inner if isinstance(part, Specimen)}
+    if piece is not None and piece not in pieces:
+        raise unknown_name("piece of rubber", piece, pieces)
+    if piece is None and len(pieces) != 1:
+        raise ArrangementError(
+            f"assembly '{actuator.name}'",
+            f"has {len(pieces)} pieces of rubber" if pieces else "has no piece of rubber",
+            next_step=f"say piece='...', one of: {', '.join(pieces)}" if pieces
+            else "declare one with specimen(...)",
+        )  # fmt: skip
+    path = piece or next(iter(pieces))
+    law = (
+        law_of(material, using=using)
+        if loss_tangent is None
+        else relaxing_law_of(material, loss_tangent=loss_tangent, using=using)
+    )
+    return actuator.with_part(path, law.in_place_of(pieces[path]))

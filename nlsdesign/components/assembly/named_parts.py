@@ -9,14 +9,13 @@ from typing import Any
 from ...foundation.deck import ParentDeck
 from ...foundation.errors import ArrangementError, NlsError, unknown_name, visible
 from ...foundation.quantity import Quantity
-from ..core.element import Element, Parallel
+from ..core.element import Element, Parallel, Tie
 from ..core.part import LONGEST, Part, check_names, find, quantities, replaced, resolved, walk, with_values
-from ..core.tie import Tie
 from ..mechanics.bodies import Body, Fixed
 from ..mechanics.gear import Transmission, transmission_problems
 from ..sensing.sensors import Sensor
+from .circuit import draw
 from .circuit_picture import NotebookCircuits
-from .circuit_text import draw
 from .sensor_chains import chain_problems, sensors_behind
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from ...foundation.errors import ArrangementError, NlsError, unknown_name
-from ..core.element import Element
+from ..core.element import Element, Tie
 from ..core.part import Part, walk
-from ..core.tie import Tie
 from ..mechanics.bodies import Body
 from ..sensing.sensors import Sensor
 

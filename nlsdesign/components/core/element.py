@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol, Self, TypeAlias
 
 from ...foundation.errors import ArrangementError
+from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
 from .domain import MATERIAL as MATERIAL
 from .domain import ROTATION as ROTATION
@@ -280,3 +281,91 @@ def parallel(**members: Element) -> Parallel:
         Elements by name.
     """
     return Parallel(members=tuple(members.items()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tie(Part):
+    """An element between two bodies; its motion is that of the first minus that of the second.
+
+    Parameters
+    ----------
+    element
+        What relates motion and effort.
+    between
+        Names of the two bodies; one name means: against the resting frame.
+
+    Raises
+    ------
+    ArrangementError
+        If what is tied is no element, or there are not one or two ends.
+    """
+
+    element: Element
+    between: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.element, Element):
+            raise ArrangementError("tie", f"holds an element, not a {type(self.element).__name__}")
+        if not 1 <= len(self.between) <= 2:
+            raise ArrangementError(
+                "tie", f"has {len(self.between)} ends; an element has two", next_step="name one or two bodies"
+            )
+
+    def children(self) -> Mapping[str, Part]:
+        """Return the parts of the element: the tie adds no level to the names."""
+        return self.element.children()
+
+    def with_children(self, children: Mapping[str, Part]) -> Self:
+        """Return a copy with other parts in the element."""
+        return replace(self, element=self.element.with_children(children))
+
+    def around(self, part: Part) -> Self:
+        """Return a copy around another element.
+
+        Parameters
+        ----------
+        part
+            The element.
+
+        Raises
+        ------
+        ArrangementError
+            If the part is not an element.
+        """
+        # The kind is checked where the copy is made.
+        return replace(self, element=part)  # type: ignore[arg-type]
+
+    def parameters(self) -> dict[str, Quantity]:
+        """Return the numbers of the element."""
+        return self.element.parameters()
+
+
+def tie(element: Element, *between: str) -> Tie:
+    """Tie an element between two bodies, or between one body and the resting frame.
+
+    Parameters
+    ----------
+    element
+        For instance a spring.
+    *between
+        One or two names of bodies.
+    """
+    return Tie(element=element, between=between)
+
+
+def delayed(scope: Scope, value: Expression, unit: str) -> Expression:
+    """Return a value as it was a time τ ago, in (2,2) Padé approximation, C∞.
+
+    e^(−sτ) ≈ (1 − sτ/2 + s²τ²/12)/(1 + sτ/2 + s²τ²/12). The gain is 1 at every frequency, the phase error
+    lies below (ωτ)⁵/720: 4e-5 rad at ωτ = 0.5. The states are a, which rests at the value, and b = τ·ȧ; the
+    delayed value is v − b. Source: Golub and Van Loan 2013 (Padé table of the exponential).
+
+    ``scope``: of a part with a number ``delay`` in s; takes the states ``lag`` and ``lag_change``.
+    """
+    tau = scope.parameter("delay")
+    lag = scope.state("lag", unit, f"lagging value inside the delay of {scope.path}")
+    change = scope.state("lag_change", unit, f"its change over one delay, in {scope.path}")
+    scope.derive(lag, change / tau)
+    scope.derive(change, (12 * (value - lag) - 6 * change) / tau)
+    return value - change

@@ -243,16 +243,12 @@ def resolved(
     """
     changed: dict[str, Quantity] = {}
     for name, value in values.items():
-        row, index = _row_item(name)
+        item = re.fullmatch(r"(.+)\[(\d+)\]", name)
+        row, index = (item[1], int(item[2])) if item else (name, None)
         if row not in known:
             raise unknown_name("parameter", name, known)
         changed[row] = _changed(name, changed.get(row, known[row]), value, index)
     return changed
-
-
-def _row_item(name: str) -> tuple[str, int | None]:
-    item = re.fullmatch(r"(.+)\[(\d+)\]", name)
-    return (item[1], int(item[2])) if item else (name, None)
 
 
 def _changed(

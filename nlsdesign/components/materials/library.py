@@ -209,7 +209,8 @@ def _property(deck: Deck, owner: str, name: str, raw: Mapping[str, Any]) -> Prop
             deck.place(f"{full}.evidence"), f"'{evidence}' is not a grade of evidence",
             did_you_mean=nearest(evidence, EVIDENCE), next_step=f"use one of: {', '.join(EVIDENCE)}",
         )  # fmt: skip
-    if evidence == "range" and not _ascending_pair(quantity):
+    ascending_pair = len(quantity.values) == 2 and quantity.values[0] < quantity.values[1]
+    if evidence == "range" and not ascending_pair:
         raise DeckError(deck.place(f"{full}.value"), "a range is two ascending numbers")
     conditions = dict(_conditions(deck, full, raw, quantity))
     return Property(name, _text(deck, full, raw, "measures"), quantity, evidence, conditions)
@@ -240,7 +241,3 @@ def _text(deck: Deck, full: str, table: Mapping[str, Any], key: str) -> str:
     if not isinstance(table.get(key), str):
         raise DeckError(deck.place(full), f"has no text '{key}'", next_step=f'add {key} = "..."')
     return str(table[key])
-
-
-def _ascending_pair(quantity: Quantity) -> bool:
-    return len(quantity.values) == 2 and quantity.values[0] < quantity.values[1]

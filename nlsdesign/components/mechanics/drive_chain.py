@@ -10,9 +10,8 @@ import casadi as ca
 
 from ...foundation.quantity import Quantity, same_dimension
 from ...foundation.symbolic import Expression
-from ..core.delay import delayed
 from ..core.domain import Domain
-from ..core.element import Scope
+from ..core.element import Scope, delayed
 from ..core.part import Part
 from ..core.part_numbers import parameter
 
@@ -76,7 +75,7 @@ class DriveDelay(DrivePart):
     """An effort that follows the command by a transport delay τ: u'(t) = u(t − τ).
 
     Before a controller its goal comes late. In (2,2) Padé approximation, see
-    :func:`~nlsdesign.components.core.delay.delayed`. Source: Golub and Van Loan 2013 (Padé table of the
+    :func:`~nlsdesign.components.core.element.delayed`. Source: Golub and Van Loan 2013 (Padé table of the
     exponential).
 
     Examples

@@ -12,9 +12,8 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
-from ..core.delay import delayed
 from ..core.domain import ROTATION, TRANSLATION, Domain
-from ..core.element import Scope
+from ..core.element import Scope, delayed
 from ..core.part_numbers import one_of, parameter
 from .sensors import Numbers, Sensor
 
@@ -23,7 +22,7 @@ from .sensors import Numbers, Sensor
 class TransportDelay(Sensor):
     """A bus or a filter chip that passes on everything τ later: reading(t) = value(t − τ).
 
-    In the flat model as its (2,2) Padé approximation, see :func:`~nlsdesign.components.core.delay.delayed`.
+    In the flat model as its (2,2) Padé approximation, see :func:`~nlsdesign.components.core.element.delayed`.
     In records the delay is exact, by lines between samples; before the first sample the value stood still.
     Source: Golub and Van Loan 2013 (Padé table of the exponential).
 

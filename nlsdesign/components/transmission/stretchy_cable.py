@@ -64,7 +64,7 @@ class StretchyCable(Combination):
 
 def newton_root(residual: Expression, unknown: Expression, start: Expression) -> Expression:
     """Return the root of a rising, piecewise smooth expression after a fixed number of Newton steps."""
-    others = _others(residual, unknown)
+    others = [s for s in ca.symvar(residual) if not ca.is_equal(s, unknown)]
     newton = ca.Function("newton", [unknown, *others], [unknown - residual / ca.jacobian(residual, unknown)])
     for _ in range(_STEPS):
         start = newton(start, *others)
@@ -79,7 +79,3 @@ def _check_pulled(cable: Combination) -> None:
                 f"{kind} member '{name}'", "its force depends directly on the rate",
                 next_step="use series(cable=Spring(...), ...) inside pull_only(...) instead",
             )  # fmt: skip
-
-
-def _others(residual: Expression, unknown: Expression) -> list[Expression]:
-    return [s for s in ca.symvar(residual) if not ca.is_equal(s, unknown)]

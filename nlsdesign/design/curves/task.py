@@ -12,8 +12,8 @@ from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError, ValueRangeError, unknown_name
 from ...foundation.locations import folder
 from ...foundation.quantity import Quantity, same_dimension
-from .columns import ReadColumns, read_columns
 from .numbers import in_si
+from .target_files import read_columns
 
 _WORST_MISFIT = 0.05
 """Largest misfit of a record that passes as periodic, rms over its range; noise and rounding are below."""
@@ -251,17 +251,8 @@ def read_task(
             next_step="give one period of the motion, in the order of time",
         )  # fmt: skip
     known = None if period is None else in_si("period", period, "s", minimum=1e-3, maximum=1e5)
-    torque = table.values["torque"] * _body_mass(table, body_mass)
-    try:
-        return Task(time=time, angle=table.values["angle"], torque=torque, period=known, harmonics=harmonics)
-    except MeasurementError as error:
-        raise error.at(table.file) from None
-
-
-def _body_mass(table: ReadColumns, given: Quantity | float | None) -> float:
-    """Return by what the column of torque has to be multiplied."""
     per_mass = same_dimension(table.units["torque"], "N*m/kg")
-    if per_mass == (given is None):
+    if per_mass == (body_mass is None):
         raise ValueRangeError(
             f"{table.file}, column 'torque' in {table.units['torque']}",
             "needs a body mass" if per_mass else "is not per body mass",
@@ -269,7 +260,12 @@ def _body_mass(table: ReadColumns, given: Quantity | float | None) -> float:
             if per_mass
             else "leave out body_mass",
         )
-    return 1.0 if given is None else in_si("body_mass", given, "kg", minimum=1.0, maximum=500.0)
+    mass = 1.0 if body_mass is None else in_si("body_mass", body_mass, "kg", minimum=1.0, maximum=500.0)
+    torque = table.values["torque"] * mass
+    try:
+        return Task(time=time, angle=table.values["angle"], torque=torque, period=known, harmonics=harmonics)
+    except MeasurementError as error:
+        raise error.at(table.file) from None
 
 
 def walking_task(joint: str, *, body_mass: Quantity | float) -> Task:

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...foundation.quantity import MM, Quantity
 from ...foundation.text_files import write_text
@@ -188,7 +187,10 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
     """Return a picture at scale 1:1: both halves, the centre, the cable at rest and at the last angle."""
     reach = 1.15 * float(contour.radii.max()) * MM + 4.0
     last = float(contour.angles[-1])
-    halves = [_polygon(half) for half in contour.outlines(cable_radius=cable_radius)]
+    halves = [
+        ArcPath(half[:-1], np.zeros(len(half) - 1), closed=True)
+        for half in contour.outlines(cable_radius=cable_radius)
+    ]
     # In the frame of the cam the cable turns the other way.
     cables = []
     for angle in (0.0, last, -last):
@@ -212,7 +214,3 @@ def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
     taken = f"cable radius {cable_radius * MM:.6g} mm taken off" if cable_radius else "cable's centre line"
     lines = [f"Cam contour, {taken}; millimetres, 1:1", "no edge to be cut: without channel and run-out"]
     return contour_dxf(contour.outlines(cable_radius=cable_radius), lines=[*lines, note] if note else lines)
-
-
-def _polygon(points: Array) -> ArcPath:
-    return ArcPath(points[:-1], np.zeros(len(points) - 1), closed=True)

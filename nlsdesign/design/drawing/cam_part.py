@@ -1,7 +1,9 @@
-"""What is drawn of a cam: outlines, holes, base plate, cable, and the numbers that they were drawn from."""
+"""What is drawn of a cam, outlines, holes, cable and numbers, and the checks that it can be made."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,8 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.quantity import Quantity
-from .arc_path import ArcPath
+from ...foundation.errors import ArrangementError, ValueRangeError
+from ...foundation.quantity import MM, Quantity
+from .arc_path import ArcPath, crossing, distance_to, inside_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,3 +85,147 @@ class CamPart:
             One of ``numbers``.
         """
         return self.numbers[name].number
+
+
+_CHORD = 2e-6
+_SLACK = 3e-6
+
+
+def check_machinable(part: CamPart) -> None:
+    """Refuse a part that cannot be made as drawn."""
+    _check_plate(part)
+    _check_edges(part)
+    _check_tool(part)
+    _check_anchor(part)
+    polygons = [outline.polygon(_CHORD) for outline in part.outlines]
+    for hole in part.holes:
+        _check_hole(hole, part, polygons)
+    _check_between_holes(part)
+
+
+def _check_plate(part: CamPart) -> None:
+    if "groove_depth" not in part.numbers:
+        return
+    groove, cable = part.number("groove_depth"), 2.0 * part.number("cable_radius")
+    if groove < cable:
+        raise ValueRangeError(
+            f"groove_depth {MM * groove:.4g} mm", f"is less than the cable is thick, {MM * cable:.4g} mm",
+            next_step="mill deeper, for instance two diameters of the cable",
+        )  # fmt: skip
+    base, wall = part.number("thickness") - groove, part.number("minimum_wall")
+    if base < wall - _SLACK:
+        raise ValueRangeError(
+            f"groove_depth {MM * groove:.4g} mm",
+            f"leaves a base of {MM * base:.4g} mm, less than minimum_wall {MM * wall:.4g} mm",
+            next_step="take a thicker plate",
+        )
+
+
+def _check_edges(part: CamPart) -> None:
+    for outline in part.outlines:
+        place = crossing(outline.polygon(10 * _CHORD))
+        if place is not None:
+            x, y = MM * place
+            raise ArrangementError(
+                "edge of the cam", f"crosses itself at x = {x:.4g} mm, y = {y:.4g} mm",
+                next_step="take a smaller over_travel, lead_in, corner_radius or body_radius",
+            )  # fmt: skip
+    if len(part.outlines) == 2:
+        lower, upper = (outline.polygon(10 * _CHORD) for outline in part.outlines)
+        gap = float(distance_to(lower, upper).min())
+        if gap < 2.0 * part.number("cable_radius") - part.number("channel_width"):
+            raise ArrangementError("halves of the cam", "overlap", next_step="take a smaller over_travel")
+        # The material between channel and back, on the y axis where the channel is closest to it.
+        heights = [
+            y0 + (y1 - y0) * x0 / (x0 - x1)
+            for (x0, y0), (x1, y1) in itertools.pairwise(lower)
+            if (x0 <= 0.0) != (x1 <= 0.0)
+        ]
+        depth, wall = max(heights) - min(heights), part.number("minimum_wall")
+        if depth < wall:
+            raise ValueRangeError(
+                f"half of the cam, {MM * depth:.4g} mm between channel and back",
+                f"is thinner than minimum_wall {MM * wall:.4g} mm",
+                next_step="take a larger body_radius",
+            )
+
+
+def _check_tool(part: CamPart) -> None:
+    sharpest, tolerance = part.number("sharpest_edge"), part.number("edge_tolerance")
+    if sharpest < tolerance:
+        raise ValueRangeError(
+            f"edge under the cable, with a radius of {MM * sharpest:.3g} mm at its sharpest",
+            f"is a corner within its tolerance of {MM * tolerance:.3g} mm",
+            next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
+        )
+    tool = part.number("tool_radius")
+    inner = np.concatenate([outline.radii for outline in part.outlines])
+    # Edges are clockwise: a turn to the left is an inner corner.
+    smallest = float(np.min(inner, where=(inner > 0.0) & np.isfinite(inner), initial=math.inf))
+    if smallest < tool * (1.0 - 1e-6):
+        raise ValueRangeError(
+            f"tool_radius {MM * tool:.4g} mm",
+            f"is larger than an inner corner of the edge, {MM * smallest:.4g} mm",
+            next_step="take a smaller tool or a larger ferrule seat",
+        )
+    if "groove_depth" in part.numbers and "mouth_width" in part.numbers:
+        mouth = part.number("mouth_width")
+        if 2.0 * tool > mouth * (1.0 + 1e-6):
+            raise ValueRangeError(
+                f"tool_radius {MM * tool:.4g} mm",
+                f"does not pass the mouth of the channel, {MM * mouth:.4g} mm wide",
+                next_step="take a smaller tool, or leave groove_depth out and cut the halves through",
+            )
+
+
+def _check_anchor(part: CamPart) -> None:
+    if "anchor_distance" in part.numbers and part.reach >= part.number("anchor_distance"):
+        raise ValueRangeError(
+            f"edge of the cam, up to {MM * part.reach:.4g} mm from the axis",
+            f"reaches the anchor at {MM * part.number('anchor_distance'):.4g} mm",
+            next_step="take a smaller over_travel or corner_radius, or move the anchor out",
+        )
+
+
+def _check_hole(hole: Hole, part: CamPart, polygons: list[Array]) -> None:
+    wall = part.number("minimum_wall")
+    away = MM * math.hypot(*hole.centre)
+    what = f"{hole.name} of {MM * hole.diameter:.4g} mm at {away:.4g} mm from the axis"
+    if part.base_radius:
+        left = part.base_radius - math.hypot(*hole.centre) - hole.diameter / 2.0
+        if left < wall - _SLACK:
+            raise ValueRangeError(
+                what, f"leaves {MM * left:.4g} mm to the rim, minimum_wall is {MM * wall:.4g} mm",
+                next_step="take a smaller circle or hole",
+            )  # fmt: skip
+    if hole.base_only:
+        return
+    inside = any(inside_of(hole.centre, polygon) for polygon in polygons)
+    left = (
+        min(float(distance_to(hole.centre[None, :], polygon)[0]) for polygon in polygons)
+        - hole.diameter / 2.0
+    )
+    if not inside and not part.base_radius:
+        raise ValueRangeError(
+            what, "lies outside the material",
+            next_step="take a smaller bolt circle, or a groove_depth so that a base plate remains",
+        )  # fmt: skip
+    if left < wall - _SLACK:
+        raise ValueRangeError(
+            what,
+            f"leaves {MM * left:.4g} mm to the edge, minimum_wall is {MM * wall:.4g} mm",
+            next_step="take smaller holes, another circle, or a larger body_radius",
+        )
+
+
+def _check_between_holes(part: CamPart) -> None:
+    wall = part.number("minimum_wall")
+    for index, one in enumerate(part.holes):
+        for other in part.holes[index + 1 :]:
+            left = math.hypot(*(one.centre - other.centre)) - (one.diameter + other.diameter) / 2.0
+            if left < wall - _SLACK:
+                raise ValueRangeError(
+                    f"{one.name} and {other.name}",
+                    f"leave {MM * left:.4g} mm between them, minimum_wall is {MM * wall:.4g} mm",
+                    next_step="take fewer or smaller holes, or a larger circle",
+                )

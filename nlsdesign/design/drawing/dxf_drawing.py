@@ -51,7 +51,15 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
     for cable in part.cables:
         _add_path(document, cable, "CABLE")
     _add_axes(document, part.outermost)
-    _add_text(document, _part_lines(part, note), below=part.outermost)
+    size = {name: f"{MM * part.number(name):.4g} mm" for name in ("cable_radius", "thickness")}
+    lines = [
+        "Cam, machined edge; millimetres, 1:1",
+        f"for a cable of radius {size['cable_radius']}, plate {size['thickness']}",
+        f"arcs within {1e6 * part.number('edge_deviation'):.2g} um of the exact edge",
+    ]
+    if "groove_depth" in part.numbers:
+        lines.append(f"edges milled {MM * part.number('groove_depth'):.4g} mm deep, base disc below")
+    _add_text(document, [*lines, note] if note else lines, below=part.outermost)
     return _text(document)
 
 
@@ -67,18 +75,6 @@ def contour_dxf(outlines: tuple[Array, ...], *, lines: list[str]) -> str:
     _add_axes(document, reach)
     _add_text(document, lines, below=reach)
     return _text(document)
-
-
-def _part_lines(part: CamPart, note: str) -> list[str]:
-    size = {name: f"{MM * part.number(name):.4g} mm" for name in ("cable_radius", "thickness")}
-    lines = [
-        "Cam, machined edge; millimetres, 1:1",
-        f"for a cable of radius {size['cable_radius']}, plate {size['thickness']}",
-        f"arcs within {1e6 * part.number('edge_deviation'):.2g} um of the exact edge",
-    ]
-    if "groove_depth" in part.numbers:
-        lines.append(f"edges milled {MM * part.number('groove_depth'):.4g} mm deep, base disc below")
-    return [*lines, note] if note else lines
 
 
 def _document() -> Drawing:

@@ -14,10 +14,8 @@ from ...foundation.quantity import Quantity, quantity
 from ..curves.numbers import in_si, plain
 from ..statics.contour import Contour
 from .arc_path import ArcPath
-from .cam_outline import one_sided_outline, two_sided_outlines
-from .cam_part import CamPart, Hole
-from .lip_edge import LipEdge, lip_edge
-from .machinability import check_machinable
+from .cam_outline import LipEdge, lip_edge, one_sided_outline, two_sided_outlines
+from .cam_part import CamPart, Hole, check_machinable
 
 _CLEARANCE = quantity(0.1, "mm", source="assumed: a braided cable of this size passes a gap so much wider")
 _OVER_TRAVEL = quantity(10.0, "deg", source="assumed: room for a stop behind the last angle")
@@ -269,7 +267,9 @@ class MachinedCam(ABC):
             ]
         base = 0.0
         if self.groove_depth is not None:
-            base = self._base_radius(outlines, holes, numbers)
+            rims = [float(np.hypot(*outline.polygon().T).max()) for outline in outlines]
+            rims += [math.hypot(*hole.centre) + hole.diameter / 2 for hole in holes]
+            base = math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
             numbers["base_radius"] = _derived(base, "lips, holes and the least wall around them")
         made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), contour.points, numbers)
         numbers["reach"] = _derived(made.reach, "largest distance of an edge from the axis")
@@ -297,11 +297,6 @@ class MachinedCam(ABC):
                 f"stands out over the edge under the cable; at most {1e3 * limit:.4g} mm fits",
                 next_step="take a smaller body_radius",
             )
-
-    def _base_radius(self, outlines: list[ArcPath], holes: list[Hole], numbers: dict[str, Quantity]) -> float:
-        rims = [float(np.hypot(*outline.polygon().T).max()) for outline in outlines]
-        rims += [math.hypot(*hole.centre) + hole.diameter / 2 for hole in holes]
-        return math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
 
     def _thickness(self) -> Quantity:
         """Plate so thick that the cable stays on it: four diameters, with a groove as much again below."""

@@ -34,7 +34,10 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
     except ImportError:
         raise missing_library("STEP", "OCP (cadquery-ocp-novtk)", "step") from None
     shape = _solid(part)
-    _be_quiet()
+    from OCP.Message import Message, Message_Gravity
+
+    for printer in Message.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(Message_Gravity.Message_Fail)
     writer = STEPControl_Writer()
     for key, value in (("write.step.schema", "AP214IS"), ("write.step.unit", "MM"),
                        ("write.step.product.name", name)):  # fmt: skip
@@ -51,14 +54,6 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
     plain = _PRODUCT.sub(f"PRODUCT('{name}','{name}'", plain)
     number = itertools.count(1)
     return _USE.sub(lambda _: f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{next(number)}'", plain)
-
-
-def _be_quiet() -> None:
-    """Keep Open CASCADE from printing its statistics."""
-    from OCP.Message import Message, Message_Gravity
-
-    for printer in Message.DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(Message_Gravity.Message_Fail)
 
 
 def _solid(part: CamPart) -> Any:

@@ -48,7 +48,7 @@ def page(reach: float, body: list[str], *, lines: list[str]) -> str:
     ``reach``: half the width of the drawing in mm. ``body``: elements in mm with y upwards. ``lines``: text
     below the drawing; the first is the title too.
     """
-    lines = [_escaped(line) for line in lines if line]
+    lines = [line.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;") for line in lines if line]
     longest = max(len(line) for line in lines)
     size = min(_TEXT, 2.0 * reach / (0.56 * longest))
     below = (len(lines) + 0.5) * 1.5 * size
@@ -93,7 +93,3 @@ def path_data(path: ArcPath) -> str:
 
 def _circle(x: float, y: float, radius: float, look: str) -> str:
     return f'<circle cx="{MM * x:.5f}" cy="{MM * y:.5f}" r="{MM * radius:.5f}" {look}/>'
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

@@ -21,8 +21,7 @@ from ..curves.target import Target
 from ..curves.target_files import read_band, read_target
 from ..curves.task_curve import TaskGoal
 from ..optimisation.goals import Goal
-from ..optimisation.limits import Limit
-from ..optimisation.limits_of_use import TorqueWithin
+from ..optimisation.limits import Limit, TorqueWithin
 from ..optimisation.settings import DesignSettings
 from ..optimisation.solve import GOALS
 from ..optimisation.stock import RubberStock, Stock, StockChoice
@@ -157,6 +156,17 @@ def job_in(deck: Deck) -> DesignJob:
     free = _names(deck, "free")
     target, band = _target(deck)
     stock = tuple(_stock(deck, "stock", _table(deck, "stock")))
+    table = _table(deck, "search")
+    values: dict[str, Any] = {}
+    for name, raw in table.items():
+        place = deck.place(f"search.{name}")
+        if name not in _SEARCH:
+            raise unknown_name(place, name, _SEARCH)
+        given = _number(raw, place).number if isinstance(raw, str) else _plain(raw, place)
+        if name != "largest_error" and given != int(given):
+            raise DeckError(place, f"{brief(raw)} is not a whole number")
+        values[name] = float(given) if name == "largest_error" else int(given)
+    values["draws"] = _draws(deck)
     return DesignJob(
         path=file,
         target=target,
@@ -164,7 +174,7 @@ def job_in(deck: Deck) -> DesignJob:
         keep=(*_objects(deck, "limits", Limit), *band),  # type: ignore[type-abstract]
         goals=tuple(_objects(deck, "goals", Goal)) or GOALS,  # type: ignore[type-abstract]
         spring=None if "spring" not in deck.tables else str(deck.tables["spring"]),
-        settings=_settings(deck),
+        settings=_placed(lambda: DesignSettings(**values), deck.place("search")),
         drawing=_table(deck, "drawing"),
         deck=deck,
     )
@@ -332,21 +342,6 @@ def _stock(deck: Deck, key: str, table: Mapping[str, Any]) -> Iterator[StockChoi
             continue
         values = tuple(_number(v, place) if isinstance(v, str) else _plain(v, place) for v in given)
         yield _placed(lambda name=name, values=values: Stock(name, values), place)  # type: ignore[misc]
-
-
-def _settings(deck: Deck) -> DesignSettings:
-    table = _table(deck, "search")
-    values: dict[str, Any] = {}
-    for name, raw in table.items():
-        place = deck.place(f"search.{name}")
-        if name not in _SEARCH:
-            raise unknown_name(place, name, _SEARCH)
-        given = _number(raw, place).number if isinstance(raw, str) else _plain(raw, place)
-        if name != "largest_error" and given != int(given):
-            raise DeckError(place, f"{brief(raw)} is not a whole number")
-        values[name] = float(given) if name == "largest_error" else int(given)
-    values["draws"] = _draws(deck)
-    return _placed(lambda: DesignSettings(**values), deck.place("search"))
 
 
 def _draws(deck: Deck) -> int:

@@ -15,8 +15,7 @@ from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ...model.structure import CamNames
 from ..curves.target import Target
-from ..statics.equilibrium import ElasticLaw
-from ..statics.relaxing_law import RelaxingLaw, relaxing_law
+from ..statics.equilibrium import ElasticLaw, RelaxingLaw, relaxing_law
 
 
 def anchor_of(cam: CamNames) -> str:

@@ -14,14 +14,13 @@ from ...foundation.errors import ValueRangeError
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ..curves.target import Target
-from ..statics.equilibrium import elastic_law
-from ..statics.rounding import has_corners
+from ..statics.equilibrium import elastic_law, has_corners
 from .goals import Goal
 from .limits import Bound, Limit
 from .problem import DesignProblem, design_problem, movable_numbers
 from .program import Program, Rows, Solution
 from .settings import DesignSettings
-from .starts import starts
+from .shape import starts
 
 _ROUNDING = 0.003
 """Width over which the knots of a rubber's law are rounded at first, relative to its stretch."""

@@ -16,19 +16,18 @@ from ...foundation.errors import NlsError
 from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.origin import derived
+from ..curves.target import Target
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam
-from ..statics.equilibrium import cam_function
-from ..statics.smooth_cables import with_smooth_cables
+from ..statics.equilibrium import cam_function, torque_function, with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
-from .checks import torque_check
+from .conflict import Remedies, find_remedies
 from .defaults import safe_limits
 from .design_search import Search, carried_over
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Solution
-from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
 from .size_ranges import size_ranges
 
@@ -139,7 +138,8 @@ class SolvedSearch:
     @cached_property
     def check(self) -> TorqueCheck:
         """Its torque against the target."""
-        spring = _spring_of(self.model, self.search.problem.law.cam.name)
+        cam = self.search.problem.law.cam.name
+        spring = next(each.name for each in self.model.springs for inside in each.cams if inside.name == cam)
         return torque_check(self.model, target=self.search.problem.design.target, spring=spring)
 
 
@@ -169,6 +169,16 @@ def finished(solved: SolvedSearch) -> CamDesign:
     settings, design = search.question.settings, problem.design
     limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
     tolerance, remarks = _tolerance(solved)
+    cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
+    sentences = []
+    if "MaximumCableTension" not in kinds:
+        sentences.append(
+            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
+        )
+    if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
+        sentences.append(
+            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
+        )
     return CamDesign(
         target=design.target,
         changes=tuple(solved.changes.items()),
@@ -189,7 +199,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         if settings.look_for_size_ranges
         else (),
         miss=_miss(solved, limits),
-        remarks=(*_remarks(search), *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
+        remarks=(*sentences, *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
         drive=problem.law.cam.drive,
     )
 
@@ -308,20 +318,6 @@ def _blocks(solved: SolvedSearch) -> Iterator[str]:
             )
 
 
-def _remarks(search: Search) -> tuple[str, ...]:
-    cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
-    sentences = []
-    if "MaximumCableTension" not in kinds:
-        sentences.append(
-            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
-        )
-    if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
-        sentences.append(
-            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
-        )
-    return tuple(sentences)
-
-
 def _curves(problem: DesignProblem, point: Array) -> DesignCurves:
     design = problem.design
     columns = [
@@ -351,10 +347,6 @@ def _upper(search: Search, name: str) -> Iterator[Bound]:
     variable = search.question.model.variable(name)
     yield Bound("", name, ca.SX(0), variable.maximum, True, variable.unit, 1.0)
     yield from (each for each in search.bounds if each.upper and each.of in (name, "pretension"))
-
-
-def _spring_of(model: FlatModel, cam: str) -> str:
-    return next(each.name for each in model.springs for inside in each.cams if inside.name == cam)
 
 
 def _designed(old: Quantity, value: float, source: str) -> Quantity:
@@ -390,3 +382,17 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
     return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active)
+
+
+_ANGLES = 801
+
+
+def torque_check(model: FlatModel, *, target: Target, spring: str | None = None) -> TorqueCheck:
+    """Return the equilibrium torque of a model against a target.
+
+    ``spring``: path of the spring; decided from the structure if it is left out.
+    """
+    angles = np.linspace(0.0, target.last_angle, _ANGLES)
+    torque = torque_function(model, spring)(angles.reshape(1, -1), model.start(model.parameters))
+    values = np.array(torque, dtype=float).ravel()
+    return TorqueCheck(angles, values, target.torque(angles), target.weight(angles))

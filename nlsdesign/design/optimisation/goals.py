@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 
+from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
+from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint
+from .steady_cycle import steady_cycle
 
 _LENGTH = 0.01
 """Typical radius of curvature in m; it only scales the roughness."""
@@ -117,3 +122,218 @@ class LeastRubber(Goal):
 def rms_of_mean_square(what: str, mean_square: Expression, design: DesignPoint) -> GoalMeasure:
     """Return a mean square torque as its root, smooth where it vanishes."""
     return GoalMeasure(what, ca.sqrt(mean_square + (_FLOOR * design.target.largest) ** 2), "mN*m")
+
+
+_RADIUS = 0.01
+"""Radius in m whose cost is the weight."""
+_MASS = 0.1
+"""Mass in kg whose cost is the weight."""
+_POWER = 32
+"""Of the mean that stands for the largest radius; it is at most 12 % above the largest of 41 equal ones."""
+
+
+def _store(goal: Goal, name: str, unit: str, minimum: float, maximum: float) -> None:
+    given = getattr(goal, name)
+    value = in_si(f"{type(goal).__name__}: {name}", given, unit, minimum=minimum, maximum=maximum)
+    object.__setattr__(goal, name, value)
+
+
+@dataclass(frozen=True)
+class LeastSize(Goal):
+    """Radius of the cam: the largest distance of its contour from the centre.
+
+    Parameters
+    ----------
+    weight
+        Cost of a radius of 10 mm.
+    """
+
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        _store(self, "weight", "1", 0.0, 1e9)
+
+    def cost(self, design: DesignPoint) -> Expression:
+        """Return weight · radius / 10 mm; a power mean of the nodes stands for the largest of them."""
+        return self.weight * ca.sum1((design.radii / _RADIUS) ** _POWER) ** (1.0 / _POWER)
+
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the distances of the contour from the centre."""
+        return GoalMeasure("cam radius", design.radii, "mm")
+
+
+@dataclass(frozen=True)
+class LeastMass(Goal):
+    """Mass of the rubber and of the plates from which the cam is cut, the parts that a design changes.
+
+    A cam through whose centre the cable passes has two equal halves. Each plate is the sector that the
+    contour encloses with the centre, ½∫p·ρ dφ, without hub and run-out.
+    Source: geometry.
+
+    Parameters
+    ----------
+    rubber_density
+        Mass of the rubber per volume, in kg/m³.
+    plate_thickness
+        Thickness of the plates of the cam, in m.
+    plate_density
+        Mass of the plates per volume, in kg/m³.
+    weight
+        Cost of 100 g.
+    """
+
+    rubber_density: Quantity | float
+    plate_thickness: Quantity | float
+    plate_density: Quantity | float
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        _store(self, "rubber_density", "kg/m^3", 100.0, 5e3)
+        _store(self, "plate_thickness", "m", 1e-5, 0.2)
+        _store(self, "plate_density", "kg/m^3", 100.0, 3e4)
+        _store(self, "weight", "1", 0.0, 1e9)
+
+    def cost(self, design: DesignPoint) -> Expression:
+        """Return weight · mass / 100 g."""
+        return self.weight * self.measured(design).expression / _MASS
+
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the mass."""
+        # The area of the sectors below the contour, with p and ρ linear between nodes.
+        p, rho, phi = design.lever_arms, design.radii_of_curvature, design.directions
+        steps = phi[1:] - phi[:-1]
+        middle = (p[1:] + p[:-1]) * (rho[1:] + rho[:-1])
+        products = (p[1:] * rho[1:] + p[:-1] * rho[:-1] + middle) / 6.0
+        halves = 2.0 if design.through_centre else 1.0
+        area = halves * ca.dot(products, steps) / 2.0
+        plates = plain(self.plate_density) * plain(self.plate_thickness) * area
+        return GoalMeasure("mass", plain(self.rubber_density) * design.rubber_volume + plates, "g")
+
+
+@dataclass(frozen=True)
+class InsensitiveStiffness(Goal):
+    """Torque error that a deviation of the rubber's stiffness leaves when the pretension is set by its force.
+
+    All moduli deviate by one factor. If the pretension stays as a length, the torque deviates by that factor
+    whatever the design. If after assembly it is trimmed until the force at angle zero is the designed one
+    again, the force at extension e deviates per factor by F(e) − F₀·K(e)/K₀, so that a design which carries
+    its torque by pretension notices the deviation less. Johnston, Orekhov and Simaan 2023 have insensitivity
+    to the spring constant as a goal for wire-wrapped cams; this definition is not taken from there, as only
+    their abstract was at hand.
+
+    Parameters
+    ----------
+    deviation
+        Relative deviation of the stiffness; its rms torque error counts as one of :class:`TorqueError` does.
+    """
+
+    deviation: float = 0.1
+
+    def __post_init__(self) -> None:
+        _store(self, "deviation", "1", 1e-6, 1.0)
+
+    def cost(self, design: DesignPoint) -> Expression:
+        """Return (rms error by the deviation / 0.1 % of the largest torque)²."""
+        return self._mean_square(design) / (1e-3 * design.target.largest) ** 2
+
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the rms torque error by the deviation."""
+        return rms_of_mean_square("rms torque error by stiffness", self._mean_square(design), design)
+
+    def _mean_square(self, design: DesignPoint) -> Expression:
+        force, stiffness = design.forces, design.stiffnesses
+        per_factor = force - stiffness * force[0] / stiffness[0]
+        squared = (self.deviation * design.elements * design.lever_arms * per_factor) ** 2
+        steps = design.angles[1:] - design.angles[:-1]
+        return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / design.target.last_angle
+
+
+def _frequency(goal: str, given: Quantity | float) -> float:
+    return in_si(f"{goal}: frequency", given, "Hz", minimum=1e-6, maximum=1e4)
+
+
+def _amplitude(goal: str, given: Quantity | float | None) -> float | None:
+    return None if given is None else in_si(f"{goal}: amplitude", given, "rad", minimum=1e-3, maximum=6.3)
+
+
+@dataclass(frozen=True)
+class EnergyLost(Goal):
+    """Energy lost in a steady cycle, relative to the energy stored up to its amplitude in equilibrium.
+
+    Both count each time the rubber is stretched: twice a cycle where the cable passes through the centre.
+
+    Parameters
+    ----------
+    frequency
+        Frequency of the cam angle, which turns as a sine, in Hz.
+    amplitude
+        Largest angle in rad; the last angle of the target if it is left out.
+    weight
+        Cost of losing 1 %.
+    """
+
+    frequency: Quantity | float
+    amplitude: Quantity | float | None = None
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        object.__setattr__(self, "frequency", _frequency(name, self.frequency))
+        object.__setattr__(self, "amplitude", _amplitude(name, self.amplitude))
+        in_si(f"{name}: weight", self.weight, "1", maximum=1e9)
+
+    def cost(self, design: DesignPoint) -> Expression:
+        """Return weight · lost / stored / 1 %."""
+        return self.weight * self.measured(design).expression / 0.01
+
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the share of the stored energy that is lost."""
+        amplitude = None if self.amplitude is None else plain(self.amplitude)
+        cycle = steady_cycle(design, plain(self.frequency), amplitude)
+        return GoalMeasure("energy lost per cycle", cycle.lost / cycle.stored, "%")
+
+
+@dataclass(frozen=True)
+class BothStrokes(Goal):
+    """Mean square torque error against the target over the angle, both strokes and a band of frequencies.
+
+    At a frequency of zero this is the goal :class:`TorqueError`.
+
+    Parameters
+    ----------
+    frequencies
+        Frequencies of the cam angle, which turns as a sine, in Hz; all count alike.
+    amplitude
+        Largest angle in rad; the last angle of the target if it is left out.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is no frequency, or a number lies outside its range.
+    """
+
+    frequencies: Sequence[Quantity | float]
+    amplitude: Quantity | float | None = None
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        if isinstance(self.frequencies, Quantity | float | int) or not len(self.frequencies):
+            raise ValueRangeError(
+                f"{name}: frequencies = {self.frequencies}", "must be a row of at least one frequency",
+                next_step="write for instance BothStrokes((1.0, 5.0))",
+            )  # fmt: skip
+        object.__setattr__(self, "frequencies", tuple(_frequency(name, f) for f in self.frequencies))
+        object.__setattr__(self, "amplitude", _amplitude(name, self.amplitude))
+
+    def cost(self, design: DesignPoint) -> Expression:
+        """Return (rms error / 0.1 % of the largest torque)²."""
+        return self._mean_square(design) / (1e-3 * design.target.largest) ** 2
+
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the rms error."""
+        return rms_of_mean_square("rms torque error on both strokes", self._mean_square(design), design)
+
+    def _mean_square(self, design: DesignPoint) -> Expression:
+        amplitude = None if self.amplitude is None else plain(self.amplitude)
+        cycles = [steady_cycle(design, plain(f), amplitude) for f in self.frequencies]
+        return sum((cycle.mean_square_error for cycle in cycles), start=Expression(0)) / len(cycles)

@@ -1,39 +1,179 @@
-"""What one goal costs in terms of another: the front of two or three goals.
-
-Each goal is first met alone. Between the best and the worst value that it has in these designs each goal
-but the first then gets a ladder of bounds, and for every combination of bounds the first goal is met as well
-as it can be (ε-constraint). A point starts from its nearest neighbour; one that failed, or that another point
-betters within its own bounds, is solved again from there.
-Source: Haimes et al. 1971 (ε-constraint).
-"""
+"""The front of two or three goals: how it is searched, and what it is as data."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
+from ...foundation.data_frames import Axis, data_frame
 from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...foundation.processes import parallel_map
-from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.quantity import parse_unit, typeset_unit, with_unit
+from ...foundation.text_files import write_table
 from ..curves.target import Target
 from .conflict import feasible_point
 from .design_search import Search
-from .finish import SolvedSearch, limit_state
-from .front import FrontPoint, LeftOut, ParetoFront
+from .finish import SolvedSearch, finished, limit_state
 from .goals import Goal, GoalMeasure, SmoothContour
 from .limits import Limit, MaximumTorqueError
 from .program import Program, Rows, Solution
+from .result import CamDesign
 from .settings import DesignSettings
+from .shape import starts
 from .solve import USUAL, Wanted
-from .starts import starts
+
+_SHOWN_IN = {"m": "mm", "m^2": "mm^2"}
+
+
+class FrontPoint(NamedTuple):
+    """One design of a front.
+
+    Parameters
+    ----------
+    values
+        The goals, in SI.
+    numbers
+        Free numbers in SI by full name, besides the contour.
+    units
+        SI units of these.
+    binding
+        Names of the limits on which the design sits.
+    """
+
+    values: tuple[float, ...]
+    numbers: tuple[tuple[str, float], ...]
+    units: tuple[str, ...]
+    binding: tuple[str, ...]
+
+
+class LeftOut(NamedTuple):
+    """Bounds for which the front has no point, in words, and why."""
+
+    bounds: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.bounds}: {self.reason}"
+
+
+@dataclass(frozen=True, eq=False)
+class ParetoFront:
+    """Designs that no other design betters in all goals, in ascending order of the first.
+
+    Parameters
+    ----------
+    target
+        Torque curve.
+    goals
+        What they are about, in words.
+    units
+        In which they are shown.
+    points
+        The designs.
+    left_out
+        What the solver did not find, or another point betters.
+    sources
+        What whole designs are made from.
+    """
+
+    target: Target
+    goals: tuple[str, ...]
+    units: tuple[str, ...]
+    points: tuple[FrontPoint, ...]
+    left_out: tuple[LeftOut, ...]
+    sources: tuple[SolvedSearch, ...] = field(repr=False)
+
+    @property
+    def values(self) -> Array:
+        """The goals in SI, shape (points, goals)."""
+        return np.array([point.values for point in self.points])
+
+    @property
+    def shown(self) -> Array:
+        """The goals in the units in which they are shown, shape (points, goals)."""
+        factors = np.array([parse_unit(unit).factor for unit in self.units])
+        result: Array = self.values / factors
+        return result
+
+    def design(self, number: int) -> CamDesign:
+        """Return one point as a whole design, measured on an assembly flattened anew.
+
+        Parameters
+        ----------
+        number
+            Of the point, from zero.
+
+        Raises
+        ------
+        ValueRangeError
+            If there is no such point.
+        """
+        if not 0 <= number < len(self.points):
+            raise ValueRangeError(
+                f"point {number}", f"the front has points 0 to {len(self.points) - 1}",
+                next_step="print the front for its table",
+            )  # fmt: skip
+        return finished(self.sources[number])
+
+    def write_csv(self, path: Path) -> None:
+        """Write one row for each point: goals, free numbers, binding limits.
+
+        Parameters
+        ----------
+        path
+            File; its folder is made if needed.
+
+        Raises
+        ------
+        ExportError
+            If the file cannot be written.
+        """
+        first = self.points[0]
+        units = [_SHOWN_IN.get(unit, unit) for unit in first.units]
+        head = [f"{goal} [{unit}]" for goal, unit in zip(self.goals, self.units, strict=True)]
+        head += [f"{name} [{unit}]" for (name, _), unit in zip(first.numbers, units, strict=True)]
+        rows = []
+        for point, shown in zip(self.points, self.shown, strict=True):
+            numbers = [v / parse_unit(u).factor for (_, v), u in zip(point.numbers, units, strict=True)]
+            row = [f"{value:.9g}" for value in (*shown, *numbers)]
+            rows.append([*row, "; ".join(point.binding)])
+        head.append("binding limits")
+        write_table(path, [head, *rows])
+
+    def to_frame(self) -> Any:
+        """Return a ``pandas.DataFrame``, one row for each point, units in its ``attrs``; needs pandas.
+
+        Goals are in the units in which they are shown, free numbers in SI.
+        """
+        columns: dict[str, Any] = {goal: self.shown[:, k] for k, goal in enumerate(self.goals)}
+        units = dict(zip(self.goals, self.units, strict=True))
+        first = self.points[0]
+        for k, (name, _) in enumerate(first.numbers):
+            columns[name] = [point.numbers[k][1] for point in self.points]
+        columns["binding limits"] = ["; ".join(point.binding) for point in self.points]
+        numbers = {name: unit for (name, _), unit in zip(first.numbers, first.units, strict=True)}
+        return data_frame(columns, units=units | numbers, index=Axis("point", "", range(len(self.points))))
+
+    def __str__(self) -> str:
+        heads = [
+            f"{goal} in {typeset_unit(unit) or '1'}"
+            for goal, unit in zip(self.goals, self.units, strict=True)
+        ]
+        lines = [" | ".join(["point", *heads, "binding limits"])]
+        for number, (point, shown) in enumerate(zip(self.points, self.shown, strict=True)):
+            cells = [f"{value:.4g}".rjust(len(head)) for value, head in zip(shown, heads, strict=True)]
+            lines.append(" | ".join([f"{number:5d}", *cells, ", ".join(point.binding) or "none"]))
+        return "\n".join([*lines, *(f"left out: {each}" for each in self.left_out)])
+
 
 _UNBOUNDED = 1e6
 """Bound, relative to the scale of a goal, that never binds."""
@@ -205,21 +345,18 @@ class _Ladder:
             for each in parallel_map(tried, len(begin)):
                 outcomes.append(each)
                 self.search.question.settings.progress()
-            reached.append(self._best(goal, outcomes))
+            solved = [each for each in outcomes if each.outcome.solved]
+            if not solved:
+                start = feasible_point(self.search, self.free)
+                solved = [self._solved(start, goal, [np.inf] * (len(self.goals) - 1))]
+            if not solved[-1].outcome.solved:
+                raise ConvergenceError(
+                    f"pareto: {type(self.goals[goal]).__name__} alone",
+                    f"IPOPT stopped with '{solved[-1].outcome.status}'",
+                    next_step="free one number more, or bound the sizes, for instance with RestLengthRange",
+                )
+            reached.append(min(solved, key=lambda each: each.outcome.cost))
         return reached
-
-    def _best(self, goal: int, outcomes: Sequence[_Tried]) -> _Tried:
-        solved = [each for each in outcomes if each.outcome.solved]
-        if not solved:
-            start = feasible_point(self.search, self.free)
-            solved = [self._solved(start, goal, [np.inf] * (len(self.goals) - 1))]
-        if not solved[-1].outcome.solved:
-            raise ConvergenceError(
-                f"pareto: {type(self.goals[goal]).__name__} alone",
-                f"IPOPT stopped with '{solved[-1].outcome.status}'",
-                next_step="free one number more, or bound the sizes, for instance with RestLengthRange",
-            )
-        return min(solved, key=lambda each: each.outcome.cost)
 
     def between(self, ends: list[_Tried], lowest: Array, highest: Array, points: int) -> list[_Tried]:
         """Return the best of the first goal for each combination of bounds on the others."""

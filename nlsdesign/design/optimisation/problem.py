@@ -20,10 +20,8 @@ from ..statics.declared_cam import declared_cam
 from ..statics.energy import closed_form
 from ..statics.equilibrium import ElasticLaw, elastic_law
 from .design_point import DesignPoint, Stretched
-from .program import Rows
-from .shape import ContourVariables, Shape, given, parallel, through_centre
-from .starts import Start, StartSizes, start_values
-from .variables import DesignVariable, scalar
+from .program import DesignVariable, Rows, scalar
+from .shape import ContourVariables, Shape, Start, StartSizes, given, parallel, start_values, through_centre
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""

@@ -17,7 +17,7 @@ from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from ..tolerance.tolerance_result import ToleranceResult
-from .remedies import Remedies
+from .conflict import Remedies
 from .size_ranges import SizeRange
 
 
@@ -372,7 +372,10 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     if design.miss is not None:
         rows += [("what would help", sentence) for sentence in design.miss.advice]
     rows += [("target", f"{type(target).__name__}, {target.largest:.4g} N·m at {end}")]
-    rows += [(name, _brief(value)) for name, value in design.changes]
+    rows += [
+        (name, str(value) if len(value.values) <= 4 else f"<{len(value.values)} control values>")
+        for name, value in design.changes
+    ]
     rows += [
         (
             "torque error",
@@ -438,10 +441,6 @@ def _alternative(design: CamDesign, each: Alternative) -> str:
 
 def _cost(outcome: StartOutcome) -> float:
     return outcome.cost
-
-
-def _brief(value: Quantity) -> str:
-    return str(value) if len(value.values) <= 4 else f"<{len(value.values)} control values>"
 
 
 def _read(torque: float) -> str:

@@ -13,8 +13,7 @@ from ...foundation.processes import parallel_map
 from ...foundation.quantity import parse_unit, with_unit
 from .design_search import Search, row_of
 from .limits import MaximumTorqueError
-from .program import Program, Solution
-from .variables import scaled
+from .program import Program, Solution, scaled
 
 _SMALL = 1e-3
 """Rms error, relative to the largest torque, that counts as nothing."""

@@ -13,7 +13,7 @@ from ...model.origin import derived
 from ...model.roles import series_cam
 from ..curves.target import Target
 from ..statics.declared_cam import with_contour
-from ..statics.smooth_cables import with_smooth_cables
+from ..statics.equilibrium import with_smooth_cables
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
 from .design_search import Question

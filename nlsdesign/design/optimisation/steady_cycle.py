@@ -20,7 +20,7 @@ import numpy as np
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import with_unit
 from ...foundation.symbolic import Expression, depends
-from ..statics.relaxing_law import RelaxingLaw
+from ..statics.equilibrium import RelaxingLaw
 from .design_point import DesignPoint
 
 _ROUNDED = 1e-4

@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from ...components.assembly.library_rubber import with_rubber
 from ...components.assembly.named_parts import Assembly
-from ...components.assembly.other_rubber import with_rubber
 from ...components.materials.library import material
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity

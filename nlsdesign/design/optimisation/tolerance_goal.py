@@ -24,8 +24,15 @@ from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
 from ..curves.numbers import in_si, plain
-from ..tolerance.causes import AnchorCause, Cause, NumberCause, ProfileCause, WaveCause
-from ..tolerance.declared_spreads import SpreadRules, spring_causes
+from ..tolerance.causes import (
+    AnchorCause,
+    Cause,
+    NumberCause,
+    ProfileCause,
+    SpreadRules,
+    WaveCause,
+    spring_causes,
+)
 from .design_point import DesignPoint
 from .goals import Goal
 from .limits import Bound, Limit

@@ -14,11 +14,10 @@ from ...model.roles import series_cam
 from ...model.structure import CamNames
 from ..curves.target import TabulatedTorque
 from ..optimisation.defaults import StrainEnd, safe_limits, strain_ends
-from ..optimisation.limit_kinds import LimitKind, limit_kinds
-from ..optimisation.limits import Limit, NumberRange
+from ..optimisation.limits import Limit, LimitKind, NumberRange, limit_kinds
 from ..statics.contour import Contour
 from ..statics.declared_cam import with_contour
-from ..statics.smooth_cables import with_smooth_cables
+from ..statics.equilibrium import with_smooth_cables
 
 _GIVEN = "given by the designer"
 

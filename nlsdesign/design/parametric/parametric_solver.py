@@ -19,8 +19,7 @@ from ..optimisation.result import CamDesign, DesignCurves, LimitState
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import cam_from_profile, contour_of_cam
 from .cam_question import CamQuestion
-from .parametric_program import ParametricProgram, SearchOutcome, SearchPoint
-from .program_rows import structure_of
+from .parametric_program import ParametricProgram, SearchOutcome, SearchPoint, structure_of
 
 _MOST_PROGRAMS = 4
 """Programs that are kept; one takes about 30 MB."""

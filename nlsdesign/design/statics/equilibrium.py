@@ -1,4 +1,4 @@
-"""The elastic law of a spring with all relaxation at rest, taken from the flat model alone."""
+"""The law of a spring at rest and while it relaxes, of the flat model, sharp or with round corners."""
 
 from __future__ import annotations
 
@@ -11,15 +11,70 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...components.assembly.named_parts import Assembly
+from ...components.core.element import Element
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ConvergenceError
 from ...foundation.symbolic import Expression, depends
 from ...model import FlatModel, Variable
+from ...model.flat import Symbols
+from ...model.graph import applied, as_results, fold, read_graph
 from ...model.roles import series_cam, series_spring
-from ...model.structure import CamNames
-from .rounding import rounded
+from ...model.structure import CamNames, body_moved_by
 
 _NEWTON_STEPS = 30
+_CORNERS = (ca.OP_FMAX, ca.OP_FMIN, ca.OP_FABS)
+
+
+def has_corners(function: ca.Function) -> bool:
+    """Tell whether a function of SX contains a maximum, minimum or absolute value."""
+    return any(step.operation in _CORNERS for step in read_graph(function).steps)
+
+
+def rounded(function: ca.Function, samples: list[Array], share: float) -> ca.Function:
+    """Return a function of SX with all corners rounded: Newton's method goes in circles at a knot.
+
+    The instructions of the function are written again, with
+
+        max(a, b) = (a + b + |a − b|)/2,  min(a, b) = (a + b − |a − b|)/2,  |v| ≈ √(v² + w²),
+
+    where w is a share of the largest |v| that occurs. Everything else stays as it is.
+    ``samples``: for each argument typical values, shape (argument, samples) or (argument,).
+    """
+    arguments = [ca.SX.sym(function.name_in(i), function.size1_in(i)) for i in range(function.n_in())]
+    _, distances = _rewritten(function, arguments, [])
+    if not distances:
+        return function
+    sampled = np.array(ca.Function("distances", arguments, [ca.vertcat(*distances)])(*samples))
+    widths = [share * float(np.max(np.abs(row))) for row in sampled]
+    results, _ = _rewritten(function, arguments, widths)
+    return ca.Function(function.name(), arguments, results)
+
+
+def _rewritten(
+    function: ca.Function, arguments: list[Expression], widths: list[float]
+) -> tuple[list[Expression], list[Expression]]:
+    """Return the results, with corners rounded where widths are given, and the distances from the corners."""
+    distances: list[Expression] = []
+
+    def written(operation: int, operands: Sequence[Expression]) -> Expression:
+        if operation not in _CORNERS:
+            return applied(operation, operands)
+        a, b = operands if len(operands) == 2 else (operands[0], ca.SX(0))
+        width = widths[len(distances)] if widths else 0.0
+        distances.append(a - b)
+        return _corner(operation, a, b, width)
+
+    values = fold(read_graph(function), lambda i, k: arguments[i].nz[k], ca.SX, combined=written)
+    return as_results(function, values), distances
+
+
+def _corner(code: int, a: Expression, b: Expression, width: float) -> Expression:
+    away = a - b
+    size = ca.sqrt(away**2 + width**2) if width > 0.0 else ca.fabs(away)
+    if code == ca.OP_FABS:
+        return size
+    return (a + b + size) / 2 if code == ca.OP_FMAX else (a + b - size) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,3 +306,119 @@ def resting_states(rates: Expression, states: Expression) -> Expression:
 def _others(expression: Expression, states: Expression) -> Sequence[Expression]:
     """Return the symbols of an expression besides the states."""
     return [s for s in ca.symvar(expression) if not depends(states, s)]
+
+
+def with_smooth_cables(actuator: Assembly) -> Assembly:
+    """Return the assembly with every cable that goes slack in its smooth form.
+
+    Within the range of a design the cable is taut, where the two forms agree.
+    """
+    for path, part in actuator.walk():
+        if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:
+            actuator = actuator.with_part(path, part.smooth())
+    return actuator
+
+
+_ANGLE = 0.2
+"""Cam angle in rad at which the element is cut out; any at which the cam has a lever arm would do."""
+
+
+@dataclass(frozen=True, eq=False)
+class RelaxingLaw:
+    """Force of the element behind a cam above that of equilibrium, over extension, rate and inner states.
+
+    Parameters
+    ----------
+    element
+        Path of the element.
+    states
+        Names of the inner states.
+    function
+        ``casadi.Function`` (extension, rate, states, parameters) -> (excess force, derivatives of the
+        states); parameters are all those of the flat model, in its order. The derivatives are affine in the
+        states.
+    """
+
+    element: str
+    states: tuple[str, ...]
+    function: ca.Function
+
+
+def relaxing_law(model: FlatModel, spring: str | None = None) -> RelaxingLaw:
+    """Return the law of the element behind a cam with its inner states free.
+
+    The model stands at an angle where its cam has a lever arm; the pretension makes up for the extension
+    there, and the speed of the body that turns the cam is the rate of the extension over that lever arm.
+
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
+    """
+    cam, symbols = series_cam(model, spring), model.symbols()
+    arm, before = _at_the_cut(model, cam)
+    place = {v.name: i for i, v in enumerate(model.parameters)}
+    extension, rate = ca.SX.sym("extension"), ca.SX.sym("rate")
+    inner = [i for i, v in enumerate(model.states) if v.name in cam.states]
+    states = _column([symbols.state[i] for i in inner])
+    # The cam's own numbers are those of the model, whatever the parameters say: any cam cuts the same.
+    own = [place[name] for name in place if name.startswith(f"{cam.name}.")]
+    old = ca.vertcat(*[symbols.parameter[i] for i in (place[cam.pretension], *own)])
+    new = ca.vertcat(extension - before, *[model.parameters[i].start for i in own])
+    force = symbols.signal[[v.name for v in model.signals].index(cam.force)]
+    cut = ca.substitute(ca.vertcat(force, *[symbols.derivative[i] for i in inner]), old, new)
+    cut = _moved(model, symbols, cut, cam, rate / arm)
+    rates = _column(ca.vertsplit(cut)[1:])
+    if depends(ca.jacobian(rates, states), states):
+        raise ArrangementError(
+            f"'{cam.element}'", "relaxes by a law that is not linear in its inner states",
+            next_step="exchange it for linear branches (springs with dashpots) that do the same at the "
+            "working point, or leave out goals that let the rubber relax",
+        )  # fmt: skip
+    excess = _excess(cut[0], rates, states, rate)
+    function = ca.Function("relaxing", [extension, rate, states, symbols.parameter], [excess, rates])
+    return RelaxingLaw(cam.element, tuple(model.states[i].name for i in inner), function)
+
+
+def _column(items: list[Expression]) -> Expression:
+    return ca.vertcat(*items) if items else ca.SX(0, 1)
+
+
+def _excess(force: Expression, rates: Expression, states: Expression, rate: Expression) -> Expression:
+    """Return the force minus that at rest; where it is affine, in its slopes alone, without any knots."""
+    at_rest = resting_states(ca.SX(ca.substitute(rates, rate, 0.0)), states)
+    moved, rest = ca.vertcat(states, rate), ca.vertcat(at_rest, 0.0)
+    slopes = ca.jacobian(force, moved)
+    if depends(slopes, moved):
+        return force - ca.substitute(force, moved, rest)
+    return ca.SX(ca.mtimes(slopes, moved - rest))
+
+
+def _at_the_cut(model: FlatModel, cam: CamNames) -> tuple[float, float]:
+    """Return lever arm and extension without pretension at the angle of the cut."""
+    arm, extension = cam_function(model, cam.drive)(_ANGLE, model.start(model.parameters))
+    if not abs(float(arm)) > 1e-9:
+        raise ArrangementError(
+            f"cam '{cam.name}'", f"has no lever arm at {_ANGLE:g} rad",
+            next_step="give its lever arm numbers above zero",
+        )  # fmt: skip
+    return float(arm), float(extension)
+
+
+def _moved(
+    model: FlatModel, symbols: Symbols, cut: Expression, cam: CamNames, speed: Expression
+) -> Expression:
+    """Return expressions with the cam at the angle of the cut, turning at a speed; all else rests."""
+    movable = ca.vertcat(symbols.state, symbols.input)
+    names = [v.name for v in (*model.states, *model.inputs)]
+    angle = symbols.signal[[v.name for v in model.signals].index(cam.angle)]
+    handle, slope = handle_of(angle, movable, cam.angle)
+    body = body_moved_by(model.bodies, names[handle])
+    if body is None or body.rate not in names:
+        raise ArrangementError(
+            f"'{names[handle]}'", "turns the cam, but belongs to no body with a speed",
+            next_step="tie the spring between bodies",
+        )  # fmt: skip
+    values = {names[handle]: _ANGLE / slope, body.rate: speed / slope}
+    others = [i for i, name in enumerate(names) if name not in cam.states]
+    old = ca.vertcat(*[movable[i] for i in others])
+    new = ca.vertcat(*[values.get(names[i], ca.SX(0)) for i in others])
+    result: Expression = ca.substitute(cut, old, new)
+    return result

@@ -1,16 +1,28 @@
-"""What differs from one made spring to the next, and by how much."""
+"""What differs from one made spring to the next, and by how much.
+
+A deck that gives no spread for pretension, contour, anchor or cable does not mean that these are exact. For
+them there are assumed deviations, each with its reason, shown with every result; ``spreads`` replaces any of
+them.
+"""
 
 from __future__ import annotations
 
-from abc import ABC
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.quantity import parse_unit, with_unit
-from ...foundation.spread import Spread
+from ...foundation.errors import unknown_name
+from ...foundation.quantity import Quantity, parse_unit, with_unit
+from ...foundation.spread import EXACT, NormalSpread, RelativeSpread, Spread
+from ...model import FlatModel, Variable
+from ...model.roles import series_cam
+from ...model.structure import CamNames
+from ..curves.numbers import in_si
 
 
 def shown_unit(unit: str) -> str:
@@ -116,3 +128,191 @@ def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int) -> Array:
         for cause in causes
     ]
     return np.column_stack(columns) if columns else np.zeros((count, 0))
+
+
+_FARTHEST = 10.0
+"""Distance in m from which on an anchor counts as infinitely far."""
+
+
+class _Assumed(NamedTuple):
+    """A standard deviation in SI that is assumed where nothing is declared."""
+
+    deviation: float
+    source: str
+
+    @property
+    def spread(self) -> Spread:
+        """A normal distribution of that size."""
+        return NormalSpread(self.deviation) if self.deviation > 0.0 else EXACT
+
+
+_PRETENSION = _Assumed(1e-4, "assumed: set by a screw of 0.5 mm pitch to a fifth of a turn")
+_ANCHOR = _Assumed(2e-4 / math.sqrt(3.0), "assumed: place of a hole within ± 0.2 mm, each place as likely")
+_CONTOUR = _Assumed(5e-5 / math.sqrt(3.0), "assumed: edge within ± 0.05 mm, each place as likely")
+_CABLE = _Assumed(2.5e-5 / math.sqrt(3.0), "assumed: diameter within ± 0.05 mm, each size as likely")
+
+
+@dataclass(frozen=True)
+class MaterialScatter(ABC):
+    """Base of the ways in which the moduli of one piece of material deviate."""
+
+    @abstractmethod
+    def grouped(self, piece: str, moduli: Mapping[str, Sequence[Variable]]) -> dict[str, list[Variable]]:
+        """Return the moduli that move together by the name of what they are.
+
+        Parameters
+        ----------
+        piece
+            Path of the piece.
+        moduli
+            The numbers of each modulus or row of moduli by its full name.
+        """
+
+
+@dataclass(frozen=True)
+class OneBatch(MaterialScatter):
+    """All moduli of a piece move together.
+
+    They are fitted to one curve, and what differs between batches and samples is mostly how stiff the whole
+    curve is. It is also the careful choice: deviations of their own would average out in the torque.
+    """
+
+    def grouped(self, piece: str, moduli: Mapping[str, Sequence[Variable]]) -> dict[str, list[Variable]]:
+        """Return one group for all."""
+        return {f"{piece}.moduli": [v for row in moduli.values() for v in row]} if moduli else {}
+
+
+@dataclass(frozen=True)
+class SeparateModuli(MaterialScatter):
+    """Each modulus, also each of a row, deviates on its own: the form of the curve is uncertain too."""
+
+    def grouped(self, piece: str, moduli: Mapping[str, Sequence[Variable]]) -> dict[str, list[Variable]]:
+        """Return a group for each number."""
+        return {v.name: [v] for row in moduli.values() for v in row}
+
+
+@dataclass(frozen=True)
+class SpreadRules:
+    """How the spreads of a deck become deviations.
+
+    Parameters
+    ----------
+    material
+        How the moduli of one piece deviate.
+    given
+        Spreads that replace declared and assumed ones, by name of the cause: a :class:`Spread`, or one
+        standard deviation in the unit of the number, relative for rows and moduli; zero for none.
+    """
+
+    material: MaterialScatter = field(default_factory=OneBatch)
+    given: Mapping[str, Spread | Quantity | float] = field(default_factory=dict)
+
+
+def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> tuple[Cause, ...]:
+    """Return everything that deviates in a cam spring, whether it matters or not.
+
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
+    """
+    cam = series_cam(model, spring)
+    tie = next(each for each in model.springs if cam in each.cams)
+    # The numbers of the spring that move together, by name.
+    inside = set(tie.parameters) - set(_not_of_the_torque(cam))
+    groups: dict[str, list[Variable]] = {}
+    for variable in model.parameters:
+        if variable.name in inside:
+            groups.setdefault(variable.name.partition("[")[0], []).append(variable)
+    for piece in cam.specimens:
+        moduli = {
+            name: row
+            for name, row in groups.items()
+            if name.startswith(f"{piece.name}.") and row[0].unit == "Pa" and any(v.spread for v in row)
+        }
+        grouped = rules.material.grouped(piece.name, moduli)
+        groups = {name: row for name, row in groups.items() if name not in moduli} | grouped
+    # What deviates besides the numbers: the edge of the cam, and the cable on it.
+    cable = _CABLE
+    if cam.cable is not None:
+        diameter = model.variable(cam.cable.diameter)
+        if diameter.spread:
+            of_radius = diameter.spread.standard_error(diameter.start) / 2.0
+            cable = _Assumed(of_radius, f"declared: {diameter.spread_text}")
+    others = {f"{cam.name}.contour": _CONTOUR, f"{cam.name}.cable_radius": cable}
+    valid = [*groups, *others]
+    for name in rules.given:
+        if name not in valid:
+            raise unknown_name("spread", name, valid)
+    causes: list[Cause] = []
+    for name, rows in groups.items():
+        causes += _of_numbers(name, rows, cam, rules)
+    for name, assumed in others.items():
+        given = rules.given.get(name)
+        size = (
+            assumed
+            if given is None
+            else _Assumed(_given_spread(name, given, "m").standard_error(1.0), "given")
+        )
+        causes += _of_the_edge(name, size)
+    return tuple(cause for cause in causes if cause.deviation > 0.0)
+
+
+def _not_of_the_torque(cam: CamNames) -> Iterator[str]:
+    """Yield the numbers of strength and cable, of which only the diameter does anything to the torque."""
+    for piece in cam.specimens:
+        yield from (name for name in (piece.tensile_strength, piece.elongation_at_break) if name is not None)
+    if cam.cable is not None:
+        yield from (cam.cable.diameter, cam.cable.breaking_force, cam.cable.bend_ratio)
+
+
+def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: SpreadRules) -> list[Cause]:
+    """Return the cause of a number, or of numbers that move together."""
+    first, given = rows[0], rules.given.get(name)
+    if name == cam.anchor_distance and first.start > _FARTHEST:
+        return []
+    alone = len(rows) == 1 and name == first.name and not name.endswith("]")
+    if given is not None:
+        spread = _given_spread(name, given, first.unit if alone else "1")
+        size = spread.standard_error(first.start if alone else 1.0)
+        share = size / (abs(first.start) or 1.0) if alone else size
+        amounts, source, relative = [size] if alone else [share * v.start for v in rows], "given", not alone
+    else:
+        widest = max(rows, key=lambda v: v.spread.share(v.start))
+        spread, share = widest.spread, widest.spread.standard_error(widest.start) / (abs(widest.start) or 1.0)
+        amounts = [math.copysign(v.spread.standard_error(v.start), v.start) for v in rows]
+        source, relative = f"declared: {widest.spread_text}", isinstance(spread, RelativeSpread)
+        assumed = {cam.pretension: _PRETENSION, cam.anchor_distance: _ANCHOR}.get(name)
+        if assumed is not None and amounts[0] == 0.0:
+            spread, amounts, source, relative = assumed.spread, [assumed.deviation], assumed.source, False
+    numbers = tuple((v.name, amount) for v, amount in zip(rows, amounts, strict=True))
+    # Rows and moduli are shown as relative deviations, single numbers in their own unit.
+    unit = shown_unit(first.unit) if alone else "1"
+    shown = (first.start, amounts[0]) if alone else (1.0, share)
+    if alone and first.unit == "1":
+        shown = (1.0, share)
+    if name == cam.anchor_distance:
+        return [AnchorCause(name, *shown, unit, source, relative, spread)]
+    if name.startswith(f"{cam.name}.") and name != cam.elements:
+        return [ProfileCause(name, *shown, unit, source, relative, spread, numbers)]
+    return [NumberCause(name, *shown, unit, source, relative, spread, numbers)]
+
+
+def _of_the_edge(name: str, whole: _Assumed) -> list[Cause]:
+    """Return the causes of a contour error; one of an edge is shared equally by an offset and two waves."""
+    if not name.endswith(".contour"):
+        return [WaveCause(name, 0.0, whole.deviation, "mm", whole.source, False, whole.spread, 0)]
+    size = whole.deviation / math.sqrt(3.0)
+    causes: list[Cause] = []
+    for order, (part, scale) in enumerate(
+        [("offset", 1.0), ("half_wave", math.sqrt(2)), ("wave", math.sqrt(2))]
+    ):
+        causes.append(
+            WaveCause(f"{name}.{part}", 0.0, scale * size, "mm", whole.source, False, whole.spread, order)
+        )
+    return causes
+
+
+def _given_spread(name: str, given: Spread | Quantity | float, unit: str) -> Spread:
+    """Return a spread that replaces another; a number is one standard deviation of a normal distribution."""
+    if isinstance(given, Spread):
+        return given
+    size = in_si(f"spread of {name}", given, unit)
+    return NormalSpread(size) if size > 0.0 else EXACT

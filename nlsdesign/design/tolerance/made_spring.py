@@ -1,21 +1,246 @@
-"""Torque of made springs at rest, for many draws of everything that deviates at once, and to first order."""
+"""Lever arm of a made cam: a contour with errors, a cable of another thickness, an anchor elsewhere.
+
+A made cam has a fixed support function p(φ). In the law of a two-sided cam the anchor shapes the drawing
+only; once the cam is made, the direction φ of the cable at the angle θ follows from
+
+    φ − asin(p̃(φ)/D̃) = θ,    h = p̃(φ),    p̃ = p + Δ,
+
+with the anchor at the distance D̃ and the error Δ(φ) of the contour. Each point of the contour is named by
+the angle u at which the cable should touch it, φ = u + asin(h₀(u)/D), so the declared law gives p = h₀(u)
+exactly and without errors u = θ. A cable that lies free in its channel (p̃ < 0) has no lever arm. The
+extension is the integral of the lever arm, δ = ∫₀^θ h. To first order, with f = √(D² − p²) − p' the free
+length of the cable,
+
+    ∂h/∂a = ψ·√(D² − p²)/f,   ∂δ/∂a = ∫₀^φ ψ dφ   for Δ = a·ψ,
+    ∂h/∂D = −p·p'/(D·f),      ∂δ/∂D = √(D² − p²)/D − 1.
+
+A contour that is hollow somewhere is treated as if the cable could follow it.
+Source: Schneider 2014 (support function of a convex curve); virtual work.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
-from ...foundation.arrays import Array
+from ...foundation.arrays import Array, Indices
+from ...foundation.errors import ConvergenceError
+from ...foundation.symbolic import depends
 from ...model import FlatModel
 from ...model.structure import CamNames
 from ..curves.target import Target
-from ..statics.equilibrium import cam_function, elastic_law
-from .causes import Cause, NumberCause
-from .made_cam import MadeCam, made_cam
+from ..statics.equilibrium import ElasticLaw, cam_function, elastic_law
+from .causes import AnchorCause, Cause, NumberCause, ProfileCause, WaveCause
+
+_RUN_OUT = 101
+"""Nodes over the quarter turn beyond that, where the lever arm is held."""
+_NODES = 1500
+_NEAR_ZERO = 80
+_BEYOND = 1.3
+"""How far the contour is looked at, relative to the last angle: errors move the point of contact."""
+_FINER = 16
+_NEWTON_STEPS = 15
+_STEPS = 75
+_SETTLED = 1e-10
+"""Angle in rad to which the point of contact is found."""
+_CLEARANCE = 0.02
+"""Least distance of an anchor beyond the farthest point of the cam, relative to its distance."""
+
+
+@dataclass(frozen=True, eq=False)
+class MadeCam:
+    """The contour of a declared cam over the angle u at which the cable should touch each point.
+
+    Parameters
+    ----------
+    angles
+        θ in rad, ascending from zero, shape (n,).
+    anchor
+        D in m; infinite for a cable that stays parallel.
+    table
+        Splines of the lever arm over u.
+    profiles
+        For each cause of declared numbers of the cam the change of the lever arm per standard deviation.
+    extensions
+        δ at the angles without errors, shape (n,), in m.
+    """
+
+    angles: Array
+    anchor: float
+    table: CubicHermiteSpline
+    profiles: dict[str, CubicHermiteSpline]
+    extensions: Array
+
+    @cached_property
+    def lever_arms(self) -> Array:
+        """H without errors at the angles, shape (n,), in m."""
+        result: Array = self.table(self.angles)
+        return result
+
+    @cached_property
+    def _directions(self) -> Array:
+        return self.angles + np.arcsin(self.lever_arms / self.anchor)
+
+    @cached_property
+    def _slopes(self) -> Array:
+        """P' without errors at the angles."""
+        # Within the change of sides at angle zero the slope is none of the contour's.
+        first = self.table(np.maximum(self.angles, self.angles[1]), 1)
+        slopes: Array = first / (1.0 + first / np.sqrt(self.anchor**2 - self.lever_arms**2))
+        return slopes
+
+    @property
+    def nearest_anchor(self) -> float:
+        """Distance in m at which an anchor would nearly touch the cam."""
+        if np.isinf(self.anchor):
+            return 0.0
+        return float(np.max(np.hypot(self.lever_arms, self._slopes))) * (1.0 + _CLEARANCE)
+
+    def shape(self, cause: Cause) -> Callable[[Array, Array], Array] | None:
+        """Return the error of the contour per standard deviation over u and φ; None for other causes."""
+        if isinstance(cause, ProfileCause):
+            profile = self.profiles[cause.name]
+            return lambda u, _: profile(u)
+        if isinstance(cause, WaveCause):
+            rate, size = cause.order * np.pi / self._directions[-1], cause.deviation
+            return lambda _, phi: size * np.cos(rate * phi) if rate else np.full_like(phi, size)
+        return None
+
+    def deviating(self, causes: Sequence[Cause], deviations: Array) -> tuple[Array, Array]:
+        """Return lever arms and extensions of made cams.
+
+        ``causes``: of any kind; those that are not of the cam are passed over. ``deviations``: in units of
+        the standard deviations, shape (draws, causes). Result: each of shape (draws, n), in m.
+        """
+        draws = len(deviations)
+        shapes = [
+            (shape, deviations[:, k])
+            for k, cause in enumerate(causes)
+            if (shape := self.shape(cause)) is not None and np.any(deviations[:, k])
+        ]
+        anchor = np.maximum(self.distance(causes, deviations), self.nearest_anchor)
+        if not shapes and np.all(anchor == self.anchor):
+            return np.tile(self.lever_arms, (draws, 1)), np.tile(self.extensions, (draws, 1))
+        arms = self._touched(anchor, shapes)
+        change = arms - self.table(self._grid)
+        steps = np.diff(self._grid) * (change[:, 1:] + change[:, :-1]) / 2
+        longer = np.concatenate([np.zeros((draws, 1)), np.cumsum(steps, axis=1)], axis=1)
+        return arms[:, self._kept], self.extensions + longer[:, self._kept]
+
+    @cached_property
+    def _grid(self) -> Array:
+        """The angles, with finer ones where an error of the edge sets in, close to zero."""
+        return np.concatenate([[0.0], self.angles[1] * np.geomspace(1e-4, 0.9, _FINER), self.angles[1:]])
+
+    @property
+    def _kept(self) -> Indices:
+        return np.append(0, np.arange(_FINER + 1, _FINER + len(self.angles)))
+
+    def distance(self, causes: Sequence[Cause], deviations: Array) -> Array:
+        """Return the distance of the anchors of made springs, shape (draws,), in m."""
+        moves = [c.deviation if isinstance(c, AnchorCause) else 0.0 for c in causes]
+        result: Array = self.anchor + deviations @ np.array(moves)
+        return result
+
+    def _touched(self, anchors: Array, shapes: Sequence[tuple[Callable[..., Array], Array]]) -> Array:
+        """Return the lever arms where the cables touch, for anchors of shape (draws,)."""
+        count = len(self._grid)
+        wanted = np.tile(self._grid, len(anchors))
+        u, arms = wanted.copy(), np.zeros(wanted.size)
+        low, high = np.zeros(wanted.size), np.full(wanted.size, self.table.x[-1])
+        open_ones, residual = np.arange(wanted.size), np.zeros(0)
+        for number in range(_STEPS):
+            row, here = open_ones // count, u[open_ones]
+            anchor, nominal = anchors[row], self.table(here)
+            phi = here + np.arcsin(nominal / self.anchor)
+            support = nominal + sum((size[row] * shape(here, phi) for shape, size in shapes), start=0.0)
+            arm = np.maximum(support, 0.0)
+            arms[open_ones] = arm
+            residual = phi - np.arcsin(arm / anchor) - wanted[open_ones]
+            unsettled = np.abs(residual) > _SETTLED
+            if not np.any(unsettled):
+                return arms.reshape(-1, count)
+            # Newton's step without the slope of the errors; where that leaves the bracket or takes long, as
+            # with an anchor that nearly touches a hollow cam, the middle of the bracket.
+            near = 1.0 / np.sqrt(self.anchor**2 - nominal**2) - (support > 0.0) / np.sqrt(anchor**2 - arm**2)
+            step = here - residual / np.maximum(1.0 + self.table(here, 1) * near, 0.2)
+            low[open_ones] = np.where(residual <= 0.0, here, low[open_ones])
+            high[open_ones] = np.where(residual >= 0.0, here, high[open_ones])
+            first, last = low[open_ones], high[open_ones]
+            newton = (step > first) & (step < last) & (number < _NEWTON_STEPS)
+            u[open_ones] = np.where(newton, step, (first + last) / 2)
+            open_ones = open_ones[unsettled]
+        if np.max(np.abs(residual)) > 1e-6 * self.angles[-1]:
+            raise ConvergenceError(
+                "contact of cable and cam", "is not found for some errors of contour and anchor",
+                next_step="state smaller spreads of contour and anchor",
+            )  # fmt: skip
+        return arms.reshape(-1, count)
+
+    def sensitivity(self, cause: Cause) -> tuple[Array, Array]:
+        """Return dh and dδ per standard deviation of a cause, to first order, shape (n,) each, in m.
+
+        ``cause``: of any kind; one that is not of the cam changes nothing.
+        """
+        root = np.sqrt(self.anchor**2 - self.lever_arms**2)
+        if isinstance(cause, AnchorCause):
+            free = root - self._slopes
+            arms = -self.lever_arms * self._slopes / (self.anchor * free)
+            return cause.deviation * arms, cause.deviation * (root / self.anchor - 1.0)
+        shape = self.shape(cause)
+        if shape is None:
+            return np.zeros_like(self.angles), np.zeros_like(self.angles)
+        values = shape(self.angles, self._directions)
+        steps = np.diff(self._directions) * (values[1:] + values[:-1]) / 2
+        arms = values / (1.0 - self._slopes / root)
+        return arms, np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def made_cam(law: ElasticLaw, cam: ca.Function, angles: Array, causes: Sequence[Cause]) -> MadeCam:
+    """Return the contour of a declared cam.
+
+    ``law``: behind the cam; only its names and numbers are used.
+    """
+    numbers, names = law.numbers, [v.name for v in law.parameters]
+    anchored = law.cam.anchor_distance
+    anchor = np.inf if anchored is None else float(numbers[names.index(anchored)])
+    angle, parameters = ca.SX.sym("angle"), ca.SX.sym("parameters", len(names))
+    arm, extension = cam.call([angle, parameters])
+    profiles = [cause for cause in causes if isinstance(cause, ProfileCause)]
+    rows = [arm]
+    for cause in profiles:
+        direction = np.zeros(len(names))
+        for name, amount in cause.numbers:
+            direction[names.index(name)] = amount
+        rows.append(ca.jtimes(arm, parameters, ca.DM(direction)))
+    columns = ca.vertcat(*rows)
+    both = ca.Function("rows", [angle, parameters], [columns, ca.jacobian(columns, angle)])
+    end = _BEYOND * float(angles[-1])
+    near, along = np.geomspace(1e-7, end / _NODES, _NEAR_ZERO), np.linspace(0.0, end, _NODES)
+    # An anchor that stands closer turns the cable farther around the cam, by a quarter turn at most.
+    run_out = np.linspace(end, end + np.pi / 2, _RUN_OUT)
+    nodes = np.unique(np.concatenate([[0.0], near, along, run_out]))
+    values, slopes = (np.array(item, dtype=float) for item in both(nodes.reshape(1, -1), numbers))
+    if anchored is not None and depends(arm, parameters[names.index(anchored)]):
+        # Such a law holds for any contour: its lever arm has moved with the point of contact, Δ·√(D² − p²)/f.
+        turning = 1.0 / (1.0 + slopes[0] / np.sqrt(anchor**2 - values[0] ** 2))
+        values[1:] *= turning
+        slopes[1:] = np.gradient(values[1:], nodes, axis=1)
+    splines = [CubicHermiteSpline(nodes, v, s) for v, s in zip(values, slopes, strict=True)]
+    stretched = ca.Function("extension", [angle, parameters], [extension])(angles.reshape(1, -1), numbers)
+    return MadeCam(
+        angles=angles,
+        anchor=anchor,
+        table=splines[0],
+        profiles={cause.name: spline for cause, spline in zip(profiles, splines[1:], strict=True)},
+        extensions=np.array(stretched, dtype=float).ravel(),
+    )
+
 
 _LONG = 2000
 """Number of instructions of a law from which on it is not written out for each angle."""

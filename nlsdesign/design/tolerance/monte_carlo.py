@@ -16,9 +16,8 @@ from ...foundation.processes import parallel_map
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ..curves.target import Target
-from ..statics.smooth_cables import with_smooth_cables
-from .causes import NumberCause, draw_deviations, shown_unit
-from .declared_spreads import SpreadRules, spring_causes
+from ..statics.equilibrium import with_smooth_cables
+from .causes import NumberCause, SpreadRules, draw_deviations, shown_unit, spring_causes
 from .made_spring import MadeSpring, made_spring
 from .tolerance_result import SHARES, CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect, quantile
 from .trimming import Trim, Trimmed, trimmed
@@ -110,18 +109,7 @@ def tolerance_analysis(
     everything = (*spring_causes(model, name, rules), *(column for column, _ in columns))
     made = made_spring(model, name, target=target, causes=everything, angles=_ANGLES)
     ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
-    return _analysed(made, ranges, target=target, draws=draws, seed=seed)
-
-
-def _analysed(
-    made: MadeSpring,
-    ranges: Sequence[tuple[str, tuple[float, float]]],
-    *,
-    target: Target,
-    draws: int,
-    seed: int,
-) -> ToleranceResult:
-    """Return the analysis of springs whose last causes are trims with these names and ranges."""
+    # The last causes of these springs are the trims.
     causes = made.causes[: len(made.causes) - len(ranges)]
     largest = np.max(np.abs(made.sensitivities), axis=1, initial=0.0)
     acting = [k for k in range(len(causes)) if largest[k] > 1e-9 * target.largest]

@@ -21,8 +21,7 @@ from nlsdesign.components import (
     series,
     tie,
 )
-from nlsdesign.components.assembly.circuit import Circuit, Leaf, Row, circuit_lines, circuit_of
-from nlsdesign.components.assembly.circuit_text import draw
+from nlsdesign.components.assembly.circuit import Circuit, Leaf, Row, circuit_lines, circuit_of, draw
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import deck_names, load_deck

@@ -8,7 +8,7 @@ import pytest
 
 from nlsdesign.components import Assembly, Specimen, material
 from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
-from nlsdesign.components.assembly.other_rubber import with_rubber
+from nlsdesign.components.assembly.library_rubber import with_rubber
 from nlsdesign.foundation.deck import read_deck
 
 HEAD = """

@@ -21,7 +21,7 @@ from nlsdesign.design import (
     design_cam,
 )
 from nlsdesign.design.optimisation.problem import DesignProblem, design_problem
-from nlsdesign.design.optimisation.starts import Start
+from nlsdesign.design.optimisation.shape import Start
 from nlsdesign.foundation.errors import ArrangementError, UnitError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten

@@ -29,7 +29,7 @@ from nlsdesign.design import (
 from nlsdesign.design.optimisation.design_search import row_of
 from nlsdesign.design.optimisation.problem import design_problem
 from nlsdesign.design.optimisation.program import Program, Rows
-from nlsdesign.design.optimisation.starts import Start
+from nlsdesign.design.optimisation.shape import Start
 from nlsdesign.foundation.errors import ArrangementError, UnitError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten

@@ -8,7 +8,7 @@ import pytest
 
 from nlsdesign.components import StrainStiffening
 from nlsdesign.design import elastic_law
-from nlsdesign.design.statics.rounding import rounded
+from nlsdesign.design.statics.equilibrium import rounded
 from nlsdesign.model import flatten
 from tests.cam_cases import actuator
 

@@ -18,8 +18,7 @@ from nlsdesign.design import (
     Trim,
     tolerance_analysis,
 )
-from nlsdesign.design.tolerance.causes import AnchorCause, Cause, NumberCause
-from nlsdesign.design.tolerance.declared_spreads import spring_causes
+from nlsdesign.design.tolerance.causes import AnchorCause, Cause, NumberCause, spring_causes
 from nlsdesign.design.tolerance.tolerance_result import quantile
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, UnitError, UnknownNameError, ValueRangeError

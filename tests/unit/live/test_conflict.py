@@ -7,9 +7,8 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from nlsdesign.design.optimisation.limit_kinds import limit_kinds
-from nlsdesign.design.parametric.parametric_program import SoftenedProgram
-from nlsdesign.design.parametric.program_rows import ProgramRows
+from nlsdesign.design.optimisation.limits import limit_kinds
+from nlsdesign.design.parametric.parametric_program import ProgramRows, SoftenedProgram
 from nlsdesign.live.gallery import gallery_question
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.design.optimisation.defaults import StrainEnd
-from nlsdesign.design.optimisation.limit_kinds import limit_kinds
+from nlsdesign.design.optimisation.limits import limit_kinds
 from nlsdesign.live.answers import LimitMargin, LiveColumn
 from nlsdesign.live.edits import FreeNumber, HoldNumber
 from nlsdesign.live.gallery import gallery_question

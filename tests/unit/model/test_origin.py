@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.components import Assembly
+from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.components.assembly.deck_writer import deck_digest, deck_problems, deck_text, declare
-from nlsdesign.components.assembly.moved_load import with_moved_load
 from nlsdesign.feedback.control import joined, torque_controller
 from nlsdesign.feedback.observer import FixedGrid, PaperForm, design_adaptive_observer, design_observer
 from nlsdesign.foundation.deck import deck_names, load_deck, read_deck

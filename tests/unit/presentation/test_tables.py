@@ -17,7 +17,7 @@ from nlsdesign.bench.discrepancy import verdict_frames
 from nlsdesign.bench.discrepancy.reporting.verdict import Course, NamedEffect, RecordGap, Verdict
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.design import design_cam
-from nlsdesign.design.optimisation.front import FrontPoint, ParetoFront
+from nlsdesign.design.optimisation.pareto import FrontPoint, ParetoFront
 from nlsdesign.feedback.analysis import Stability, over_angle
 from nlsdesign.feedback.observer import SpreadErrors
 from nlsdesign.foundation.data_frames import data_frame, data_set
