@@ -7,6 +7,7 @@ vectors is that of the deck, whatever the order in which laws happen to ask for 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -76,11 +77,8 @@ def flatten(
     roots = [*solved.signals, *solved.outputs, *moving, *solved.laws.lasts]
     states = _needed_states(builder, solved.derivatives, roots)
     equations, switches = _equations(builder, solved, states, chosen)
-    _check_unique(builder)
-    _check_finite(
-        assembly, builder, equations,
-        names=[*(f"der({n})" for n in states), *given, *builder.signals, *builder.checks],
-    )  # fmt: skip
+    names = [*(f"der({n})" for n in states), *given, *builder.signals, *builder.checks]
+    _check(assembly, builder, equations, names=names)
     owners = Owners(
         builder.owned(builder.parameters), builder.owned(states), builder.owned(chosen),
         builder.owned(builder.signals),
@@ -242,21 +240,19 @@ def _equations(
     return equations, switches
 
 
-def _check_unique(builder: EquationBuilder) -> None:
-    seen: set[str] = set()
-    for group in (builder.states, builder.inputs, builder.parameters, builder.signals):
-        for name in group:
-            if name in seen:
-                raise ArrangementError(
-                    f"name '{name}'", "is used twice", next_step="rename the part or the number"
-                )
-            seen.add(name)
-
-
-def _check_finite(
+def _check(
     assembly: Assembly, builder: EquationBuilder, equations: ca.Function, *, names: Sequence[str]
 ) -> None:
-    """Raise unless every number that the equations give near rest is finite, with the declared parameters."""
+    """Raise unless all variables have different names, and all numbers near rest are finite.
+
+    ``names``: of the numbers that the equations give.
+    """
+    groups = (builder.states, builder.inputs, builder.parameters, builder.signals)
+    for name, count in Counter(name for group in groups for name in group).items():
+        if count > 1:
+            raise ArrangementError(
+                f"name '{name}'", "is used twice", next_step="rename the part or the number"
+            )
     # Not at rest itself, where a law may have a corner.
     arguments = [ca.DM.ones(equations.sparsity_in(i)) * 1e-3 for i in range(equations.n_in())]
     arguments[3] = ca.DM([v.start for v, _ in builder.parameters.values()])

@@ -6,7 +6,7 @@ answer open, one sentence says which role was looked for, what there is, and how
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
@@ -153,15 +153,12 @@ def _listed(kind: str, names: Sequence[str], which: str = "") -> str:
     if not names:
         return f"there is no {kind} {which}".rstrip()
     plural = "bodies" if kind == "body" else f"{kind}s"
-    return f"there are {len(names)} {plural} {which}".rstrip() + ": " + _quoted(names)
+    listed = ", ".join(f"'{name}'" for name in names)
+    return f"there are {len(names)} {plural} {which}".rstrip() + f": {listed}"
 
 
 def _choice(examples: Sequence[str], otherwise: str) -> str:
     return f"name one, for instance {examples[0]}" if examples else otherwise
-
-
-def _quoted(names: Iterable[str]) -> str:
-    return ", ".join(f"'{name}'" for name in names)
 
 
 class DeclaredReading(NamedTuple):

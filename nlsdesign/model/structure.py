@@ -392,12 +392,12 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
         states=tuple(declared_by(pieces, owners.states)),
         specimens=tuple(_specimen(name, p) for name, p in pieces.items() if isinstance(p, Specimen)),
         cable=_cable(cam, part.cam),
-        guides=tuple(_exponent(name, p) for name, p in pieces.items() if isinstance(p, CapstanFriction)),
+        guides=tuple(
+            tuple(f"{name}.{field}" for field in templates(type(p.guide)))
+            for name, p in pieces.items()
+            if isinstance(p, CapstanFriction)
+        ),
     )
-
-
-def _exponent(path: str, part: CapstanFriction) -> tuple[str, ...]:
-    return tuple(f"{path}.{field}" for field in templates(type(part.guide)))
 
 
 def _single_numbers(parts: Mapping[str, Part]) -> Iterator[str]:
