@@ -374,7 +374,7 @@ def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> Colu
     """
     motions = {name for body in model.bodies for name in (body.motion, body.rate)}
     shown = {r.signal for r in model.readings if r.measured in motions} | motions
-    told = mapping.inputs.commanded | mapping.inputs.shown
+    given = mapping.inputs.commanded | mapping.inputs.shown
     columns = []
     for column in mapping.columns:
         if column.sampling is not None and column.sampling.held_from is not None and column.signal in shown:
@@ -383,7 +383,7 @@ def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> Colu
                 f"is declared '{column.sampling.name}', but a motion moves on between its samples",
                 next_step='write between_samples = "sampled", or leave it out',
             )
-        known = column.sampling is not None or (column.signal in told and column.signal not in shown)
+        known = column.sampling is not None or (column.signal in given and column.signal not in shown)
         columns.append(column if known else replace(column, sampling=SAMPLED))
     return replace(mapping, columns=tuple(columns))
 
