@@ -13,12 +13,14 @@ from ....foundation.arrays import Array
 from ....simulation import Trace
 from ..filters import every
 from ..records.measurement import Record, RecordSet, in_canonical_order
+from ..records.sampling import Sampling
 from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
 from .block import Block
 from .block_noise import BlockNoise, Filters, noise_of_blocks
 from .block_response import DrivenBlock, Samples
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
+from .told_sampling import SeenBlock, with_sampling, with_told_sampling
 
 _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
@@ -73,6 +75,8 @@ class Bench:
     clock
         Time in s between samples at which the blocks show what they do, where that is known from other
         records of the same bench.
+    sampling
+        How inputs run between their samples, where that is known from other records of the same bench.
     """
 
     def __init__(
@@ -83,12 +87,15 @@ class Bench:
         noise: Noise | None = None,
         filters: Mapping[str, Filters] | None = None,
         clock: float | None = None,
+        sampling: Mapping[str, Sampling] | None = None,
     ) -> None:
         self._blocks = tuple(blocks)
-        self.records = in_canonical_order(records)
+        self.records = in_canonical_order(with_sampling(records, sampling or {}))
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
         self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
         self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
+        if any(column.sampling is None for column in self.records.columns):
+            self._read_as_told(blocks)
         self.units = {block.name: block.unit for block in blocks}
         self._scales = {block.name: block.effort_per_drive for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, BlockNoise]] = {}
@@ -103,7 +110,24 @@ class Bench:
 
     def with_records(self, records: RecordSet) -> Bench:
         """Return other records of the same bench as they are seen with the same noise and filters."""
-        return Bench(records, self._blocks, noise=self.noise, filters=self.filters, clock=self.clock)
+        return Bench(
+            records, self._blocks, noise=self.noise, filters=self.filters, clock=self.clock,
+            sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
+        )  # fmt: skip
+
+    def _read_as_told(self, blocks: Sequence[Block]) -> None:
+        """Read inputs of which nothing is said as the records tell that they run between their samples."""
+        seen = [
+            SeenBlock(
+                block,
+                self.filters[block.name],
+                {record: floor for (name, record), floor in self.floors.items() if name == block.name},
+            )
+            for block in blocks
+        ]
+        self.records = with_told_sampling(self.records, seen)
+        self.noise = self.noise.read_as(self.records)
+        self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
