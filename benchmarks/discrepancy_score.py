@@ -31,7 +31,7 @@ from typing import Any
 
 from benchmarks._score_cases import KIND_TIERS, TIERS, Case, cases, sample
 from benchmarks._score_digest import digest
-from benchmarks._score_kinds import codes, declared_kinds, kind_cases, kind_table
+from benchmarks._score_kinds import all_kinds, codes, kind_cases, kind_table
 from benchmarks._score_run import run
 from benchmarks._score_table import Result, table
 from nlsdesign.foundation.work_sharing import DaskScheduler, PointOutcome, Processes, shared_map
@@ -139,7 +139,7 @@ def seeds_of(text: str) -> list[int]:
 
 def _wanted(given: argparse.Namespace) -> list[Case]:
     if given.kinds:
-        kinds = declared_kinds() if given.kinds == "all" else given.kinds.split(",")
+        kinds = all_kinds() if given.kinds == "all" else given.kinds.split(",")
         pool = [c for c in kind_cases(given.seeds, kinds) if c.tier in (given.tier or KIND_TIERS)]
     else:
         pool = cases(given.seeds, given.tier or TIERS)

@@ -146,7 +146,9 @@ class Logger:
     load_quantum: float = 0.0  # 0: there is no encoder on the second body
     current_noise: float = 0.01  # A
     coloured: float = 0.0  # of the current, as a multiple of its noise
-    averaged: bool = False  # whether the log holds the mean current of its rows rather than the last one
+    averaged: bool = (
+        False  # whether a row has the mean current since the row before, and not the one from now on
+    )
 
 
 def logged(
@@ -165,9 +167,9 @@ def logged(
             load = np.interp(ticks.time - missing.encoder_delay, ticks.time, load)
         columns.append(_counted(load + missing.encoder_bias, logger.load_quantum))
     current = ticks.current + missing.current_bias
-    if logger.averaged and logger.every > 1:
-        mean = np.convolve(current, np.full(logger.every, 1.0 / logger.every))
-        current = np.concatenate([mean[logger.every - 1 :], np.full(logger.every - 1, current[-1])])
+    if logger.averaged:
+        past = np.concatenate([np.full(logger.every, current[0]), current[:-1]])
+        current = np.convolve(past, np.full(logger.every, 1.0 / logger.every))[logger.every - 1 :]
         current = current[: len(ticks.current)]
     columns.append(current)
     table = np.column_stack(columns)[:: logger.every]

@@ -17,11 +17,11 @@ import numpy as np
 
 from . import specimens
 from .digital_loop import Logger, Ticks, logged, run
-from .kind_decks import NAMES, deck_of, mapping_of
+from .kind_decks import NAMES, SLIDE_SHARE, deck_of, mapping_of
 from .kinds import COMMAND, KINDS, NOISE, Kind, built, stream, wanted
 from .two_bodies import Missing, Plant, TwoBodies
 
-CONDITIONS = ("plain", "coarse", "coloured", "slow")
+CONDITIONS = ("plain", "coarse", "coloured", "slow", "averaged")
 ALL_KINDS = (*KINDS, "specimen")
 _STRIP_NAMES = (
     ("grip", "clamp", "strip", "load_cell"),
@@ -54,8 +54,9 @@ class Truth:
 
 
 def write_kind_case(
-    folder: Path, kind: str, effects: tuple[str, ...], strength: float, seed: int, *, condition: str = "plain"
-) -> Truth:
+    folder: Path, kind: str, effects: tuple[str, ...], strength: float, seed: int, *,
+    condition: str = "plain", says_held: bool = False,
+) -> Truth:  # fmt: skip
     """Write a case and return the truth behind it, which is written beside the records too.
 
     Parameters
@@ -72,17 +73,20 @@ def write_kind_case(
         Fixes machine, names of parts, motion and noise.
     condition
         One of :data:`CONDITIONS`.
+    says_held
+        Whether `records.toml` says that the current is held from row to row, where it is.
 
     Raises
     ------
     ValueError
-        If the kind has no such effect, or no deck can declare it.
+        If the kind has no such effect.
     """
     folder.mkdir(parents=True, exist_ok=True)
     if kind == "specimen":
         _write_strip(folder, effects, strength, seed, condition)
     else:
-        _write_machine(folder, KINDS[kind], effects, strength, seed, condition)
+        told = says_held and condition not in ("slow", "averaged")
+        _write_machine(folder, KINDS[kind], effects, strength, seed, condition, says_held=told)
     truth = truth_of(kind, effects, strength, seed, condition=condition)
     shown = asdict(truth) | {"sizes": {".".join(key): size for key, size in truth.sizes.items()}}
     (folder / "truth.json").write_text(json.dumps(shown, indent=1), encoding="utf-8")
@@ -90,17 +94,20 @@ def write_kind_case(
 
 
 def _write_machine(
-    folder: Path, kind: Kind, effects: tuple[str, ...], strength: float, seed: int, condition: str
-) -> None:
-    if kind.declarable:
-        raise ValueError(f"no deck can declare {kind.name}: {kind.declarable}")
+    folder: Path, kind: Kind, effects: tuple[str, ...], strength: float, seed: int, condition: str, *,
+    says_held: bool,
+) -> None:  # fmt: skip
     plant, missing = built(kind, effects, strength, seed)
     logger, names = conditioned(kind, condition), names_of(kind.name, seed)
     (folder / "deck.toml").write_text(deck_of(kind, effects, names, logger), encoding="utf-8")
-    (folder / "records.toml").write_text(mapping_of(kind, names, logger), encoding="utf-8")
+    (folder / "records.toml").write_text(
+        mapping_of(kind, names, logger, says_held=says_held), encoding="utf-8"
+    )
     for number, (name, ticks) in enumerate(simulated(kind, plant, missing, seed, logger.quantum).items()):
         draw = stream(seed, NOISE, number)
         table = logged(ticks, logger, missing, draw, disc_on_motor=kind.sides == 1)
+        if kind.radius:
+            table[:, 1] /= kind.radius
         heads = ["time", "place", *(["load_place"] if kind.sides == 2 else []), "current"]
         _write_table(folder / f"{name}.csv", table, [names[head] for head in heads])
 
@@ -135,6 +142,10 @@ def truth_of(
     else:
         plant, missing = built(KINDS[kind], effects, strength, seed)
         sizes, numbers = _sizes(plant, missing, effects), _numbers(KINDS[kind], plant, effects, names)
+        if KINDS[kind].radius:
+            # Friction of the motor may be stated in N·m or in N: only what has one unit has a true size.
+            alike = ("drive_delay", "current_sensor_bias", "angle_sensor_delay", "spring_damping")
+            sizes = {key: size for key, size in sizes.items() if key[0] in alike}
     return Truth(kind, effects, strength, seed, condition, sizes, numbers)
 
 
@@ -182,6 +193,8 @@ def conditioned(kind: Kind, condition: str) -> Logger:
         return replace(logger, quantum=kind.coarse, load_quantum=kind.coarse if kind.sides == 2 else 0.0)
     if condition == "coloured":
         return replace(logger, coloured=1.5)
+    if condition == "averaged":
+        return replace(logger, averaged=True)
     if condition == "slow":
         return replace(logger, every=max(round(kind.rate / 100.0), 1))
     return logger
@@ -225,6 +238,14 @@ def _numbers(
             f"{motor}.force_constant": plant.effort_per_ampere,
             f"{names['bearing']}.damping": plant.damping,
         }
+    elif kind.radius:
+        turning = (1.0 - SLIDE_SHARE) * plant.inertia
+        numbers = {
+            f"{motor}.inertia": turning * kind.radius**2,
+            f"{motor}.torque_constant": plant.effort_per_ampere * kind.radius,
+            f"{names['bearing']}.damping": plant.damping,
+            f"{names['load']}.mass": plant.load_inertia,
+        }
     else:
         numbers = {
             f"{motor}.inertia": plant.inertia,
@@ -241,7 +262,7 @@ def _numbers(
         }
     divided = {f"{motor}.inertia", f"{motor}.mass"} if kind.sides == 1 and plant.load_inertia else set()
     if "drivetrain_resonance" in effects and kind.sides == 2:
-        divided = {f"{names['load']}.inertia"}
+        divided = {f"{names['load']}.inertia", f"{names['load']}.mass"}
     return {name: value for name, value in numbers.items() if name not in divided}
 
 
@@ -291,13 +312,14 @@ def main() -> None:
     parser.add_argument("seed", type=int)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--condition", choices=CONDITIONS, default="plain")
+    parser.add_argument("--says-held", action="store_true", help='write between_samples = "held"')
     given = parser.parse_args()
     effects = () if given.effect == "nothing" else tuple(given.effect.split("+"))
-    print(
-        write_kind_case(
-            given.folder, given.kind, effects, given.strength, given.seed, condition=given.condition
-        )
-    )
+    truth = write_kind_case(
+        given.folder, given.kind, effects, given.strength, given.seed,
+        condition=given.condition, says_held=given.says_held,
+    )  # fmt: skip
+    print(truth)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@
 ``direct_drive``     no gear, a loop at 1 kHz
 ``belt_axis``        motor, belt, load; encoders on both sides, 250 Hz
 ``screw_carriage``   motor and screw seen along the line, a scale in metres, 500 Hz
-``rack_carriage``    a turning motor and a sliding carriage with encoders in rad and m: no deck declares it
+``rack_carriage``    a turning motor, a belt that stretches, a carriage; encoders in rad and in m, 500 Hz
 ``mujoco_*``         geared and elastic joints that MuJoCo advances (`mujoco_machines`)
 
 All numbers are invented. The specimen in tension stands in `specimens`.
@@ -46,7 +46,7 @@ class Kind:
     pairs: tuple[tuple[str, str], ...]
     not_listed: tuple[str, ...]
     simulator: str = "own"
-    declarable: str = ""  # why no deck can say it; empty where one can
+    radius: float = 0.0  # m per rad of a turning motor that moves a carriage; 0 where all is of one kind
     deck: str = ""  # kind whose deck it shares
 
     @property
@@ -87,7 +87,7 @@ GEARED_JOINT = Kind(
     coarse=1.5e-3,
     effects=(
         *_FRICTION, "load_dependent_friction", "position_dependent_friction", *_DRIVE, "backlash",
-        "drivetrain_resonance", "gravity_load", "angle_sensor_eccentricity",
+        "drivetrain_resonance", "gravity_load",
     ),
     pairs=(
         ("coulomb_friction", "gravity_load"), ("coulomb_friction", "torque_ripple"),
@@ -194,8 +194,21 @@ SCREW_CARRIAGE = replace(
 RACK_CARRIAGE = replace(
     BELT_AXIS,
     name="rack_carriage",
-    declarable="no part couples a turning motor to a sliding carriage",
-)
+    radius=0.02,
+    plant=Plant(
+        inertia=5.0, effort_per_ampere=40.0, damping=60.0, load_inertia=8.0, load_damping=20.0,
+        stiffness=2.6e4, spring_damping=40.0,
+    ),
+    typical=90.0,
+    sines=SCREW_CARRIAGE.sines,
+    holds=SCREW_CARRIAGE.holds,
+    peak=SCREW_CARRIAGE.peak,
+    multisine=SCREW_CARRIAGE.multisine,
+    rate=500.0,
+    limit=10.0,
+    logger=Logger(quantum=1e-6, load_quantum=1e-6, current_noise=0.01),
+    coarse=2e-5,
+)  # fmt: skip
 _IN_MUJOCO = (
     "coulomb_friction", "viscous_friction", "gravity_load", "torque_ripple", "drive_delay",
     "current_sensor_bias",
@@ -209,7 +222,7 @@ MUJOCO_MOTOR = replace(
     name="mujoco_motor",
     simulator="mujoco",
     deck="geared_joint",
-    effects=(*_IN_MUJOCO, "drivetrain_resonance", "angle_sensor_eccentricity"),
+    effects=(*_IN_MUJOCO, "drivetrain_resonance"),
     pairs=_PAIRS_IN_MUJOCO,
     not_listed=("payload_change", "periodic_disturbance", "external_push", "amplifier_dead_zone"),
 )
@@ -256,6 +269,8 @@ def sizes(kind: Kind, draw: np.random.Generator) -> dict[str, dict[str, float]]:
     fastest = max(a * 2.0 * np.pi * f for a, f, _ in kind.sines)
     largest = max(a for a, _, _ in kind.sines)
     twist = effort / plant.stiffness if plant.stiffness else 0.02 * largest
+    order = plant.gear_ratio if plant.gear_ratio > 1.0 else 14.0 / min(largest, 1.0)
+    order = 12.0 / kind.radius if kind.radius else order
     period, u = 1.0 / kind.rate, float(draw.uniform(-1.0, 1.0))
     return {
         "coulomb_friction": {"friction": 0.12 * effort},
@@ -269,7 +284,7 @@ def sizes(kind: Kind, draw: np.random.Generator) -> dict[str, dict[str, float]]:
         "quadratic_drag": {"drag": 0.25 * effort / fastest**2},
         "torque_ripple": {
             "ripple": 0.08 * effort, "ripple_phase": phase[1],
-            "ripple_order": plant.gear_ratio if plant.gear_ratio > 1.0 else 14.0 / min(largest, 1.0),
+            "ripple_order": order,
         },
         "backlash": {"gap": 0.35 * twist},
         "drive_delay": {"drive_delay": max(0.2 / kind.bandwidth, 3.0 * period)},

@@ -23,7 +23,7 @@ TWO = Plant(
     inertia=0.2, effort_per_ampere=1.0, damping=0.3, load_inertia=0.3, load_damping=0.1, stiffness=90.0,
     spring_damping=0.05, weight=2.0,
 )  # fmt: skip
-OWN = [kind for kind in KINDS.values() if kind.simulator == "own" and not kind.declarable]
+OWN = [kind for kind in KINDS.values() if kind.simulator == "own"]
 needs_mujoco = pytest.mark.skipif(bool(available()), reason=available())
 
 
@@ -151,7 +151,7 @@ def test_a_log_is_slow_coarse_averaged_late_and_biased() -> None:
     assert table[2:, 2] == pytest.approx(2.0 * (time[::4] - 0.05)[2:] + 0.2)
     assert table[:, 3] == pytest.approx(np.arange(0.0, 40.0, 4.0) + 0.5)
     mean = logged(ticks, replace(plain, averaged=True), Missing(), draw)
-    assert mean[:-1, 3] == pytest.approx(np.arange(0.0, 36.0, 4.0) + 1.5)
+    assert mean[1:, 3] == pytest.approx(np.arange(4.0, 40.0, 4.0) - 2.5), "of the four ticks before the row"
 
 
 def test_a_strip_relaxes_as_its_branch_does() -> None:
@@ -176,13 +176,9 @@ def test_every_effect_changes_its_machine_and_scales_with_its_strength() -> None
         built(KINDS["belt_axis"], ("no_such",), 1.0, 1)
 
 
-@pytest.mark.long_cases("elastic_joint", "direct_drive", "belt_axis")
+@pytest.mark.long_cases("elastic_joint", "direct_drive", "belt_axis", "screw_carriage")
 @pytest.mark.parametrize("kind", [name for name in ALL_KINDS if not name.startswith("mujoco")])
 def test_the_files_of_a_case_are_what_the_package_reads(kind: str, tmp_path: Path) -> None:
-    if kind in KINDS and KINDS[kind].declarable:
-        with pytest.raises(ValueError, match="no deck can declare"):
-            write_kind_case(tmp_path, kind, (), 0.0, 1)
-        return
     condition = CONDITIONS[ALL_KINDS.index(kind) % len(CONDITIONS)]
     truth = write_kind_case(tmp_path, kind, ("coulomb_friction",), 1.0, 1, condition=condition)
     declared, records = opened(tmp_path)
@@ -204,6 +200,7 @@ def test_conditions_change_the_log_and_not_the_machine() -> None:
         assert kind.rate / slow.every <= 130.0
         assert conditioned(kind, "coarse").quantum > 10.0 * kind.logger.quantum
         assert conditioned(kind, "coloured").coloured > 0.0
+        assert conditioned(kind, "averaged").averaged
         assert conditioned(kind, "plain") == kind.logger
 
 

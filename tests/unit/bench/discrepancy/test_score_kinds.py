@@ -12,11 +12,11 @@ import pytest
 from benchmarks import discrepancy_score
 from benchmarks._score_cases import KIND_TIERS, PAIRS, Case, sample
 from benchmarks._score_digest import DECIDING, counted_with, digest, shape
-from benchmarks._score_kinds import declared_kinds, kind_cases, kind_of, kind_table, named_with_place
+from benchmarks._score_kinds import all_kinds, kind_cases, kind_of, kind_table, named_with_place
 from benchmarks._score_table import exact
 from benchmarks._score_truth import true_numbers
 from tests.rig import ACTUATORS
-from tests.rig.kind_cases import names_of
+from tests.rig.kind_cases import CONDITIONS, names_of
 from tests.rig.kinds import KINDS
 
 CLEAN, SINGLE, HALF, PAIR, OTHER = KIND_TIERS
@@ -32,19 +32,18 @@ def result(tier: str, machine: str, hidden: list[str], named: list[str], **more:
 
 
 def test_cases_go_round_over_effects_conditions_and_kinds() -> None:
-    pool = kind_cases(range(20), declared_kinds())
-    assert len({case.name for case in pool}) == len(pool) == 20 * 6 * len(declared_kinds())
-    assert "rack_carriage" not in declared_kinds()
-    assert {"mujoco_motor", "mujoco_tendon", "mujoco_gear", "specimen"} < set(declared_kinds())
-    for kind in (KINDS[name] for name in declared_kinds() if name in KINDS):
+    pool = kind_cases(range(20), all_kinds())
+    assert len({case.name for case in pool}) == len(pool) == 20 * 6 * len(all_kinds())
+    assert {"mujoco_motor", "mujoco_tendon", "mujoco_gear", "specimen"} < set(all_kinds())
+    for kind in (KINDS[name] for name in all_kinds() if name in KINDS):
         own = [case for case in pool if case.machine == kind.name]
         assert {c.effects[0] for c in own if c.tier == SINGLE} == set(kind.effects)
         assert {c.effects[0] for c in own if c.tier == HALF} == set(kind.effects)
         assert {c.effects for c in own if c.tier == PAIR} == set(kind.pairs)
         assert {c.effects[0] for c in own if c.tier == OTHER} == set(kind.not_listed)
-        assert {c.noise for c in own if c.tier == CLEAN} == {"plain", "coarse", "coloured", "slow"}
+        assert {c.noise for c in own if c.tier == CLEAN} == set(CONDITIONS)
         assert not any(c.noise == "coarse" and "torque_ripple" in c.effects for c in own)
-    few = sample(pool, len(KIND_TIERS) * len(declared_kinds()))
+    few = sample(pool, len(KIND_TIERS) * len(all_kinds()))
     assert {(c.tier, kind_of(c.machine)) for c in few} == {(c.tier, kind_of(c.machine)) for c in pool}
     cam = [case for case in pool if kind_of(case.machine) == "cam"]
     assert {case.machine for case in cam} == set(ACTUATORS)
