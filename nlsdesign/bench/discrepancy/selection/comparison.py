@@ -166,6 +166,7 @@ class HypothesisFit:
             return declared_parameter(variable, start)
         scale = self._scale(unknown)
         low, high = unknown.lower * scale, unknown.upper * scale
+        low = max(low, self._sizes.get(unknown.beyond, 0.0)) if unknown.beyond else low
         begin = variable.start if start is None else start
         log = unknown.lower > 0.0
         return Parameter(

@@ -94,10 +94,15 @@ class Bench:
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
         self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
         self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
-        if any(column.sampling is None for column in self.records.columns):
-            self._read_as_told(blocks)
-        self.units = {block.name: block.unit for block in blocks}
         self._scales = {block.name: block.effort_per_drive for block in blocks}
+        self._as_measured, self._floors_as_measured = self.records, dict(self.floors)
+        if sampling is None:
+            self.records = self.told(blocks)
+        if self.records is not self._as_measured:
+            self.noise = self.noise.read_as(self.records)
+            self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
+        self._remarks = self.records.remarks
+        self.units = {block.name: block.unit for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, BlockNoise]] = {}
         if clock is None:
             clock = resolving_step(_block_records(self, blocks))
@@ -110,24 +115,35 @@ class Bench:
 
     def with_records(self, records: RecordSet) -> Bench:
         """Return other records of the same bench as they are seen with the same noise and filters."""
+        own = [remark for remark in self._remarks if remark not in records.remarks]
         return Bench(
-            records, self._blocks, noise=self.noise, filters=self.filters, clock=self.clock,
+            replace(records, remarks=(*records.remarks, *own)),
+            self._blocks,
+            noise=self.noise,
+            filters=self.filters,
+            clock=self.clock,
             sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
-        )  # fmt: skip
+        )
 
-    def _read_as_told(self, blocks: Sequence[Block]) -> None:
-        """Read inputs of which nothing is said as the records tell that they run between their samples."""
+    def told(self, blocks: Sequence[Block]) -> RecordSet:
+        """Return the records with inputs of which nothing is said as they tell it by some blocks.
+
+        ``blocks``: of the declared model, or of a better one with the same names.
+        """
         seen = [
             SeenBlock(
-                block,
+                block.scaled_to(self._scales[block.name]),
                 self.filters[block.name],
-                {record: floor for (name, record), floor in self.floors.items() if name == block.name},
+                {
+                    record: floor
+                    for (name, record), floor in self._floors_as_measured.items()
+                    if name == block.name
+                },
             )
             for block in blocks
+            if block.name in self.filters
         ]
-        self.records = with_told_sampling(self.records, seen)
-        self.noise = self.noise.read_as(self.records)
-        self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
+        return with_told_sampling(self._as_measured, seen)
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None

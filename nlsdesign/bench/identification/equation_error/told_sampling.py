@@ -2,9 +2,9 @@
 
 Half a sample is seen in a balance of efforts long before it is seen in a picture. Each way to run between
 samples gives other residuals of the blocks that the input drives; their likelihoods are compared. What else
-the model may lack must not decide: numbers with a spread, and a set of plain terms of each motion (constant,
-place, sine and cosine of it, speed, its sign and its square) take from the residuals what
-they can, however much. So a friction that nobody declared is not taken for a hold.
+the model may lack must not decide: numbers with a spread, and plain terms of each motion (a constant, the
+place, its sine and cosine, the speed, its square, and its sign, alone and times the size of the input) take
+from the residuals what they can, however much. So a friction that nobody declared is not taken for a hold.
 
 Channels of one recorder can also be shifted against each other by a part of a sample, as where they are
 sampled in turn. Up to half a sample of each of the two, such a shift is a number without a meaning of its
@@ -26,17 +26,18 @@ from ..filters import derivative
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..records.sampling import AVERAGED, HELD, SAMPLED, Sampling, shifted
+from ..residuals import effective_size
 from .block import Block
 from .block_noise import BlockNoise, Filters
 from .block_response import DrivenBlock
 
 _FORMS = (SAMPLED, HELD, AVERAGED)
-_PLAINLY = 5.0
-"""Natural logarithm of the likelihood ratio from which another way to run is taken: odds of 150."""
+_PLAINLY = 3.0
+"""Natural logarithm of the likelihood ratio from which another way to run is taken: odds of 20."""
+_NO_FORM = 10.0
+"""The same for a shift that none of the usual ways explains: it is rare, and what a model lacks looks so."""
 _MOST = 1.0
 """Samples by which two channels can be shifted against each other: half a sample of each."""
-_ERRORS = 3.0
-"""Standard errors by which a shift must lie beyond that to be none."""
 
 
 class SeenBlock(NamedTuple):
@@ -54,11 +55,15 @@ def with_told_sampling(records: RecordSet, seen: Sequence[SeenBlock]) -> RecordS
     """
     for column in records.columns:
         if column.sampling is None:
-            told, remark = _told(records, seen, column.signal)
-            remarks = (Finding(f"column '{column.name}'", remark),) if remark else ()
-            records = replace(
-                with_sampling(records, {column.signal: told}), remarks=records.remarks + remarks
-            )
+            told, remark = _told(_asked(records, seen, column.signal))
+            records = with_sampling(records, {column.signal: told})
+        elif column.declared and column.sampling is not SAMPLED:
+            remark = _contradicted(column.sampling, _asked(records, seen, column.signal))
+        else:
+            continue
+        if remark:
+            finding = Finding(f"column '{column.name}'", remark)
+            records = replace(records, remarks=(*records.remarks, finding))
     return records
 
 
@@ -69,34 +74,42 @@ def with_sampling(records: RecordSet, sampling: Mapping[str, Sampling]) -> Recor
 
 
 def _as(record: Record, sampling: Mapping[str, Sampling]) -> Record:
-    known = {signal: form for signal, form in sampling.items() if form is not SAMPLED}
-    return replace(record, sampling={**record.sampling, **known})
+    known = {**record.sampling, **sampling}
+    return replace(record, sampling={s: form for s, form in known.items() if form is not SAMPLED})
 
 
-def _told(records: RecordSet, seen: Sequence[SeenBlock], signal: str) -> tuple[Sampling, str]:
+def _told(likelihood: _Likelihood | None) -> tuple[Sampling, str]:
     """Return how a signal runs between its samples, and the remark on it; none where it is sampled."""
-    driven = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
-    try:
-        likelihood = _Likelihood([_rows(each, records.deciding, signal) for each in driven])
-    except ConvergenceError:
-        return SAMPLED, ""  # a fit tells that the declared numbers give no response
-    shift, error, best = likelihood.shift, likelihood.error, likelihood.of_shift
-    gains = {form.name: value - best for form, value in zip(_FORMS, likelihood.of_forms, strict=True)}
-    if not likelihood.tells or -gains[SAMPLED.name] < _PLAINLY or abs(shift) > _MOST + _ERRORS * error:
+    if likelihood is None or likelihood.loss(SAMPLED) < _PLAINLY:
         return SAMPLED, ""
-    form = max(_FORMS, key=lambda each: gains[each.name])
-    words = f"is taken as {form.name}: it {form.words}"
-    if -gains[form.name] >= _PLAINLY:
-        form = shifted(shift)
-        words = f"is read {abs(shift):.2g} of a sample {'later' if shift > 0.0 else 'earlier'}"
-    others = ", ".join(
-        f"{other.name} is e^{gains[other.name] - gains.get(form.name, 0.0):.3g} times as likely"
-        for other in _FORMS
-        if other is not form
-    )
+    late = f"{likelihood.shift:.2f} ± {likelihood.error:.2g} samples behind its stamps"
+    if abs(likelihood.shift) > _MOST:
+        return SAMPLED, (
+            f"acts {late}; half a sample of each channel may be their clocks and holds, what is beyond is a "
+            "delay of the machine; to tell them apart, write between_samples in records.toml"
+        )
+    form = likelihood.likeliest
+    words, others = f"is taken as {form.name}: it {form.words}", likelihood.losses_of_others(form)
+    if likelihood.loss(form) >= _NO_FORM:
+        form = shifted(likelihood.shift)
+        words = f"is read {abs(form.late):.2g} of a sample {'earlier' if form.late > 0.0 else 'later'}"
     return form, (
-        f"{words}; nothing says how it runs between its samples, and the records show it {shift:.2f} ± "
-        f"{error:.2g} samples behind its stamps ({others}); between_samples in records.toml decides it"
+        f"{words}; nothing says how it runs between its samples, and the records show that it acts {late} "
+        f"({others}); to decide it, write between_samples in records.toml"
+    )
+
+
+def _contradicted(declared: Sampling, likelihood: _Likelihood | None) -> str:
+    """Return the remark that the records speak against what is declared; none where they do not."""
+    if likelihood is None or abs(likelihood.shift) > _MOST or likelihood.likeliest.late == declared.late:
+        return ""
+    form = likelihood.likeliest
+    if likelihood.at(declared.late) < _NO_FORM:
+        return ""
+    return (
+        f"is declared {declared.name}, but the records show that it acts {likelihood.shift:.2f} ± "
+        f"{likelihood.error:.2g} samples behind its stamps ({likelihood.losses_of_others(form)}); it is read "
+        f"as declared: check between_samples in records.toml, {form.name} would fit"
     )
 
 
@@ -107,31 +120,69 @@ class _Rows(NamedTuple):
     terms: Array
 
 
-class _Likelihood:
-    """Likelihoods of the ways in which a signal runs between its samples, and of a shift of any size.
+class _Likelihood(NamedTuple):
+    """Logarithms of the likelihood of each form and of a shift of any size, and that shift in samples."""
 
-    The residuals of each block are freed of its terms. What is left beyond the noise scales the noise: the
-    blocks then say as much less.
+    of_forms: tuple[float, ...]
+    of_shift: float
+    shift: float
+    error: float
+
+    @property
+    def likeliest(self) -> Sampling:
+        """Form with the largest likelihood."""
+        return min(_FORMS, key=self.loss)
+
+    def loss(self, form: Sampling) -> float:
+        """Return the logarithm of the likelihood that a form has less than the best shift."""
+        return self.of_shift - self.of_forms[_FORMS.index(form)]
+
+    def at(self, late: float) -> float:
+        """Return the same for a signal that acts so many samples behind its stamps."""
+        return 0.5 * ((late - self.shift) / self.error) ** 2
+
+    def losses_of_others(self, form: Sampling) -> str:
+        """Return in words how much less likely the other forms are than one of them."""
+        others = (
+            f"{other.name} by {(self.loss(other) - self.loss(form)) / math.log(10.0):.3g}"
+            for other in _FORMS
+            if other is not form
+        )
+        return f"less likely, as decimal logarithms: {', '.join(others)}"
+
+
+def _asked(records: RecordSet, seen: Sequence[SeenBlock], signal: str) -> _Likelihood | None:
+    """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells."""
+    driven = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
+    try:
+        return _likelihood([_rows(each, records.deciding, signal) for each in driven]) if driven else None
+    except ConvergenceError:
+        return None  # a fit tells that the declared numbers give no response
+
+
+def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
+    """Return how likely each form is; nothing where the blocks do not depend on it.
+
+    The residuals of each block are freed of its terms. What is left beyond the noise scales the noise, and
+    rows that depend on each other count as fewer: the blocks then say as much less.
     """
-
-    def __init__(self, blocks: Sequence[_Rows]) -> None:
-        freed = [_freed(each) for each in blocks]
-        rows = np.hstack([residual for residual, _ in freed])
-        slope = rows[_FORMS.index(HELD)] - rows[_FORMS.index(AVERAGED)]
-        information = float(slope @ slope)
-        count = rows.shape[1] - sum(rank for _, rank in freed) - 1
-        self.tells = count > 0 and information > 0.0
-        if not self.tells:
-            self.shift = self.error = self.of_shift = 0.0
-            self.of_forms = [0.0] * len(_FORMS)
-            return
-        sampled = rows[_FORMS.index(SAMPLED)]
-        self.shift = -float(slope @ sampled) / information
-        left = float(np.sum((sampled + self.shift * slope) ** 2))
-        scale = max(1.0, left / count)
-        self.error = math.sqrt(scale / information)
-        self.of_shift = -0.5 * left / scale
-        self.of_forms = [-0.5 * float(row @ row) / scale for row in rows]
+    freed = [_freed(each) for each in blocks]
+    rows = np.hstack([residual for residual, _ in freed])
+    sampled, held, averaged = rows
+    slope = held - averaged
+    information = float(slope @ slope)
+    count = rows.shape[1] - sum(rank for _, rank in freed) - 1
+    if count <= 0 or information == 0.0:
+        return None
+    shift = -float(slope @ sampled) / information
+    best = sampled + shift * slope
+    scale = max(1.0, float(best @ best) / count) * rows.shape[1] / effective_size(best)
+    return _Likelihood(
+        tuple(-0.5 * float(row @ row) / scale for row in rows),
+        -0.5 * float(best @ best) / scale,
+        shift,
+        math.sqrt(scale / information),
+    )
 
 
 def _freed(rows: _Rows) -> tuple[Array, int]:
@@ -154,7 +205,7 @@ def _rows(seen: SeenBlock, records: Sequence[Record], signal: str) -> _Rows:
         floor = seen.floors[record.name]
         values, rows = block.model.values, []
         for form in _FORMS:
-            read = _as(record, {signal: form}) if form is not SAMPLED else record
+            read = _as(record, {signal: form})
             response = driven.respond(driven.samples(read, values), values)
             error = (read.as_computed(block.target) if block.target else 0.0) - response.output
             rows.append((floor.filter @ error) / floor.sigma)
@@ -168,7 +219,11 @@ def _rows(seen: SeenBlock, records: Sequence[Record], signal: str) -> _Rows:
 def _plain_terms(block: Block, record: Record, span: float) -> Iterator[Array]:
     """Yield what may be missing in a block whatever it is: plain functions of what drives it."""
     yield np.ones(len(record.trace))
-    for signal in dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0):
+    motions = dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0)
+    others = dict.fromkeys(d.signal for d in block.drives.values() if d.signal not in motions)
+    inputs = [np.abs(record.trace[signal]) for signal in others]
+    for signal in motions:
         place = record.trace[signal]
         rate = derivative(place, record.step, order=1, span=span)
-        yield from (place, np.sin(place), np.cos(place), rate, np.sign(rate), rate * np.abs(rate))
+        yield from (place, np.sin(place), np.cos(place), rate, rate * np.abs(rate))
+        yield from (np.sign(rate) * size for size in (1.0, *inputs))

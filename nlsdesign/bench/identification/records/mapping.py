@@ -90,6 +90,8 @@ class Column:
         Head of the clock of this column, in the unit of ``[time]``; empty for the clock of ``[time]``.
     sampling
         How the signal runs between its samples; ``None`` where the records are to tell.
+    declared
+        Whether that is said: otherwise the channel may be shifted by up to half a sample.
     """
 
     name: str
@@ -99,6 +101,7 @@ class Column:
     quantum: float = 0.0
     time: str = ""
     sampling: Sampling | None = SAMPLED
+    declared: bool = True
 
 
 @dataclass(frozen=True)
@@ -383,8 +386,10 @@ def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> Colu
                 f"is declared '{column.sampling.name}', but a motion moves on between its samples",
                 next_step='write between_samples = "sampled", or leave it out',
             )
-        known = column.sampling is not None or (column.signal in told and column.signal not in shown)
-        columns.append(column if known else replace(column, sampling=SAMPLED))
+        if column.sampling is None:
+            asked = column.signal in told and column.signal not in shown
+            column = replace(column, sampling=None if asked else SAMPLED, declared=False)
+        columns.append(column)
     return replace(mapping, columns=tuple(columns))
 
 
