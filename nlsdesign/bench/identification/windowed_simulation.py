@@ -121,7 +121,7 @@ class Windows:
                     ends[:, i] = record.sampling_of(drive.signal).over_steps(record.trace[drive.signal])
         # Steps behind the last sample fill up the last window; nothing is read there.
         padded = np.minimum(np.arange(self.number * self.count), n - 2)
-        self.ends = ca.DM(np.vstack(ends[:, :, padded]))
+        self.ends = ca.DM(np.vstack([ends[0][:, padded], ends[1][:, padded]]))
         self.inputs = ca.DM(inputs)
         self.measured = np.array([record.as_computed(name) for name in wiring.outputs])
         # Motion and speed that are measured tell where a window begins.

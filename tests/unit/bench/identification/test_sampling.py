@@ -17,9 +17,7 @@ from nlsdesign.bench.discrepancy import Verdict, diagnose
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.records.sampling import (
-    Sampling,
-)
+from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.smooth_form import smoothed
@@ -101,12 +99,12 @@ damping = {value = 0.04, unit = "N*m*s/rad", source = "declared", spread = 0.7}
 [encoder]
 component = "Encoder"
 of = "motor.angle"
-quantum = {value = 2e-6, unit = "rad", source = "declared"}
+quantum = {value = 2e-5, unit = "rad", source = "declared"}
 
 [load_encoder]
 component = "Encoder"
 of = "load.angle"
-quantum = {value = 2e-6, unit = "rad", source = "declared"}
+quantum = {value = 2e-5, unit = "rad", source = "declared"}
 
 [ammeter]
 component = "CurrentSensor"
@@ -145,7 +143,7 @@ def axis(seed: int) -> Array:
         return moved
 
     table = held(seed, step, rate=250.0, gains=(0.023 * 400.0 / 0.4, 0.023 * 32.0 / 0.4), size=1.5)
-    table[:, 1:3] = 2e-6 * np.round(table[:, 1:3] / 2e-6)
+    table[:, 1:3] = 2e-5 * np.round(table[:, 1:3] / 2e-5)
     return table
 
 
@@ -177,7 +175,7 @@ def held(
 
 
 def bench(
-    folder: Path, deck: str, tables: list[Array], between: str | None = None, more: str = ""
+    folder: Path, deck: str, tables: list[Array], between: str | None = None
 ) -> tuple[Assembly, RecordSet]:
     """Write a deck and its records, the last one held out, and read them as a user would."""
     (folder / "deck.toml").write_text(deck, encoding="utf-8")
@@ -190,7 +188,7 @@ def bench(
             f'unit = "{"A" if name == "ammeter" else "rad"}"',
         ]
     lines += [f'between_samples = "{between}"'] if between else []
-    (folder / "records.toml").write_text("\n".join([*lines, more]), encoding="utf-8")
+    (folder / "records.toml").write_text("\n".join(lines), encoding="utf-8")
     for k, table in enumerate(tables):
         np.savetxt(
             folder / f"run{k}.csv", table, "%.9g", ",", header=",".join(["t_s", *signals]), comments=""
@@ -209,7 +207,7 @@ def remarks(found: Verdict) -> str:
     return " ".join(found.remarks)
 
 
-@pytest.mark.parametrize("between", [None, "held"])
+@pytest.mark.parametrize("between", [None, pytest.param("held", marks=pytest.mark.slow)])
 def test_nothing_is_missing_from_a_joint_whose_controller_holds_its_current(
     tmp_path: Path, between: str | None
 ) -> None:
@@ -218,9 +216,45 @@ def test_nothing_is_missing_from_a_joint_whose_controller_holds_its_current(
     assert ("is taken as held" in remarks(found)) is (between is None)
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_from_an_axis_and_the_damping_of_its_belt_is_right(tmp_path: Path) -> None:
     found = diagnose(*bench(tmp_path, _AXIS, [axis(seed) for seed in range(5)]))
     assert found.verdict == "none"
     numbers = {p.name: (f.values[p.name], f.standard_error(p.name)) for f in found.fits for p in f.parameters}
     value, error = numbers["loss.damping"]
     assert value == pytest.approx(0.03, abs=max(3.0 * error, 6e-4))
+
+
+def test_a_held_current_is_told_beside_friction_that_nobody_declared(tmp_path: Path) -> None:
+    told = forms(*bench(tmp_path, _JOINT, [joint(seed, missing=3.0) for seed in range(4)]))
+    assert told["ammeter"] is not None
+    assert told["ammeter"].late == pytest.approx(0.5, abs=0.1)
+    assert told["encoder"] is SAMPLED
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_wave_is_read_at_the_samples_as_a_filter_sees_it(form: Sampling) -> None:
+    """A hold of one period passes a wave half a sample later, times sin(x)/x; a mean is undone."""
+    turn, at = 0.3, np.arange(200)
+    gain = {"sampled": 1.0, "averaged": (0.5 * turn) / math.sin(0.5 * turn)}
+    expected = gain.get(form.name, math.sin(0.5 * turn) / (0.5 * turn)) * np.sin(turn * (at - form.late))
+    np.testing.assert_allclose(form.at_samples(np.sin(turn * at))[5:-5], expected[5:-5], atol=3e-4)
+
+
+def test_a_held_signal_is_read_held_between_its_samples() -> None:
+    time, values = np.arange(5.0), np.array([0.0, 1.0, 3.0, 3.0, 2.0])
+    np.testing.assert_array_equal(HELD.at_times(time, values, np.array([0.9, 1.0, 2.5])), [0.0, 1.0, 3.0])
+    np.testing.assert_array_equal(HELD.over_steps(values)[1], values[:-1])
+    assert AVERAGED.over_steps(values)[0].shape == (4,)
+
+
+def test_a_motion_that_is_held_is_refused(tmp_path: Path) -> None:
+    bench(tmp_path, _JOINT, [joint(0)[:200], joint(1)[:200]])
+    text = (tmp_path / "records.toml").read_text(encoding="utf-8")
+    spoilt = text.replace('unit = "rad"', 'unit = "rad"\nbetween_samples = "held"')
+    (tmp_path / "records.toml").write_text(spoilt, encoding="utf-8")
+    with pytest.raises(MeasurementError, match="a motion moves on between its samples"):
+        load_records(tmp_path, flatten(smoothed(declare(load_deck(str(tmp_path / "deck.toml"))))))
+    (tmp_path / "records.toml").write_text(spoilt.replace('= "held"', '= "holds"'), encoding="utf-8")
+    with pytest.raises(MeasurementError, match="no way to run between samples"):
+        load_records(tmp_path, flatten(smoothed(declare(load_deck(str(tmp_path / "deck.toml"))))))
