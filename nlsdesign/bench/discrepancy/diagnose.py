@@ -116,6 +116,12 @@ def diagnose(
     base = case.comparison.base(actuator)
     effects = known_effects() if catalogue is None else catalogue
     outcome, decision = _decided(case, base, effects, progress)
+    again = _read_as_told_beside(case, outcome)
+    if again is not None:
+        progress("reading inputs between their samples as they run beside what is named")
+        case = again
+        base = case.comparison.base(actuator)
+        outcome, decision = _decided(case, base, effects, progress)
     progress("reading the held-out records")
     return _verdict(case, base, outcome, decision, records)
 
@@ -132,6 +138,32 @@ class _Case:
     def excesses(self, hypothesis: Hypothesis) -> Excesses:
         """Return the excess of each block on all samples."""
         return excesses(hypothesis, self.bench, self.criteria)
+
+
+_SAME_SAMPLING = 0.1
+"""Samples by which an input may be read otherwise without a second look at everything."""
+
+
+def _read_as_told_beside(case: _Case, outcome: Outcome) -> _Case | None:
+    """Return the case with inputs read between their samples as records tell it beside what is named.
+
+    Backlash that nobody declared, for instance, hides at first that a current is held. Nothing is returned
+    where the inputs are read so already.
+    """
+    if not outcome.steps:
+        return None
+    bench = case.bench
+    records = bench.told(blocks_of(flatten(outcome.last.fitted), bench.records.signals))
+    moved = (
+        abs(now.sampling.late - then.sampling.late)
+        for then, now in zip(bench.records.columns, records.columns, strict=True)
+        if then.sampling and now.sampling
+    )
+    if max(moved, default=0.0) <= _SAME_SAMPLING:
+        return None
+    bench = Bench(records, blocks_of(flatten(case.actuator), records.signals))
+    sizes = typical_sizes(case.actuator, bench.records)
+    return _Case(case.actuator, bench, Comparison(bench, sizes), case.criteria)
 
 
 def _decided(

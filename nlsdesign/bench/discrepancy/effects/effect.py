@@ -38,6 +38,8 @@ class Unknown:
     null
         Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for
         a number that only shapes the effect, such as a time constant or an order.
+    beyond
+        Size below which something plainer explains the number, which is then a bound too; empty for none.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Unknown:
     upper: float
     of: str = ""
     null: float | None = 0.0
+    beyond: str = ""
 
 
 @dataclass(frozen=True)

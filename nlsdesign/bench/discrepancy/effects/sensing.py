@@ -25,7 +25,7 @@ from ....components.core.domain import Domain
 from ....foundation.quantity import Quantity
 from .effect import Edit, Effect, Form, Places, Unknown, free_name, number
 from .places import turning_bodies, turns_per_turn
-from .sizes import LONGEST, QUICKEST
+from .sizes import LONGEST, QUICKEST, SHIFT
 
 _CELLS = (ForceSensor, TorqueSensor)
 """What reads an effort: load cells and torque transducers have the same faults."""
@@ -83,7 +83,7 @@ def _gain(assembly: Assembly, name: str) -> Iterator[Edit]:
 def _delay(assembly: Assembly, name: str) -> Iterator[Edit]:
     delay = TransportDelay(of=assembly.sensors()[name].of, delay=number(1e-3, "s"))
     edited, fault = _with_fault(assembly, name, "delay", delay)
-    unknown = Unknown(f"{fault}.delay", (0.1,), 1e-3, 6.0, QUICKEST)
+    unknown = Unknown(f"{fault}.delay", (0.1,), 1e-3, 6.0, QUICKEST, beyond=SHIFT)
     yield Edit(edited, (unknown,), {"explains_lag": True})
 
 

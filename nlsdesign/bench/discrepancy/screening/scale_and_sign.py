@@ -30,7 +30,7 @@ from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ..block_prediction import shown_values
 from ..effects.places import efforts_of_ties
-from ..effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on
+from ..effects.sizes import LONGEST, QUICKEST, SHIFT, Sizes, efforts_on
 from ..selection.comparison import Comparison, Judged
 from ..selection.hypothesis import Hypothesis
 from ..tearing import blocks_of
@@ -136,6 +136,7 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
     """
     model = flatten(actuator)
     sizes = {LONGEST: max(float(r.trace.time[-1] - r.trace.time[0]) for r in records.records)}
+    sizes[SHIFT] = records.shift
     quickest: dict[str, float] = {}
     signal_of = {r.measured: r.signal for r in _shown(model, records)}
     spans = {name: rate_span(records.records, signal) for name, signal in signal_of.items()}

@@ -166,6 +166,7 @@ class HypothesisFit:
             return declared_parameter(variable, start)
         scale = self._scale(unknown)
         low, high = unknown.lower * scale, unknown.upper * scale
+        low = max(low, self._sizes.get(unknown.beyond, 0.0)) if unknown.beyond else low
         begin = variable.start if start is None else start
         log = unknown.lower > 0.0
         return Parameter(
@@ -351,7 +352,7 @@ def _prediction(evidence: Evidence) -> tuple[Array, Array]:
     """Return the unfiltered output, and the filtered error in units of the noise floor."""
     output = evidence.predicted({})
     target = evidence.driven.block.target
-    error = (evidence.record.trace[target] if target else 0.0) - output
+    error = (evidence.record.as_computed(target) if target else 0.0) - output
     return output, (evidence.floor.filter @ error) / evidence.floor.sigma
 
 
