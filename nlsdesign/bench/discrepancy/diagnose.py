@@ -220,11 +220,12 @@ def _verdict(
     base = base.as_written()
     better = outcome.last if verdict == "named" or outcome.last.released else base
     steps = outcome.steps if verdict == "named" else ()
-    # No record is proposed for the values of a table that has no name.
-    known = tuple(better.as_written().fits.values())
+    # The numbers of a name are those of the fit that was judged, and so is what they leave. No record is
+    # proposed for the values of a table that has no name.
+    judged = better = better.as_written()
+    known, complete = tuple(judged.fits.values()), is_complete(case.excesses(judged))
     if verdict in ("named", "unknown", "undecidable"):
-        better = with_what_has_no_name(case.comparison, better, case.criteria)
-    better = better.as_written()
+        better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)
     worst = _furthest([n for n in before if n != DECLARED], before)
     unpredictable = [k for k in case.bench.floors if k in better.unpredictable]
@@ -233,7 +234,7 @@ def _verdict(
     experiment = _experiment(case, base, outcome, decision)
     return Verdict(
         verdict,
-        tuple(_named(better, step, place, complete=is_complete(after)) for place, step in enumerate(steps)),
+        tuple(_named(judged, better, step, place, complete=complete) for place, step in enumerate(steps)),
         ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
@@ -252,7 +253,7 @@ def _verdict(
             *((experiment.words(),) if experiment else ()),
         ),
         outcome.skipped,
-        complete=is_complete(after),
+        complete=complete,
         criteria=case.criteria,
         remarks=tuple(dict.fromkeys(str(r) for r in (*records.remarks, *every.bench.records.remarks))),
         unnamed=tuple(_unnamed(better, each) for each in better.added[len(steps) :]),
@@ -335,10 +336,13 @@ def _not_predicted(key: Key) -> str:
     )
 
 
-def _numbers(last: Hypothesis, candidate: Candidate) -> dict[str, tuple[float, str, float]]:
-    own = {u.name for u in candidate.unknowns}
+def _numbers(
+    last: Hypothesis, candidate: Candidate, written: Candidate
+) -> dict[str, tuple[float, str, float]]:
+    """Return the fitted numbers of an effect, by the names that they have in the deck that is written."""
+    own = {u.name: w.name for u, w in zip(candidate.unknowns, written.unknowns, strict=True)}
     return {
-        p.name: (last.values[p.name], p.unit, fit.standard_error(p.name))
+        own[p.name]: (last.values[p.name], p.unit, fit.standard_error(p.name))
         for fit in last.fits.values()
         for p in fit.parameters
         if p.name in own
@@ -349,7 +353,7 @@ def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
     return NamedEffect(
         candidate.effect,
         candidate.location,
-        _numbers(last, candidate),
+        _numbers(last, candidate, candidate),
         (),
         math.nan,
         candidate.signature,
@@ -357,13 +361,15 @@ def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
     )
 
 
-def _named(last: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
+def _named(
+    last: Hypothesis, written: Hypothesis, step: Step, place: int, *, complete: bool
+) -> NamedEffect:
     # Later edits may have put the same number under a longer name: the last hypothesis knows.
     candidate = last.added[place]
     return NamedEffect(
         candidate.effect,
         candidate.location,
-        _numbers(last, candidate),
+        _numbers(last, candidate, written.added[place]),
         tuple(h.newest.effect for h in step.equals),
         step.share,
         candidate.signature,

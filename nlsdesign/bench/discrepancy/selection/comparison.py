@@ -318,7 +318,8 @@ class Comparison:
         for block in blocks_of(flatten(hypothesis.assembly), self.bench.records.signals):
             spread = [v.name for v in _refittable(block.model.parameters)]
             own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
-            blocks.append(FreeBlock(block, free_in(block, list(dict.fromkeys([*spread, *own])))))
+            wanted = [n for n in dict.fromkeys([*spread, *own]) if n not in hypothesis.held]
+            blocks.append(FreeBlock(block, free_in(block, wanted)))
         return _groups(blocks)
 
     def _refitted(
@@ -372,9 +373,15 @@ def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
             values[name] *= now[name].number / then[name].number
     added = (*_with_unknowns(hypothesis.added, old), candidate)
     fits = {blocks: _renamed(fit, renamed) for blocks, fit in hypothesis.fits.items()}
-    released = frozenset(map(renamed, hypothesis.released))
+    released, held = (frozenset(map(renamed, names)) for names in (hypothesis.released, hypothesis.held))
     return replace(
-        hypothesis, assembly=candidate.assembly, added=added, values=values, fits=fits, released=released
+        hypothesis,
+        assembly=candidate.assembly,
+        added=added,
+        values=values,
+        fits=fits,
+        released=released,
+        held=held,
     )
 
 

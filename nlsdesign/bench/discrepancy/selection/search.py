@@ -357,12 +357,14 @@ def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criter
     """Return a hypothesis with a table for what each open block leaves over, where one predicts it.
 
     The clauses are those of an effect that ask for prediction; no share is asked for, since nothing is named.
+    What is named keeps the numbers that it was judged with.
     """
-    present = hypothesis
+    present, named = hypothesis.with_names_held(), len(hypothesis.added)
     for block in lacking(excesses(hypothesis, comparison.bench, criteria)):
         before = excesses(present, comparison.bench, criteria)
         fit = next((f for names, f in present.fits.items() if block in names), None)
-        candidate = unnamed_part(present.assembly, fit, comparison.bench, block) if fit else None
+        held = {u.name for each in present.added[:named] for u in each.unknowns}
+        candidate = unnamed_part(present.assembly, fit, comparison.bench, block, held) if fit else None
         if candidate is None:
             continue
         try:
