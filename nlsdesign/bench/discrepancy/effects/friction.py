@@ -31,7 +31,7 @@ from .places import (
     moving_bodies,
     turning_bodies,
 )
-from .sizes import efforts_on
+from .sizes import efforts_on, span_of
 
 
 def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[Assembly, str]:
@@ -107,6 +107,20 @@ def _even_friction(assembly: Assembly, place: str) -> str | None:
         if type(part) is CoulombFriction and (on_body or path.startswith(f"{place}.")):
             return path
     return None
+
+
+def _evenly_round(assembly: Assembly) -> list[str]:
+    """Return the moving bodies whose friction does not come round with the angle."""
+    return [body for body in moving_bodies(assembly) if not _has(WavyFriction, assembly, body)]
+
+
+def _without_spot(assembly: Assembly) -> list[str]:
+    return [body for body in turning_bodies(assembly) if not _has(SpotFriction, assembly, body)]
+
+
+def _has(kind: type[Element], assembly: Assembly, body: str) -> bool:
+    owners = ((assembly[path.partition(".")[0]], part) for path, part in laws(assembly))
+    return any(isinstance(p, kind) and isinstance(tie, Tie) and body in tie.between for tie, p in owners)
 
 
 def _rubbing(assembly: Assembly) -> list[str]:
@@ -199,9 +213,10 @@ def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{path}.sliding_effort", (0.1,), 1e-4, 5.0, around.effort),
         Unknown(f"{path}.place", (-0.7, -0.35, 0.0, 0.35, 0.7), -1.2, 1.2, around.motion, null=None),
-        Unknown(f"{path}.width", (0.15,), 0.01, 3.0, around.motion, null=None),
+        # A spot as wide as the motion is friction everywhere.
+        Unknown(f"{path}.width", (0.25,), 0.01, 0.5, span_of(around.motion), null=None),
     )
-    yield Edit(edited, unknowns)
+    yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
 
 
 def _wavy(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -303,14 +318,14 @@ position_dependent_friction = Effect(
     165,
     (
         Form(
-            moving_bodies,
+            _evenly_round,
             _spot,
             "an effort against the motion in one place only",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
             "friction of a place",
         ),
         Form(
-            turning_bodies,
+            _without_spot,
             _wavy,
             "a torque against the motion that is larger in one half of each turn",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",

@@ -25,7 +25,7 @@ with what the rivals leave of the excess, the noise margin n, and m = 1 where no
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
@@ -68,7 +68,8 @@ class Criteria:
     )
     widest: float = _criterion(
         1.0,
-        "largest standard error of a number on the fitted scale: natural logarithm, or tenths of the range",
+        "largest standard error of a number: as a share of it (1 is 100 %) where it cannot change its sign, "
+        "in tenths of its range where it can",
     )
     worse: float = _criterion(
         0.25,
@@ -344,18 +345,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
         return None
     best = min(able, key=left)
 
-    def is_near(rival: Rival[T]) -> bool:
-        """Tell whether a rival predicts about as well as the best: within noise, or in proportion.
-
-        What it gains in another block does not make up for what it leaves in this one.
-        """
-        here, there = ({block: each.excesses[block]} for each in (rival, best))
-        gains = gain(here, there), gain(rival.excesses, best.excesses)
-        within = not any(criteria.is_more_than_noise(each) for each in gains)
-        nested = rival.effect in best.simpler
-        return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
-
-    near = [rival for rival in able if is_near(rival)]
+    near = [rival for rival in able if predict_alike(criteria, rival, best, block, left)]
     simplest = min(rival.numbers for rival in near)
     alike = dict[str, Rival[T]]()
     for rival in reversed(near):
@@ -368,6 +358,20 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     if any(imitates(criteria, taken, rival, block) for rival in unknown):
         return None
     return Choice(taken, tuple(alike.values()))
+
+
+def predict_alike(
+    criteria: Criteria, rival: Rival[T], best: Rival[T], block: str, left: Callable[[Rival[T]], float]
+) -> bool:
+    """Tell whether a rival predicts about as well as the best: within noise, or in proportion.
+
+    What it gains in another block does not make up for what it leaves in this one.
+    """
+    here, there = ({block: each.excesses[block]} for each in (rival, best))
+    gains = gain(here, there), gain(rival.excesses, best.excesses)
+    within = not any(criteria.is_more_than_noise(each) for each in gains)
+    nested = rival.effect in best.simpler
+    return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
 
 
 def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -> bool:

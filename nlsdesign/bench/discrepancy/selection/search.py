@@ -7,6 +7,7 @@ name: a smooth, passive table in place of an effect, if it predicts what it has 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -14,7 +15,7 @@ from ....foundation.errors import ConvergenceError
 from ..effects.effect import Candidate, EffectFunction
 from ..effects.unnamed_tables import unnamed_part
 from .comparison import Comparison
-from .criteria import Change, Criteria, is_complete, lacking
+from .criteria import Change, Criteria, is_complete, lacking, predict_alike
 from .hypothesis import Hypothesis, excesses
 from .measures import explained, gain, gains_by_record, standing_of, total_excess
 from .trials import Skipped, Step, Trials, Tried, account, rival_of
@@ -289,7 +290,7 @@ class _Search:
                 if step is not None:
                     break
             self.tried = self.tried or account(self.trials, present, tried)
-            further = [step] if step else []
+            further = self._plainer(step, tried, present, block) if step else []
             room = self._most_effects(present) - len(steps)
             if room > 1 and not further and self._is_far_from_closed(start, present, open_blocks[0]):
                 further = self._pair(tried, present, open_blocks[0])
@@ -321,6 +322,37 @@ class _Search:
             shares = explained(self.trials.on_all(start), now)
             blocks = [b for b in blocks if shares.get(b, 0.0) < self.trials.criteria.closed_share]
         return blocks
+
+    def _plainer(
+        self, step: Step, tried: Sequence[Hypothesis], present: Hypothesis, block: str
+    ) -> list[Step]:
+        """Return a step, or two simpler effects that predict as well as its richer form with no more numbers."""
+        chosen = step.chosen.newest
+        forms = {chosen.effect, *chosen.simpler}
+        plain = [h for h in tried if h.newest.effect in chosen.simpler and h.newest.location == chosen.location]
+        others = [h for h in self._best_of_each(tried) if h.newest.effect not in forms][:_PARTNERS]
+        room = self._most_effects(present) - len(present.added)
+        tasks = [
+            (one, again)
+            for one, other in itertools.product(plain if room > 1 else [], others)
+            if len(one.newest.unknowns) + len(other.newest.unknowns) <= len(chosen.unknowns)
+            and (again := same_again(self.trials, one, other.newest)) is not None
+        ]
+        before = self.trials.excesses_of(present)
+        fitted = [h for h in self.trials.fits(tasks) if not any(objections_of_all(self.trials.criteria, h))]
+        pair = self.trials.sound(
+            present, before, {h: self.trials.excesses_of(h) for h in (*fitted, step.chosen)}, block
+        )
+        if pair is None or pair.chosen is step.chosen:
+            return [step]
+        # What both leave alike is one class, with the richer form in it.
+        single = rival_of(step.chosen, self.trials.excesses_of(step.chosen))
+        best = rival_of(pair.chosen, self.trials.excesses_of(pair.chosen))
+        alike = predict_alike(self.trials.criteria, single, best, block, lambda each: each.left_in(block))
+        equals = (step.chosen,) if alike else ()
+        (alone,) = {one for one, _ in tasks if one.newest.effect == pair.chosen.added[-2].effect}
+        first = self.trials.made(before, rival_of(alone, self.trials.excesses_of(alone)), block)
+        return [replace(each, distance=step.distance, equals=equals) for each in (first, pair)]
 
     def _pair(self, tried: Sequence[Hypothesis], present: Hypothesis, block: str) -> list[Step]:
         """Return two effects that help together where none helps alone."""
