@@ -38,6 +38,9 @@ class Unknown:
     null
         Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for
         a number that only shapes the effect, such as a time constant or an order.
+    above
+        Name of a number of the edited assembly of which it is at least three times as much: a speed at which
+        friction falls lies above the width of its sign. Empty where there is none.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Unknown:
     upper: float
     of: str = ""
     null: float | None = 0.0
+    above: str = ""
 
 
 @dataclass(frozen=True)

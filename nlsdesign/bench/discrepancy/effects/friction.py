@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from ....components import (
     Assembly,
     AsymmetricFriction,
     CoulombFriction,
+    Driven,
     Element,
     LoadFriction,
     QuadraticDrag,
@@ -20,6 +22,7 @@ from ....components import (
 )
 from ....components.core.domain import Domain
 from ....components.mechanics.bodies import Free
+from ....foundation.quantity import Quantity, significant
 from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, numbers_of, wrapped
 from .places import (
     beside,
@@ -38,6 +41,34 @@ def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[As
     """Return the assembly with one more element on a body, and the element's name."""
     part = free_name(assembly, name)
     return assembly.with_part(part, tie(element, body)), part
+
+
+_SHARE_OF_SLOWEST = 0.2
+"""Width of the sign of friction, in the slowest speed that the records resolve: there the sign is 0.9999."""
+
+
+def with_resolved_signs(before: Assembly, after: Assembly, slowest: Mapping[str, float]) -> Assembly:
+    """Return an edited assembly whose new friction changes its sign as sharply as the records resolve.
+
+    A width that the records could see would be paid for by something else. What is declared stays.
+
+    Parameters
+    ----------
+    before, after
+        Assembly without and with an effect.
+    slowest
+        Least speed that the records resolve, by name of the body.
+    """
+    declared, widths = {id(each) for each in before.quantities().values()}, dict[str, Quantity]()
+    for name, width in after.quantities().items():
+        part = after[name.partition(".")[0]]
+        ends = part.between if isinstance(part, Tie) else ()
+        moving = [end for end in ends if isinstance(after[end], Driven | Free)]
+        if name.endswith(".creep_speed") and id(width) not in declared and set(moving) <= slowest.keys():
+            least = min((_SHARE_OF_SLOWEST * slowest[end] for end in moving), default=math.inf)
+            if 0.0 < least < width.number:
+                widths[name] = number(significant([least])[0], width.unit)
+    return after.with_values(widths) if widths else after
 
 
 def _with_law(
@@ -94,9 +125,15 @@ def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{path}.sliding_effort", (0.05,), 1e-4, 2.0, around.effort),
         Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
-        Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
+        _stribeck_speed(path, around),
     )
     yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
+
+
+def _stribeck_speed(path: str, around: _Signals) -> Unknown:
+    return Unknown(
+        f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, None, f"{path}.creep_speed"
+    )
 
 
 def _even_friction(assembly: Assembly, place: str) -> str | None:
@@ -156,7 +193,7 @@ def _falling(assembly: Assembly, place: str) -> Iterator[Edit]:
         falling = StribeckFriction(**numbers_of(even), breakaway=more, stribeck_speed=speed)
         unknowns = (
             Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
-            Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
+            _stribeck_speed(path, around),
         )
         yield Edit(assembly.with_part(path, falling), unknowns)
 
