@@ -1,4 +1,4 @@
-"""Small machines in NumPy for tests of the diagnosis: a motor, perhaps a joint behind a spring, sharp friction.
+"""Small machines in NumPy: a motor, perhaps a joint behind a spring, and friction that truly sticks.
 
     Jₘ dωₘ/dt = k I − b ωₘ − friction − spring         J dω/dt = spring − friction − W sin(θ + φ)
     spring = K (θₘ − θ) + D (ωₘ − ω)

@@ -62,6 +62,7 @@ from .mechanics.drive_faults import (
 from .mechanics.friction import (
     AsymmetricFriction,
     CoulombFriction,
+    GearFriction,
     LoadFriction,
     QuadraticDrag,
     StribeckFriction,
@@ -75,7 +76,14 @@ from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
 from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
-from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
+from .sensing.sensor_faults import (
+    ClockDrift,
+    Drift,
+    Eccentricity,
+    EncoderOffset,
+    LoadNonlinearity,
+    TransportDelay,
+)
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, ReadingLimits, Sensor, TorqueSensor
 from .transmission.cam import Cable, Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
@@ -124,6 +132,7 @@ __all__ = [
     "ElectricMotor",
     "Element",
     "Encoder",
+    "EncoderOffset",
     "EndStop",
     "ExtendedTube",
     "FittedRange",
@@ -132,6 +141,7 @@ __all__ = [
     "Following",
     "ForceSensor",
     "Gear",
+    "GearFriction",
     "GearedMotor",
     "GradualSaturation",
     "GravityLoad",

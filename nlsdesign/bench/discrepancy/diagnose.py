@@ -361,9 +361,7 @@ def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
     )
 
 
-def _named(
-    last: Hypothesis, written: Hypothesis, step: Step, place: int, *, complete: bool
-) -> NamedEffect:
+def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
     # Later edits may have put the same number under a longer name: the last hypothesis knows.
     candidate = last.added[place]
     return NamedEffect(

@@ -10,8 +10,10 @@ from ....components import (
     Assembly,
     AsymmetricFriction,
     CoulombFriction,
+    Dashpot,
     Driven,
     Element,
+    GearFriction,
     LoadFriction,
     QuadraticDrag,
     SpotFriction,
@@ -228,6 +230,41 @@ def _loaded(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
 
 
+def _geared(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Let the gear in front of a spring rub in proportion to what the spring carries."""
+
+    def around(inner: str, element: Element) -> Element:
+        return GearFriction(members=((inner, element),), ratio=number(0.01, "1")).smooth()
+
+    edited = wrapped(assembly, name, "driven", around, read_outside=True)
+    yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
+
+
+def _between_moving_bodies(assembly: Assembly) -> list[str]:
+    """Return the ties that pull back between two bodies that move freely."""
+    ends = {name: assembly[name].between for name in loaded_ties(assembly)}  # type: ignore[attr-defined]
+    return [n for n, bodies in ends.items() if len(bodies) == 2 and set(bodies) <= {*moving_bodies(assembly)}]
+
+
+def _undamped(assembly: Assembly) -> list[str]:
+    """Return the moving bodies on which no viscous friction against the resting frame is declared."""
+    ties = ((path.partition(".")[0], part) for path, part in laws(assembly) if isinstance(part, Dashpot))
+    ends = (assembly[name].between for name, _ in ties if isinstance(assembly[name], Tie))  # type: ignore[attr-defined]
+    free = {*moving_bodies(assembly)}
+    damped = {body for bodies in ends if len(free & set(bodies)) == 1 for body in bodies}
+    return [body for body in moving_bodies(assembly) if body not in damped]
+
+
+def _viscous(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        return Dashpot(damping=number(1e-3, domain.unit("{effort}*s/{motion}")), domain=domain)
+
+    edited, path = _with_law(assembly, place, "viscous_friction", law)
+    around = _signals_at(assembly, place)
+    unknown = Unknown(f"{path}.damping", (0.05,), 1e-5, 10.0, f"{around.effort} / {around.speed}")
+    yield Edit(edited, (unknown,))
+
+
 def _drag(assembly: Assembly, place: str) -> Iterator[Edit]:
     def law(domain: Domain) -> Element:
         unit = domain.unit("{effort}*s^2/{motion}^2")
@@ -322,6 +359,26 @@ load_dependent_friction = Effect(
             "an effort against the motion in proportion to the load",
             "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
             "load friction",
+        ),
+        Form(
+            _between_moving_bodies,
+            _geared,
+            "a torque against the motion of the drive alone, in proportion to what it carries",
+            "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
+            "load friction",
+        ),
+    ),
+)
+viscous_friction = Effect(
+    "viscous_friction",
+    "Friction in proportion to the speed, on a body that turns or slides and has none declared.",
+    35,
+    (
+        Form(
+            _undamped,
+            _viscous,
+            "an effort against the motion in proportion to the speed",
+            "Newton 1687, book II",
         ),
     ),
 )

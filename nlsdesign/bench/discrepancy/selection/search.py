@@ -326,10 +326,12 @@ class _Search:
     def _plainer(
         self, step: Step, tried: Sequence[Hypothesis], present: Hypothesis, block: str
     ) -> list[Step]:
-        """Return a step, or two simpler effects that predict as well as its richer form with no more numbers."""
+        """Return a step, or two simpler effects that predict as well with no more numbers."""
         chosen = step.chosen.newest
         forms = {chosen.effect, *chosen.simpler}
-        plain = [h for h in tried if h.newest.effect in chosen.simpler and h.newest.location == chosen.location]
+        plain = [
+            h for h in tried if h.newest.effect in chosen.simpler and h.newest.location == chosen.location
+        ]
         others = [h for h in self._best_of_each(tried) if h.newest.effect not in forms][:_PARTNERS]
         room = self._most_effects(present) - len(present.added)
         tasks = [

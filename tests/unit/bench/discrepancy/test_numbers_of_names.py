@@ -15,7 +15,7 @@ SLIDING = 0.12
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
-    """A motor whose friction is Coulomb's and grows with a weight of one sign; only Coulomb's is looked for."""
+    """A motor whose friction is Coulomb's and grows with a weight; only Coulomb's is looked for."""
     machine = Machine(
         weight=3.0,
         middle=0.9,

@@ -1,4 +1,4 @@
-"""Which friction it is: sharp Coulomb friction, one that falls with speed, grows with load, or has a place."""
+"""Which friction it is: Coulomb's, one that falls with speed, grows with load, or has a place."""
 
 from __future__ import annotations
 
@@ -53,9 +53,7 @@ def test_friction_that_falls_with_speed_keeps_its_numbers(tmp_path: Path) -> Non
 def test_coulomb_and_load_friction_on_a_weight_of_one_sign_are_one_class_with_friction_of_a_place(
     tmp_path: Path,
 ) -> None:
-    machine = Machine(
-        weight=3.0, middle=1.4, friction=lambda rate, angle, load: 0.12 + 0.08 * abs(load)
-    )
+    machine = Machine(weight=3.0, middle=1.4, friction=lambda rate, angle, load: 0.12 + 0.08 * abs(load))
     found = named(machine, tmp_path)
     assert [each.name for each in found.effects] == ["coulomb_friction", "load_dependent_friction"]
     values = [value for each in found.effects for value, _, _ in each.parameters.values()]
