@@ -145,7 +145,7 @@ def _decided(
     ]
     findings = findings or drive_findings(case.actuator, case.comparison, base)
     lagging = lagging_forces(case.actuator, records)
-    if findings or (lagging.findings and not lagging.testable):
+    if findings:
         findings += lagging.findings
         return Outcome(base), _Decision("data_suspect", tuple(str(f) for f in findings))
     outcome = _searched(case, base, catalogue, progress)
@@ -223,7 +223,8 @@ def _verdict(
     # The numbers of a name are those of the fit that was judged, and so is what they leave. No record is
     # proposed for the values of a table that has no name.
     judged = better = better.as_written()
-    known, complete = tuple(judged.fits.values()), is_complete(case.excesses(judged))
+    left, known = case.excesses(judged), tuple(judged.fits.values())
+    complete = is_complete(left)
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)
@@ -234,7 +235,7 @@ def _verdict(
     experiment = _experiment(case, base, outcome, decision)
     return Verdict(
         verdict,
-        tuple(_named(judged, better, step, place, complete=complete) for place, step in enumerate(steps)),
+        tuple(_named(judged, better, step, place, left) for place, step in enumerate(steps)),
         ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
@@ -282,11 +283,16 @@ def _furthest(names: Sequence[str], excesses: Excesses) -> str:
 
 
 def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[Any, ...], ...]:
-    """Return what was tried first: identifier, share that it explains alone, and why it is not named."""
+    """Return what was tried first: identifier, share that it explains alone, why it is not named, numbers."""
     named = {step.effect for step in steps}
     first = sorted(outcome.tried, key=lambda each: each.candidate.effect not in named)[:_RUNNERS_UP]
     return tuple(
-        (each.candidate.effect, each.share, *(("; ".join(each.objections),) if each.objections else ()))
+        (
+            each.candidate.effect,
+            each.share,
+            "; ".join(each.objections),
+            _numbers(each.hypothesis, each.candidate, each.candidate),
+        )
         for each in sorted(first, key=lambda each: -each.share)
     )
 
@@ -361,7 +367,7 @@ def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
     )
 
 
-def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
+def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, left: Excesses) -> NamedEffect:
     # Later edits may have put the same number under a longer name: the last hypothesis knows.
     candidate = last.added[place]
     return NamedEffect(
@@ -372,9 +378,17 @@ def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, *, com
         step.share,
         candidate.signature,
         candidate.source,
-        probability=CALIBRATION.probability(step.distance, complete=complete) / (1 + len(step.equals)),
+        probability=CALIBRATION.probability(
+            step.distance, complete=is_complete(left), times_noise=_times_noise(left[step.block])
+        )
+        / (1 + len(step.equals)),
         evidence=_evidence(step, standing_of(candidate.unknowns, last.fits.values())),
     )
+
+
+def _times_noise(left: Excess) -> float:
+    """Return what is left in a block in multiples of its noise floor, at least one."""
+    return math.sqrt(max(1.0, left.mean_square)) if left.open else 1.0
 
 
 def _evidence(step: Step, standing: Standing) -> EffectEvidence:

@@ -128,7 +128,8 @@ def _drift(assembly: Assembly, name: str) -> Iterator[Edit]:
     kind = _domain(cell)
     drift = Drift(of=cell.of, drift=number(0.0, kind.unit("{effort}/s")), domain=kind)
     edited, fault = _with_fault(assembly, name, "drift", drift)
-    yield Edit(edited, (Unknown(f"{fault}.drift", (0.0,), -1.0, 1.0, f"{name}.reading / {LONGEST}"),))
+    unknown = Unknown(f"{fault}.drift", (0.0,), -1.0, 1.0, f"{name}.reading / {LONGEST}")
+    yield Edit(edited, (unknown,), {"bends_reading": True})
 
 
 def _nonlinearity(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -136,7 +137,8 @@ def _nonlinearity(assembly: Assembly, name: str) -> Iterator[Edit]:
     unit = Quantity(1.0, _domain(cell).effort_unit, "definition: the gain is told per unit of load")
     law = LoadNonlinearity(of=cell.of, nonlinearity=number(0.0, "1"), full_scale=unit)
     edited, fault = _with_fault(assembly, name, "nonlinearity", law)
-    yield Edit(edited, (Unknown(f"{fault}.nonlinearity", (0.0,), -0.45, 2.0, f"1 / {name}.reading"),))
+    unknown = Unknown(f"{fault}.nonlinearity", (0.0,), -0.45, 2.0, f"1 / {name}.reading")
+    yield Edit(edited, (unknown,), {"bends_reading": True})
 
 
 def _eccentric_disc(assembly: Assembly, name: str) -> Iterator[Edit]:

@@ -16,10 +16,11 @@ Of several such effects the one that predicts best is taken, unless a simpler on
 
 The probability that a name is right is calibrated on cases with known answers:
 
-    ln(p/(1 − p)) = a + b·ln(r) + c·m,   r = (left by the best other name + n)/(left by the named + n)
+    ln(p/(1 − p)) = a + b·ln(r) + c·m − d·ln(l),   r = (left by the best other + n)/(left by the named + n)
 
 with what the rivals leave of the excess, the noise margin n, and m = 1 where nothing is left beyond the noise
-(Platt 1999: a logistic curve through scores). What the records cannot tell apart shares the probability.
+(Platt 1999: a logistic curve through scores), and l, what is left in the block in multiples of its noise: the
+right name may be in no list. What the records cannot tell apart shares the probability.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ class Criteria:
         0.05, "share of the excess of a block that the inexact form of a named effect may leave in it"
     )
     stands_out: float = _criterion(
-        1.5, "where a block stays open, every other name must leave at least so many times as much"
+        1.2, "where a block stays open, every other name must leave at least so many times as much"
     )
     closed_share: float = _criterion(
         0.75, "share of the excess of a block that all effects in it together must explain for a name"
@@ -390,8 +391,8 @@ class Calibration:
 
     Parameters
     ----------
-    offset, distance, complete
-        a, b and c of the module's formula.
+    offset, distance, complete, left
+        a, b, c and d of the module's formula.
     most
         No more is stated: so many cases cannot show that one in a hundred is wrong.
     """
@@ -399,11 +400,13 @@ class Calibration:
     offset: float = 1.0
     distance: float = 1.05
     complete: float = 1.25
+    left: float = 0.5
     most: float = 0.99
 
-    def probability(self, distance: float, *, complete: bool) -> float:
+    def probability(self, distance: float, *, complete: bool, times_noise: float = 1.0) -> float:
         """Return the probability that a name is right."""
         score = self.offset + self.distance * distance + self.complete * complete
+        score -= self.left * math.log(times_noise)
         return min(self.most, 1.0 / (1.0 + math.exp(-score)))
 
 

@@ -17,7 +17,7 @@ from ..effects.unnamed_tables import unnamed_part
 from .comparison import Comparison
 from .criteria import Change, Criteria, is_complete, lacking, predict_alike
 from .hypothesis import Hypothesis, excesses
-from .measures import explained, gain, gains_by_record, standing_of, total_excess
+from .measures import Standing, explained, gain, gains_by_record, standing_of, total_excess
 from .trials import Skipped, Step, Trials, Tried, account, rival_of
 
 
@@ -66,6 +66,49 @@ class Revision:
             else:
                 place += 1
         return steps
+
+    def sound(self, steps: list[Step]) -> list[Step]:
+        """Drop the effects that do not hold every clause beside all others, the last added first.
+
+        A fault of a sensor that bends a reading leaves too where a smooth law of what is read does as much.
+        """
+        place = len(steps) - 1
+        while len(steps) > 1 and place >= 0:
+            fewer = self._without(steps, place)
+            if fewer and (why := self._against(steps, place, fewer[-1].chosen)):
+                added = steps[place].chosen.newest
+                beside = fewer[-1].chosen.names
+                self.trials.skipped.append(Skipped(added.effect, added.location, beside, "; ".join(why)))
+                steps, place = fewer, len(fewer)
+            place -= 1
+        return steps
+
+    def _against(self, steps: Sequence[Step], place: int, fewer: Hypothesis) -> list[str]:
+        """Return in words what speaks against an effect beside all others."""
+        every, criteria = steps[-1].chosen, self.trials.criteria
+        change = Change(criteria, self.trials.excesses_of(fewer), self.trials.excesses_of(every))
+        added = every.added[place]
+        # Its numbers are asked on all samples.
+        why = list(change.objections(Standing()))
+        if added.bends_reading and self._is_smooth_law(steps, place, fewer):
+            why.append("a smooth law of what is read explains as much")
+        return why
+
+    def _is_smooth_law(self, steps: Sequence[Step], place: int, fewer: Hypothesis) -> bool:
+        """Tell whether a table over the motion does what a sensor's fault does, beside a named law."""
+        block, sensors = steps[place].block, fewer.assembly.sensors()
+        laws = [s for s in steps if s.block == block and s.chosen.newest.location not in sensors]
+        fit = next((f for names, f in fewer.fits.items() if block in names), None)
+        comparison = self.trials.comparison
+        table = unnamed_part(fewer.assembly, fit, comparison.bench, block) if laws and fit else None
+        try:
+            smooth = comparison.with_effect(fewer, table) if table else None
+        except ConvergenceError:
+            return False
+        if smooth is None:
+            return False
+        law, fault = (self.trials.excesses_of(h)[block].excess for h in (smooth, steps[-1].chosen))
+        return law <= self.trials.criteria.equal * fault
 
     def enriched(self, steps: list[Step]) -> list[Step]:
         """Put a richer form of an effect in its place where it leaves much less.
@@ -223,7 +266,7 @@ class _Search:
         # with much left may have a name at all. Fits to all samples are the dearest, so they come after
         # that. What each effect gains is asked of the final set, because dropping any other one changes it.
         steps = revision.simplified(revision.backward(self._forward(start)))
-        steps = self._explaining(start, steps)
+        steps = self._explaining(start, revision.sound(steps))
         last = self._fitted_to_all(start, steps)
         skipped = tuple(dict.fromkeys(self.trials.skipped))
         if last is None:

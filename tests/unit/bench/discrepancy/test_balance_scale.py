@@ -88,7 +88,7 @@ def test_a_drive_that_does_not_saturate_gains_nothing_by_saturation() -> None:
 
 @pytest.mark.parametrize("logged", [0.0, 1.0])
 def test_dry_friction_is_no_drive_whose_torque_fades_or_grows(logged: float) -> None:
-    """A drive that grew without end would make any error small, also of a current of zero; or it fades away."""
+    """A drive that grew without end would make any error small, and one that fades is gone."""
     measured = records(drive(friction=0.8), logged=logged)
     without, _ = left(measured, drive())
     with_it, _ = left(measured, drive(DRIFTING))
