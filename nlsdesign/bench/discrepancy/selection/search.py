@@ -8,6 +8,7 @@ name: a smooth, passive table in place of an effect, if it predicts what it has 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -300,7 +301,7 @@ class _Search:
             return []
         first, last = (self.trials.excesses_of(each) for each in (start, steps[-1].chosen))
         left = Change(self.trials.criteria, first, last).unexplained()
-        kept = [s for s in steps if s.block not in left or self.trials.criteria.is_outstanding(s.distance)]
+        kept = [s for s in steps if s.block not in left or self._stands_out(s)]
         if len(kept) == len(steps):
             return steps
         shares, least = explained(first, last), self.trials.criteria.closed_share
@@ -314,6 +315,13 @@ class _Search:
         }
         self.tried = tuple(_with_objection(each, why) for each in self.tried)
         return Revision(self.trials, start).rebuilt(kept)
+
+    def _stands_out(self, step: Step) -> bool:
+        """Tell whether an effect explains plainly more than any other, also of those in a class with it."""
+        own, criteria = self.trials.excesses_of(step.chosen)[step.block].excess, self.trials.criteria
+        alike = (self.trials.excesses_of(each)[step.block].excess / max(own, 1.0) for each in step.equals)
+        nearest = min(alike, default=math.inf)
+        return criteria.is_outstanding(min(step.distance, math.log(max(nearest, 1e-300))))
 
     def _forward(self, start: Hypothesis) -> list[Step]:
         """Return the effects that may be named, one after the other."""
