@@ -76,8 +76,8 @@ def speed_change(rate: Expression, speed: Expression, sample_time: float) -> Exp
     Friction is stiff near zero speed: held at its value it would throw the speed from side to side. So it
     comes last (Lie splitting), its step is the exponential Rosenbrock–Euler one, Δω = T·f·(e^x − 1)/x with
     x = T·∂f/∂ω, which is exact where f is linear, and it may stop the speed but not turn it around. Here f is
-    the rate that friction gives the speed. At rest itself the slope is that beside it: a speed of zero and one
-    of 1e-21 rad/s, which differ by rounding, must give the same covariance.
+    the rate that friction gives the speed. At rest the slope is that beside it: a speed of zero and one of
+    1e-21 rad/s, which differ by rounding, must give the same covariance.
     """
     x = sample_time * ca.jacobian(rate, speed)
     # Away from zero, where the quotient is undefined; its limit there is one.

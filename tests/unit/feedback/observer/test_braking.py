@@ -1,4 +1,4 @@
-"""What friction takes from a speed in one sample: it stops but never turns, and rest has no corner of its own."""
+"""What friction takes from a speed in one sample: it stops but never turns, and rest is no exception."""
 
 from __future__ import annotations
 
