@@ -18,6 +18,11 @@ def efforts_on(body: str) -> str:
     return f"efforts on {body}"
 
 
+def span_of(motion: str) -> str:
+    """Return the name of the distance between both ends of a measured motion."""
+    return f"span of {motion}"
+
+
 class Sizes(Mapping[str, float]):
     """The largest value of each signal on the records, and products and quotients of them.
 

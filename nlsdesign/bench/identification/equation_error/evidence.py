@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,12 +12,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from ....foundation.arrays import Array
 from ....simulation import Trace
-from ..filters import every
+from ..filters import derivative, every
 from ..records.measurement import Record, RecordSet, in_canonical_order
 from ..records.sampling import Sampling
 from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
 from .block import Block
-from .block_noise import BlockNoise, Filters, noise_of_blocks
+from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
@@ -193,6 +194,18 @@ class Bench:
         # One estimate of the noise serves all records, so more of them make it no better.
         doubt = float(np.mean([1.0 / f.known for (name, _), f in self.floors.items() if name == block]))
         return 1.0 / doubt if doubt else math.inf
+
+    def slowest(self) -> dict[str, float]:
+        """Return the least speed that some record resolves, by the measured signal that it is the rate of."""
+        speeds: dict[str, float] = {}
+        for block, record in itertools.product(self._blocks, self.records.deciding):
+            span = self.filters[block.name].span
+            for name, drive in block.drives.items():
+                if drive.order == 1 or name == block.moving:
+                    rate = derivative(record.trace[drive.signal], record.step, order=drive.order, span=span)
+                    least = slowest_rate(drive, record, self.noise, span, rate)
+                    speeds[drive.signal] = min(least, speeds.get(drive.signal, math.inf))
+        return speeds
 
     def _thinned(self, block: str, record: Record, *, whole: bool) -> tuple[Record, BlockNoise]:
         """Return every k-th sample unfiltered; with ``whole`` all are simulated and the same are compared."""
