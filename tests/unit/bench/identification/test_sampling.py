@@ -19,8 +19,8 @@ from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling
 from nlsdesign.components import Assembly
-from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.changed_copies import smoothed
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError
