@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from ....components import (
     Assembly,
     AsymmetricFriction,
     CoulombFriction,
+    Dashpot,
+    Driven,
     Element,
+    GearFriction,
     LoadFriction,
     QuadraticDrag,
     SpotFriction,
@@ -20,6 +24,7 @@ from ....components import (
 )
 from ....components.core.domain import Domain
 from ....components.mechanics.bodies import Free
+from ....foundation.quantity import Quantity, significant
 from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, numbers_of, wrapped
 from .places import (
     beside,
@@ -31,13 +36,41 @@ from .places import (
     moving_bodies,
     turning_bodies,
 )
-from .sizes import efforts_on
+from .sizes import efforts_on, span_of
 
 
 def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[Assembly, str]:
     """Return the assembly with one more element on a body, and the element's name."""
     part = free_name(assembly, name)
     return assembly.with_part(part, tie(element, body)), part
+
+
+_SHARE_OF_SLOWEST = 0.2
+"""Width of the sign of friction, in the slowest speed that the records resolve: there the sign is 0.9999."""
+
+
+def with_resolved_signs(before: Assembly, after: Assembly, slowest: Mapping[str, float]) -> Assembly:
+    """Return an edited assembly whose new friction changes its sign as sharply as the records resolve.
+
+    A width that the records could see would be paid for by something else. What is declared stays.
+
+    Parameters
+    ----------
+    before, after
+        Assembly without and with an effect.
+    slowest
+        Least speed that the records resolve, by name of the body.
+    """
+    declared, widths = {id(each) for each in before.quantities().values()}, dict[str, Quantity]()
+    for name, width in after.quantities().items():
+        part = after[name.partition(".")[0]]
+        ends = part.between if isinstance(part, Tie) else ()
+        moving = [end for end in ends if isinstance(after[end], Driven | Free)]
+        if name.endswith(".creep_speed") and id(width) not in declared and set(moving) <= slowest.keys():
+            least = min((_SHARE_OF_SLOWEST * slowest[end] for end in moving), default=math.inf)
+            if 0.0 < least < width.number:
+                widths[name] = number(significant([least])[0], width.unit)
+    return after.with_values(widths) if widths else after
 
 
 def _with_law(
@@ -94,9 +127,15 @@ def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{path}.sliding_effort", (0.05,), 1e-4, 2.0, around.effort),
         Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
-        Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
+        _stribeck_speed(path, around),
     )
     yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
+
+
+def _stribeck_speed(path: str, around: _Signals) -> Unknown:
+    return Unknown(
+        f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, None, f"{path}.creep_speed"
+    )
 
 
 def _even_friction(assembly: Assembly, place: str) -> str | None:
@@ -107,6 +146,20 @@ def _even_friction(assembly: Assembly, place: str) -> str | None:
         if type(part) is CoulombFriction and (on_body or path.startswith(f"{place}.")):
             return path
     return None
+
+
+def _evenly_round(assembly: Assembly) -> list[str]:
+    """Return the moving bodies whose friction does not come round with the angle."""
+    return [body for body in moving_bodies(assembly) if not _has(WavyFriction, assembly, body)]
+
+
+def _without_spot(assembly: Assembly) -> list[str]:
+    return [body for body in turning_bodies(assembly) if not _has(SpotFriction, assembly, body)]
+
+
+def _has(kind: type[Element], assembly: Assembly, body: str) -> bool:
+    owners = ((assembly[path.partition(".")[0]], part) for path, part in laws(assembly))
+    return any(isinstance(p, kind) and isinstance(tie, Tie) and body in tie.between for tie, p in owners)
 
 
 def _rubbing(assembly: Assembly) -> list[str]:
@@ -142,7 +195,7 @@ def _falling(assembly: Assembly, place: str) -> Iterator[Edit]:
         falling = StribeckFriction(**numbers_of(even), breakaway=more, stribeck_speed=speed)
         unknowns = (
             Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
-            Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
+            _stribeck_speed(path, around),
         )
         yield Edit(assembly.with_part(path, falling), unknowns)
 
@@ -177,6 +230,41 @@ def _loaded(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
 
 
+def _geared(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Let the gear in front of a spring rub in proportion to what the spring carries."""
+
+    def around(inner: str, element: Element) -> Element:
+        return GearFriction(members=((inner, element),), ratio=number(0.01, "1")).smooth()
+
+    edited = wrapped(assembly, name, "driven", around, read_outside=True)
+    yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
+
+
+def _between_moving_bodies(assembly: Assembly) -> list[str]:
+    """Return the ties that pull back between two bodies that move freely."""
+    ends = {name: assembly[name].between for name in loaded_ties(assembly)}  # type: ignore[attr-defined]
+    return [n for n, bodies in ends.items() if len(bodies) == 2 and set(bodies) <= {*moving_bodies(assembly)}]
+
+
+def _undamped(assembly: Assembly) -> list[str]:
+    """Return the moving bodies on which no viscous friction against the resting frame is declared."""
+    ties = ((path.partition(".")[0], part) for path, part in laws(assembly) if isinstance(part, Dashpot))
+    ends = (assembly[name].between for name, _ in ties if isinstance(assembly[name], Tie))  # type: ignore[attr-defined]
+    free = {*moving_bodies(assembly)}
+    damped = {body for bodies in ends if len(free & set(bodies)) == 1 for body in bodies}
+    return [body for body in moving_bodies(assembly) if body not in damped]
+
+
+def _viscous(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        return Dashpot(damping=number(1e-3, domain.unit("{effort}*s/{motion}")), domain=domain)
+
+    edited, path = _with_law(assembly, place, "viscous_friction", law)
+    around = _signals_at(assembly, place)
+    unknown = Unknown(f"{path}.damping", (0.05,), 1e-5, 10.0, f"{around.effort} / {around.speed}")
+    yield Edit(edited, (unknown,))
+
+
 def _drag(assembly: Assembly, place: str) -> Iterator[Edit]:
     def law(domain: Domain) -> Element:
         unit = domain.unit("{effort}*s^2/{motion}^2")
@@ -199,9 +287,10 @@ def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{path}.sliding_effort", (0.1,), 1e-4, 5.0, around.effort),
         Unknown(f"{path}.place", (-0.7, -0.35, 0.0, 0.35, 0.7), -1.2, 1.2, around.motion, null=None),
-        Unknown(f"{path}.width", (0.15,), 0.01, 3.0, around.motion, null=None),
+        # A spot as wide as the motion is friction everywhere.
+        Unknown(f"{path}.width", (0.25,), 0.01, 0.5, span_of(around.motion), null=None),
     )
-    yield Edit(edited, unknowns)
+    yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
 
 
 def _wavy(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -271,6 +360,26 @@ load_dependent_friction = Effect(
             "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
             "load friction",
         ),
+        Form(
+            _between_moving_bodies,
+            _geared,
+            "a torque against the motion of the drive alone, in proportion to what it carries",
+            "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
+            "load friction",
+        ),
+    ),
+)
+viscous_friction = Effect(
+    "viscous_friction",
+    "Friction in proportion to the speed, on a body that turns or slides and has none declared.",
+    35,
+    (
+        Form(
+            _undamped,
+            _viscous,
+            "an effort against the motion in proportion to the speed",
+            "Newton 1687, book II",
+        ),
     ),
 )
 quadratic_drag = Effect(
@@ -303,14 +412,14 @@ position_dependent_friction = Effect(
     165,
     (
         Form(
-            moving_bodies,
+            _evenly_round,
             _spot,
             "an effort against the motion in one place only",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
             "friction of a place",
         ),
         Form(
-            turning_bodies,
+            _without_spot,
             _wavy,
             "a torque against the motion that is larger in one half of each turn",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",

@@ -262,6 +262,15 @@ class RecordSet:
         """Records that may decide on noise and filters: those held out only where there are no others."""
         return self.of("fit", "selection") or self.records
 
+    @property
+    def shift(self) -> float:
+        """Time in s by which two channels may be shifted against each other without any fault.
+
+        Half a sample of each of which is not said how it runs between its samples.
+        """
+        loose = min(2, sum(not column.declared for column in self.columns))
+        return 0.5 * loose * max(record.step for record in self.records)
+
     def of(self, *roles: Role) -> tuple[Record, ...]:
         """Return the records of some roles.
 
