@@ -46,7 +46,7 @@ def write_drawings(
     folder: Path,
     contour: Contour,
     *,
-    machined: MachinedCam | None = None,
+    machined: MachinedCam | CamPart | None = None,
     name: str = "cam",
     note: str = "",
     cable_radius: float = 0.0,
@@ -64,7 +64,7 @@ def write_drawings(
     contour
         What the cable's centre line touches.
     machined
-        Sizes of the part.
+        Sizes of the part, or the part itself where it was made for this contour.
     name
         Name of the files without suffix.
     note
@@ -104,7 +104,8 @@ def write_drawings(
             next_step="leave cable_radius out",
         )  # fmt: skip
     else:
-        texts = _part_texts(machined.part(contour), contour, name, note)
+        part = machined if isinstance(machined, CamPart) else machined.part(contour)
+        texts = _part_texts(part, contour, name, note)
     # All are made before the first is written.
     made = [(f"{name}{ending}", text()) for suffix in formats for ending, text in texts[suffix].items()]
     for file, text in made:

@@ -13,6 +13,7 @@ from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
 from ...foundation.quantity import Quantity, parse_unit, with_unit
 from ...foundation.written_numbers import prefixed, without_power
+from ...model.structure import CamNames
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
@@ -242,6 +243,8 @@ class CamDesign:
         Where the search from each start came to; ``taken`` is the number of the one that was taken.
     taken
         Number of the start.
+    cam
+        Names around the cam: of its part, cable and rubber.
     size_ranges
         Ranges of sizes that cost nothing.
     miss
@@ -250,8 +253,6 @@ class CamDesign:
         What a designer should know besides.
     alternatives
         All combinations of the stock that was offered.
-    drive
-        Path of the part that holds the cam.
     """
 
     target: Target
@@ -267,11 +268,16 @@ class CamDesign:
     rubber_volume: float
     starts: tuple[StartOutcome, ...]
     taken: int
+    cam: CamNames
     size_ranges: tuple[SizeRange, ...] = ()
     miss: Miss | None = None
     remarks: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
-    drive: str | None = None
+
+    @property
+    def drive(self) -> str:
+        """Path of the part that holds the cam."""
+        return self.cam.drive
 
     @property
     def met(self) -> bool:
