@@ -153,7 +153,7 @@ def _read_as_told_beside(case: _Case, outcome: Outcome) -> _Case | None:
     if not outcome.steps:
         return None
     bench = case.bench
-    records = bench.told(blocks_of(flatten(outcome.last.fitted), bench.records.signals))
+    records = bench.inferred(blocks_of(flatten(outcome.last.fitted), bench.records.signals))
     moved = (
         abs(now.sampling.late - then.sampling.late)
         for then, now in zip(bench.records.columns, records.columns, strict=True)

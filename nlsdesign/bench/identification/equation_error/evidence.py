@@ -97,7 +97,7 @@ class Bench:
         self._scales = {block.name: block.effort_per_drive for block in blocks}
         self._as_measured, self._floors_as_measured = self.records, dict(self.floors)
         if sampling is None:
-            self.records = self.told(blocks)
+            self.records = self.inferred(blocks)
         if self.records is not self._as_measured:
             self.noise = self.noise.read_as(self.records)
             self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
@@ -125,7 +125,7 @@ class Bench:
             sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
         )
 
-    def told(self, blocks: Sequence[Block]) -> RecordSet:
+    def inferred(self, blocks: Sequence[Block]) -> RecordSet:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.
 
         ``blocks``: of the declared model, or of a better one with the same names.

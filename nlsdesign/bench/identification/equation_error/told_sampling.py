@@ -55,8 +55,8 @@ def with_told_sampling(records: RecordSet, seen: Sequence[SeenBlock]) -> RecordS
     """
     for column in records.columns:
         if column.sampling is None:
-            told, remark = _told(_asked(records, seen, column.signal))
-            records = with_sampling(records, {column.signal: told})
+            inferred, remark = _read_as(_asked(records, seen, column.signal))
+            records = with_sampling(records, {column.signal: inferred})
         elif column.declared and column.sampling is not SAMPLED:
             remark = _contradicted(column.sampling, _asked(records, seen, column.signal))
         else:
@@ -78,7 +78,7 @@ def _as(record: Record, sampling: Mapping[str, Sampling]) -> Record:
     return replace(record, sampling={s: form for s, form in known.items() if form is not SAMPLED})
 
 
-def _told(likelihood: _Likelihood | None) -> tuple[Sampling, str]:
+def _read_as(likelihood: _Likelihood | None) -> tuple[Sampling, str]:
     """Return how a signal runs between its samples, and the remark on it; none where it is sampled."""
     if likelihood is None or likelihood.loss(SAMPLED) < _PLAINLY:
         return SAMPLED, ""

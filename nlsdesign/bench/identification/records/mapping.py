@@ -377,7 +377,7 @@ def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> Colu
     """
     motions = {name for body in model.bodies for name in (body.motion, body.rate)}
     shown = {r.signal for r in model.readings if r.measured in motions} | motions
-    told = mapping.inputs.commanded | mapping.inputs.shown
+    driving = mapping.inputs.commanded | mapping.inputs.shown
     columns = []
     for column in mapping.columns:
         if column.sampling is not None and column.sampling.held_from is not None and column.signal in shown:
@@ -387,7 +387,7 @@ def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> Colu
                 next_step='write between_samples = "sampled", or leave it out',
             )
         if column.sampling is None:
-            asked = column.signal in told and column.signal not in shown
+            asked = column.signal in driving and column.signal not in shown
             column = replace(column, sampling=None if asked else SAMPLED, declared=False)
         columns.append(column)
     return replace(mapping, columns=tuple(columns))

@@ -23,6 +23,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.smooth_form import smoothed
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
 
 _FINE = 20
