@@ -37,7 +37,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "bench.discrepancy": SIMULATED | {"bench.identification"},
     "bench.calibration": SIMULATED | {"bench.identification", "bench.discrepancy"},
     "export": SIMULATED,
-    "regeneration": SIMULATED | {"feedback.observer", "bench.identification", "bench.discrepancy", "export"},
+    "regeneration": SIMULATED | FEEDBACK | BENCH | {"components", "design", "export"},
     "presentation.figures": SIMULATED | MIDDLE,
     "presentation.report": SIMULATED | MIDDLE | {"presentation.figures"},
     "sweeps": SIMULATED | MIDDLE | {"components"},
@@ -165,6 +165,14 @@ def objection(package: str, found: Import, known: dict[str, Path]) -> str | None
     return f"{here} may not know {there}"
 
 
+def behind_the_front(package: str, target: str) -> bool:
+    """Whether a module stands within a room other than the commands and the foundation, whose modules are open."""
+    if not inside(target, package) or target == package:
+        return False
+    room = room_of(package, target)
+    return room not in ("cli", "foundation") and target != f"{package}.{room}"
+
+
 def floor_of(package: str, module: str) -> int | None:
     """Floor of a module within its room; -1 where the room has no inner rooms, None if it is in none."""
     room, inner = inner_room(package, module)
@@ -233,6 +241,29 @@ def test_the_drawing_is_not_empty(root: Path) -> None:
 
 def test_no_forbidden_import(root: Path) -> None:
     expect_none(forbidden(root / "nlsdesign"))
+
+
+def test_the_commands_import_from_a_room_only_its_front(root: Path) -> None:
+    package = root / "nlsdesign"
+    expect_none(
+        f"{found}, past the front of its room"
+        for found in imports(package)
+        if inside(found.source, "nlsdesign.cli") and behind_the_front(package.name, found.target)
+    )
+
+
+@pytest.mark.parametrize(
+    "text", ["..components.assembly.deck_writer import x", "..presentation.report.page import x"]
+)
+def test_an_import_past_the_front_of_a_room_is_caught(tmp_path: Path, text: str) -> None:
+    behind = {"components/assembly/deck_writer": "", "presentation/report/page": "", "foundation/deck": ""}
+    commands = (
+        f"def f():\n from {text}\n from ..foundation.deck import y\n from ..presentation.report import z"
+    )
+    package = build(tmp_path, {**behind, "cli/deck": commands})
+    (found,) = [each for each in imports(package) if behind_the_front(package.name, each.target)
+                and each.source == "nlsdesign.cli.deck"]  # fmt: skip
+    assert found.line == 2
 
 
 def test_the_waist_hands_out_no_assembly() -> None:

@@ -12,9 +12,11 @@ from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
 from .compilation.target_run import TargetMeasurement, measure_on_target
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
+from .cosimulation.coupling import Coupling as Coupling
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
 from .cosimulation.ssp import WrittenSystem, read_ssp, write_ssp
 from .cosimulation.wires import Late, SamplesOf, Wire
+from .cosimulation.wires import as_wire as as_wire
 from .exported_files import ExportedFile, ExportedFolder, read_exports
 from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu

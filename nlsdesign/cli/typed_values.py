@@ -1,9 +1,12 @@
-"""Numbers with units on the command line, such as ``"20 mm"``."""
+"""Values on the command line: numbers with units, sizes of memory, ``NAME=VALUE``, paths with a name."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -11,24 +14,16 @@ from ..foundation.errors import NlsError, UnitError, ValueRangeError
 from ..foundation.quantity import Quantity, parse_unit, quantity, same_dimension, typeset_unit, with_unit
 from ..foundation.written_numbers import split_number as split_number
 
+T = TypeVar("T")
 if TYPE_CHECKING:
-    _Kind = click.ParamType[float]
+    _FloatKind, _IntKind, _PathKind = click.ParamType[float], click.ParamType[int], click.Path[Path]
 else:
-    _Kind = click.ParamType
+    _FloatKind = _IntKind = click.ParamType
+    _PathKind = click.Path
 
 
-class Number(_Kind):
-    """A number with a unit of one dimension; gives its value in SI.
-
-    Parameters
-    ----------
-    unit
-        A unit of the expected dimension.
-    above
-        In SI; what is not larger is refused before any work.
-    up_to
-        In SI; what is larger is refused before any work.
-    """
+class Number(_FloatKind):
+    """A number with a unit of one dimension; gives its value in SI, refused outside its bounds in SI."""
 
     name = "number unit"
 
@@ -54,15 +49,10 @@ class Number(_Kind):
         return number
 
 
-if TYPE_CHECKING:
-    _Count = click.ParamType[int]
-else:
-    _Count = click.ParamType
-
 _BYTES = {"B": 1, "kB": 1000, "KiB": 1024, "MB": 1000**2, "MiB": 1024**2}
 
 
-class Bytes(_Count):
+class Bytes(_IntKind):
     """A size of memory such as ``16kB``; gives bytes. A kB has 1000 of them, a KiB 1024."""
 
     name = "size"
@@ -99,3 +89,58 @@ def parse_number(text: str, unit: str) -> Quantity:
             next_step=f"write '{with_unit(f'{number:.12g}', unit)}'",
         )
     return quantity(number, given or "1", source="given on the command line")
+
+
+class NamedPath(_PathKind):
+    """A path with a name; gives a :class:`~pathlib.Path`.
+
+    A variable of the shell that is not set gives an empty text, which Python reads as the current folder:
+    files would be written where nobody looks for them, or whatever is there would be read. ``example``: a
+    name for the message, where the option has no usual one.
+    """
+
+    def __init__(
+        self, *, file_okay: bool = True, dir_okay: bool = True, exists: bool = False, example: str = ""
+    ) -> None:
+        super().__init__(exists=exists, file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+        self._example = example
+
+    def convert(
+        self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> Path:
+        """Return the path."""
+        if not os.fspath(value).strip():
+            what = "folder" if not self.file_okay else "file" if not self.dir_okay else "file or folder"
+            name = "" if param is None else param.metavar or (param.name or "").upper()
+            if isinstance(param, click.Option):
+                name = param.opts[0]
+            usual = param.default if param is not None and isinstance(param.default, str) else ""
+            example = self._example or usual or f"my_{what.partition(' ')[0]}"
+            if name.startswith("-"):
+                example = f"{name} {example}"
+            step = f"write for instance {example}" + (
+                ", or '.' for the current folder" if self.dir_okay else ""
+            )
+            raise ValueRangeError(f"{name} '{value}'".lstrip(), f"names no {what}", next_step=step)
+        path: Path = super().convert(value, param, ctx)
+        return path
+
+
+def read_pairs(option: str, given: Iterable[str], read: Callable[[str], T]) -> dict[str, T]:
+    """Return what ``NAME=VALUE`` options give, by name.
+
+    ``read``: from a value as text; may raise a ``ValueError`` where it cannot be read.
+    """
+    values: dict[str, T] = {}
+    for text in given:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not (name and sign and value):
+            raise ValueRangeError(f"{option} '{text}'", "is not NAME=VALUE", next_step="write NAME=VALUE")
+        if name in values:
+            raise ValueRangeError(f"{option} '{text}'", f"'{name}' is given twice", next_step="remove one")
+        try:
+            values[name] = read(value)
+        except ValueError:
+            hint = "give a number, or for an input amplitude@frequency in Hz, for instance 1.5@2"
+            raise ValueRangeError(f"{option} '{text}'", f"'{value}' cannot be read", next_step=hint) from None
+    return values
