@@ -11,9 +11,9 @@ import click
 from ..foundation.errors import ValueRangeError
 from ..foundation.quantity import typeset_unit
 from ..foundation.text_files import make_folder
-from .files import out_option
 from .options import deck_option, json_option, measured_option, spring_option
 from .output import examples, show_json, show_table, warn
+from .overwriting import out_option
 from .typed_values import Number
 
 if TYPE_CHECKING:

@@ -13,7 +13,6 @@ import click
 from ..foundation.command_words import typed_command
 from ..foundation.errors import MeasurementError
 from ..foundation.quantity import typeset_unit, with_error
-from .files import c_names, out_option
 from .options import (
     deck_option,
     export_option,
@@ -24,6 +23,7 @@ from .options import (
     workers_option,
 )
 from .output import examples, next_command, show_json, show_table, warn
+from .overwriting import c_names, out_option
 from .typed_values import NamedPath, Number
 
 if TYPE_CHECKING:

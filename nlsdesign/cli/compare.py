@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import NlsError
-from .files import out_option
 from .options import json_option
 from .output import examples, show_json, show_table
+from .overwriting import out_option
 from .typed_values import NamedPath
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ import click
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..foundation.quantity import Quantity, quantity, typeset_unit
 from .export import export
-from .files import out_file_option
 from .options import json_option
 from .output import examples, show_json, show_table, show_written
+from .overwriting import out_file_option
 from .typed_values import NamedPath, Number, parse_number, read_pairs
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from ..foundation.locations import bundled
 from ..foundation.quantity import sources, with_unit
 from ..foundation.text_files import write_text
 from .deck_new import force_option, new, refuse_to_replace, shown_command
-from .files import out_file_option
 from .options import json_option
 from .output import examples, line_width, next_command, show_json, show_table
+from .overwriting import out_file_option
 from .typed_values import NamedPath
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import NlsError, ValueRangeError
-from .files import out_option
 from .options import DECK_HELP, json_option, spring_option, workers_option
 from .output import examples, show_json, show_table, warn
+from .overwriting import out_option
 from .typed_values import NamedPath, parse_number
 
 if TYPE_CHECKING:

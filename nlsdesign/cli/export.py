@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .files import c_names, out_file_option, out_option
 from .options import (
     DECK_HELP,
     deck_option,
@@ -23,6 +22,7 @@ from .options import (
     spring_option,
 )
 from .output import examples, show_json, show_table, show_written, warn
+from .overwriting import c_names, out_file_option, out_option
 from .typed_values import NamedPath
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ import click
 
 from ..foundation.errors import NlsError
 from .export import controller_of, export
-from .files import out_option
 from .options import (
     deck_option,
     json_option,
@@ -23,6 +22,7 @@ from .options import (
     spring_option,
 )
 from .output import examples, show_written, warn
+from .overwriting import out_option
 
 if TYPE_CHECKING:
     from ..model import FlatModel

@@ -25,7 +25,7 @@ from .decks import deck
 from .design import design
 from .export import export
 from .export_fmu import export_fmus as export_fmus
-from .library import docs, materials, parts
+from .look_up import docs, materials, parts
 from .observer import observer
 from .output import examples
 from .serve import serve

@@ -12,7 +12,6 @@ import click
 
 from ..foundation.quantity import typeset_unit
 from ..foundation.written_numbers import shared_prefix, without_power
-from .files import c_names, out_option
 from .options import (
     CASCADE,
     CERTIFIED,
@@ -26,6 +25,7 @@ from .options import (
     spring_option,
 )
 from .output import examples, next_command, show_json, show_table, show_written, warn
+from .overwriting import c_names, out_option
 from .typed_values import NamedPath, Number
 
 if TYPE_CHECKING:

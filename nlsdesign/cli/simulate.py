@@ -11,9 +11,9 @@ import click
 
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..foundation.quantity import typeset_unit
-from .files import out_file_option
 from .options import deck_option, json_option
 from .output import examples, show_json, show_table
+from .overwriting import out_file_option
 from .typed_signals import BARE, FORMS, given_start, read_inputs, with_given_values
 from .typed_values import NamedPath, Number
 

@@ -20,9 +20,9 @@ from ..foundation.errors import NlsError, brief, unknown_name
 from ..foundation.locations import bundled, folder
 from ..foundation.quantity import with_unit
 from ..foundation.text_files import is_there, listed_files, make_folder, text_of
-from .files import dry_run_option, force_option, kept, list_files
 from .options import json_option, workers_option
 from .output import examples, show_json, show_table
+from .overwriting import dry_run_option, force_option, kept, list_files
 from .typed_values import NamedPath
 
 _SIGNATURE = "def main(out, fast=False): ..."

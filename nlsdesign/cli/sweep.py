@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import ExportError, NlsError, ValueRangeError
-from .files import folder_option, kept, out_option
 from .options import json_option
 from .output import examples, next_command, show_json, show_table, show_written
+from .overwriting import folder_option, kept, out_option
 from .typed_values import NamedPath, parse_number
 
 if TYPE_CHECKING:

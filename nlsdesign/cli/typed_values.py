@@ -16,7 +16,9 @@ from ..foundation.written_numbers import split_number as split_number
 
 T = TypeVar("T")
 if TYPE_CHECKING:
-    _FloatKind, _IntKind, _PathKind = click.ParamType[float], click.ParamType[int], click.Path[Path]
+    _FloatKind = click.ParamType[float]
+    _IntKind = click.ParamType[int]
+    _PathKind = click.Path[Path]
 else:
     _FloatKind = _IntKind = click.ParamType
     _PathKind = click.Path

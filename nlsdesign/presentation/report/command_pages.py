@@ -316,11 +316,13 @@ def write_simulation_report(
     """
     picture = run_over_time(run, signals)
     (file,) = write_figures(path.parent, {path.stem: picture})
-    sizes = tuple((n, *signal_sizes(run[n]).values(), typeset_unit(run.units[n])) for n in signals)
+    sizes: list[tuple[str | float, ...]] = [
+        (n, *signal_sizes(run[n]).values(), typeset_unit(run.units[n])) for n in signals
+    ]
     sections: list[Section] = [
         TextSection("Warnings", "\n\n".join(warnings) or "No law leaves its range, no limit is reached."),
         FigureSection("Signals over time", picture, caption="Signals of one unit share a panel."),
-        TableSection("Sizes", SIZES, sizes, caption="Over the whole run."),
+        TableSection("Sizes", SIZES, tuple(sizes), caption="Over the whole run."),
     ]
     if run.events:
         rows = tuple((f"{event.time:.6g}", event.name, event.what) for event in run.events)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli import files as overwriting
+from nlsdesign.cli import overwriting
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.foundation.text_files import (
     LIST_NAME,
