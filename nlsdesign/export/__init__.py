@@ -9,6 +9,7 @@ from .c.writer import CSource
 from .compilation.compiled_step import natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS
 from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
+from .compilation.target_build import controller_sizes as controller_sizes
 from .compilation.target_run import TargetMeasurement, measure_on_target
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate

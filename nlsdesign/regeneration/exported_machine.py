@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..export import export_c, export_fmu
 from ..feedback.control import ScheduledTorque, joined, torque_controller
 from ..feedback.observer import designed_observer
 from ..foundation.errors import NlsError
@@ -67,6 +66,7 @@ def export_machine(
     spring, measured
         Series spring and measured state, where the structure leaves them open.
     """
+    from ..export import export_c, export_fmu  # here, as its libraries take time to load
 
     @cache
     def observing() -> FlatModel:

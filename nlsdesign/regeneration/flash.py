@@ -6,10 +6,8 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..export import CORTEX_M4F, Processor, export_c
-from ..export.compilation.target_build import controller_sizes
 from ..feedback.observer import DesignedObserver, GridByTorqueError, designed_observer
 from ..feedback.observer.scheduling.scheduled import whole_contour
 from ..feedback.observer.scheduling.torque_grid import TableTooLargeError
@@ -17,6 +15,9 @@ from ..foundation.errors import ExportError, ValueRangeError
 from ..foundation.quantity import typeset_unit
 from ..foundation.written_numbers import prefixed
 from ..model import FlatModel
+
+if TYPE_CHECKING:
+    from ..export import Processor
 
 ATTEMPTS = 3
 """Designs until code and table together keep a size; a coarser table changes the code a little."""
@@ -74,7 +75,7 @@ def sized_observer(
     flash: int | None = None,
     table_error: float | None = None,
     part_of: Callable[[FlatModel], FlatModel] = lambda observer: observer,
-    processor: Processor = CORTEX_M4F,
+    processor: Processor | None = None,
     **chosen: Any,
 ) -> SizedObserver:
     """Design an observer whose code and tables keep a size.
@@ -94,7 +95,7 @@ def sized_observer(
     part_of
         Makes what is exported of the observer; by default that is the observer alone.
     processor
-        For which the code is compiled.
+        For which the code is compiled; a Cortex-M4F by default.
     **chosen
         As for :func:`~nlsdesign.feedback.observer.designed_observer`: kind, spring, measured.
 
@@ -105,7 +106,7 @@ def sized_observer(
     ExportError
         If a size is asked for and no compiler is installed.
     """
-    number = 4 if real == "float" else 8
+    number, board = 4 if real == "float" else 8, processor or _usual_processor()
 
     def designed(most: int | None) -> DesignedObserver:
         grid: GridByTorqueError = replace(
@@ -115,8 +116,8 @@ def sized_observer(
 
     def measured(observer: DesignedObserver) -> SizedObserver:
         tables = observer.design.compact.size(number)
-        whole = measured_flash(part_of(observer.model), real, processor, needed=flash is not None)
-        return SizedObserver(observer, None if whole is None else whole - tables, tables, processor)
+        whole = measured_flash(part_of(observer.model), real, board, needed=flash is not None)
+        return SizedObserver(observer, None if whole is None else whole - tables, tables, board)
 
     current = measured(designed(None))
     if flash is None or current.code is None or current.flash <= flash:
@@ -127,7 +128,7 @@ def sized_observer(
         code = current.code or 0
         if not current.tables:
             raise ValueRangeError(
-                f"flash of {flash} B", f"the code alone takes {code} B on a {processor.name}",
+                f"flash of {flash} B", f"the code alone takes {code} B on a {board.name}",
                 next_step=f"allow {code} B, or take another --kind or --real float",
             )  # fmt: skip
         try:
@@ -151,7 +152,7 @@ def sized_observer(
 
 
 def require_flash(
-    controller: FlatModel, real: str, most: int | None = None, *, processor: Processor = CORTEX_M4F
+    controller: FlatModel, real: str, most: int | None = None, *, processor: Processor | None = None
 ) -> str:
     """Return in a sentence how much flash a controller without tables takes.
 
@@ -164,7 +165,7 @@ def require_flash(
     most
         Bytes that it may take; ``None`` for any size.
     processor
-        For which the code is compiled.
+        For which the code is compiled; a Cortex-M4F by default.
 
     Raises
     ------
@@ -173,19 +174,29 @@ def require_flash(
     ExportError
         If a size is asked for and no compiler is installed.
     """
-    size = measured_flash(controller, real, processor, needed=most is not None)
+    board = processor or _usual_processor()
+    size = measured_flash(controller, real, board, needed=most is not None)
     if size is None:
         return "the flash of the code was not measured: no compiler"
     if most is not None and size > most:
         raise ValueRangeError(
-            f"flash of {most} B", f"the code of the controller takes {size} B on a {processor.name}",
+            f"flash of {most} B", f"the code of the controller takes {size} B on a {board.name}",
             next_step=f"allow {size} B, or take another --law or --real float",
         )  # fmt: skip
-    return f"flash on a {processor.name}: {size} B, without the C library"
+    return f"flash on a {board.name}: {size} B, without the C library"
+
+
+def _usual_processor() -> Processor:
+    """Return the processor for which the flash is measured by default."""
+    from ..export import CORTEX_M4F
+
+    return CORTEX_M4F
 
 
 def measured_flash(exported: FlatModel, real: str, processor: Processor, *, needed: bool) -> int | None:
     """Return the flash of code and tables in bytes; ``None`` without a compiler, unless it is needed."""
+    from ..export import controller_sizes, export_c  # here, as its libraries take time to load
+
     with tempfile.TemporaryDirectory() as folder:
         source = export_c(exported, Path(folder), real=real, name="part")
         try:

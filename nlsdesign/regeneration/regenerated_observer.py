@@ -21,7 +21,6 @@ import numpy as np
 from ..bench.discrepancy.block_prediction import shown_values
 from ..bench.identification import Record, RecordSet
 from ..bench.identification.least_squares import Fit
-from ..export import export_c, export_fmu
 from ..feedback.observer import (
     AdaptiveDesign,
     FixedGrid,
@@ -451,6 +450,8 @@ def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration
         The result, with reasons for what could not be written too; and the files of observer and plant, with
         a few words on each.
     """
+    from ..export import export_c, export_fmu  # here, as its libraries take time to load
+
     written: dict[Path, str] = {}
     reasons = list(result.reasons)
     for name, model in {"observer": result.observer, "plant": result.plant}.items():
