@@ -84,7 +84,7 @@ from .mechanics.friction import (
     QuadraticDrag,
     StribeckFriction,
 )
-from .mechanics.gear import Gear, LossyGear
+from .mechanics.gear import Gear, LossyGear, Rack, Screw, Transmission
 from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
@@ -188,6 +188,7 @@ __all__ = [
     "Pulley",
     "QuadraticDrag",
     "QuasilinearRelaxation",
+    "Rack",
     "RateFeedback",
     "ReadingLimits",
     "Regularised",
@@ -197,6 +198,7 @@ __all__ = [
     "Rising",
     "Rounded",
     "SampleAndHold",
+    "Screw",
     "SelfHeating",
     "Sensor",
     "Series",
@@ -219,6 +221,7 @@ __all__ = [
     "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
+    "Transmission",
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
