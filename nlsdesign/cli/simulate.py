@@ -76,7 +76,7 @@ _FORWARD = (
 @click.option("--mapping", type=_file, default=None,
               help="Of --record: TOML that maps columns to signals.")  # fmt: skip
 @out_file_option("out/simulation/run.csv", "CSV to write; picture and page stand beside it.",
-                 beside=lambda options: () if options["record"] or options["table_only"] else (".svg", ".html"),
+                 beside=lambda asked: () if asked["record"] or asked["table_only"] else (".svg", ".html"),
                  ending=".csv")  # fmt: skip
 @json_option
 @click.pass_context

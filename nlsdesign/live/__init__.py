@@ -5,5 +5,3 @@ page stand in modules of their own. Never computes what a room below could compu
 """
 
 from .server import serve as serve
-
-__all__ = ["serve"]

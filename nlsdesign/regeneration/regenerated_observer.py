@@ -206,9 +206,23 @@ def regenerate(
 ) -> Regeneration:
     """Design the observer again, and compare it with the one from the declared model.
 
-    ``records``: bench records; those that no fit has seen are compared, or all where there are none.
-    ``choice``: what is estimated; by default the torque of the series spring, every millisecond. Result: with
-    reasons in words where no observer can be designed or nothing can be compared.
+    Parameters
+    ----------
+    declared, better
+        The model as declared, and the one that a diagnosis has left.
+    records
+        From the bench; those that no fit has seen are compared, or all where there are none.
+    fits
+        Of the better model; their covariance gives the draws of its numbers.
+    choice
+        What is estimated; by default the torque of the series spring, every millisecond.
+    progress
+        Told what is being done.
+
+    Returns
+    -------
+    Regeneration
+        With reasons in words where no observer can be designed or nothing can be compared.
     """
     choice = choice or ObserverChoice()
     progress("designing the observer of the better model")

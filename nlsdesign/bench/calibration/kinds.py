@@ -20,13 +20,27 @@ KINDS: Mapping[str, CalibrationTest] = {
 
 
 def write_plan(plan: CalibrationPlan, folder: Path) -> Path:
-    """Write the plan as ``plan.json``."""
+    """Write the plan as ``plan.json``.
+
+    Parameters
+    ----------
+    plan
+        From :func:`~nlsdesign.bench.calibration.what_calibration_buys`.
+    folder
+        Is made where it does not exist.
+    """
     file = folder / "plan.json"
     write_text(file, json.dumps(plan.to_dict(), indent=2, ensure_ascii=False) + "\n")
     return file
 
 
 def record_findings(tests: Sequence[CalibrationRecords]) -> list[str]:
-    """Return in sentences what was found in the files: what is suspect, and remarks."""
+    """Return in sentences what was found in the files: what is suspect, and remarks.
+
+    Parameters
+    ----------
+    tests
+        Records of calibrations as they were read.
+    """
     suspect = [f"suspect: {finding}" for test in tests for finding in test.records.findings]
     return suspect + [str(remark) for test in tests for remark in test.records.remarks]

@@ -16,7 +16,15 @@ from .svg import write_figures
 
 
 def write_loop_figures(result: LoopEvaluation, folder: Path) -> list[Path]:
-    """Write what is drawn of an evaluated torque loop as SVG files into a folder, which is made."""
+    """Write what is drawn of an evaluated torque loop as SVG files.
+
+    Parameters
+    ----------
+    result
+        Of the evaluation.
+    folder
+        Is made where it does not exist.
+    """
     make_folder(folder)
     drawn = {
         "responses": torque_responses(result.responses, result.line),

@@ -15,7 +15,19 @@ from .verdict import Verdict
 
 
 def refit_of_run(result: Refit, records: RecordSet, *, folder: str, day: str) -> Refit:
-    """Return a fit whose numbers name in their source the records of a folder, and the ISO day of the fit."""
+    """Return a fit whose numbers name in their source the records that they were fitted to.
+
+    Parameters
+    ----------
+    result
+        Of the fit.
+    records
+        That it was made with.
+    folder
+        Of the records.
+    day
+        Of the fit, ISO 8601.
+    """
     names = [record.name for record in records.of("fit")]
     return replace(result, actuator=with_records_named(result.actuator, folder, names, day=day))
 
@@ -25,7 +37,18 @@ def verdict_of_run(
 ) -> Verdict:
     """Return a diagnosis that says under which circumstances it was made, also in its better model.
 
-    ``deck``, ``folder``: as given. ``command``: that repeats it. ``date``: day and time, ISO 8601.
+    Parameters
+    ----------
+    verdict
+        Of the diagnosis.
+    records
+        That it was made with.
+    deck, folder
+        Deck and folder of records, as given.
+    command
+        Command line that repeats it.
+    date
+        Day and time, ISO 8601.
     """
     names = [record.name for record in records.of("fit")]
     run = DiagnosisRun(deck, folder, date, command, version(), records_of_run(records))
@@ -34,7 +57,15 @@ def verdict_of_run(
 
 
 def range_findings(verdict: Verdict, records: RecordSet) -> list[str]:
-    """Return which laws of the better model the records take out of their stated range."""
+    """Return which laws of the better model the records take out of their stated range, each in a sentence.
+
+    Parameters
+    ----------
+    verdict
+        Of the diagnosis.
+    records
+        That it was made with.
+    """
     try:
         left_ranges = ranges_left(verdict.actuator, records)
     except NlsError:  # the verdict stands, and says itself what cannot be simulated

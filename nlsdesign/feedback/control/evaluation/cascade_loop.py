@@ -17,8 +17,16 @@ def cascade_loops(
 ) -> tuple[ClosedLoop, ClosedLoop]:
     """Return the torque loop with its load fixed and with it moved; one observer and controller for both.
 
-    ``fixed``, ``moved``: the machine as declared, and with the motion of its load prescribed. ``delay``: in
-    samples. ``law``: as for :func:`~nlsdesign.feedback.control.torque_controller`.
+    Parameters
+    ----------
+    fixed, moved
+        The machine as declared, and with the motion of its load prescribed.
+    delay
+        Samples between a current's computation and its effect.
+    sample_time
+        In s.
+    **law
+        As for :func:`~nlsdesign.feedback.control.torque_controller`: law, gains, velocity.
     """
     plants = [with_outputs(m, [measured_motion(m), series_spring(m).effort]) for m in (fixed, moved)]
     # What an adaptive observer has learned depends on what went before, so a loop with it has no one figure.
