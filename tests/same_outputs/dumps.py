@@ -42,7 +42,7 @@ def flat(deck: str, model: str = "") -> None:
         except nls.errors.NlsError as error:
             slopes = {"none": str(error)}
         told["points"].append({"state": state, "inputs": inputs, "values": values, "slopes": slopes})
-    Path("flat.json").write_text(json.dumps(told, indent=1, ensure_ascii=False), encoding="utf8")
+    Path("flat.json").write_text(json.dumps(told, indent=1, ensure_ascii=False, default=str), encoding="utf8")
 
 
 def views(deck: str) -> None:
@@ -54,7 +54,9 @@ def views(deck: str) -> None:
     chart = nls.over_angle(model, asked, angles=[0.1, 0.3, 0.5, 0.7])
     columns = [{"name": c.name, "unit": c.unit, "values": chart[c.name].tolist()} for c in chart.columns]
     told = {"columns": columns, "words": {name: list(texts) for name, texts in chart.words.items()}}
-    Path("views.json").write_text(json.dumps(told, indent=1, ensure_ascii=False), encoding="utf8")
+    Path("views.json").write_text(
+        json.dumps(told, indent=1, ensure_ascii=False, default=str), encoding="utf8"
+    )
 
 
 def table(folder: str) -> None:

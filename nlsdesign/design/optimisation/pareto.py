@@ -21,8 +21,8 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ValueRangeError
-from ...foundation.processes import parallel_map
 from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.work_sharing import parallel_map
 from ..curves.target import Target
 from .conflict import feasible_point
 from .design_search import Search

@@ -11,8 +11,8 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.processes import parallel_map
 from ...foundation.symbolic import Expression
+from ...foundation.work_sharing import parallel_map
 
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 PROVED_INFEASIBLE = "Infeasible_Problem_Detected"
