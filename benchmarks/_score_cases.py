@@ -44,8 +44,17 @@ ACCEPTED: Mapping[str, frozenset[str]] = {
     "sensor_lowpass": frozenset({"force_sensor_delay"}),
     "constant_torque": frozenset({"constant_torque", "constant_force", "current_sensor_bias"}),
     "current_sensor_bias": frozenset({"current_sensor_bias", "constant_torque", "constant_force"}),
+    "joint_coulomb_friction": frozenset({"coulomb_friction@load"}),
+    "gravity_load": frozenset({"gravity_load@load"}),
+    "angle_sensor_bias": frozenset({"angle_sensor_bias@load"}),
+    "angle_sensor_delay": frozenset({"angle_sensor_delay@load"}),
+    "joint_eccentricity": frozenset({"angle_sensor_eccentricity@load"}),
+    "drivetrain_resonance": frozenset({"drivetrain_resonance@load"}),
 }
-"""Names that describe a hidden thing truly although they are not its own: equal laws, or a wider one."""
+"""Names that describe a hidden thing truly although they are not its own: equal laws, or a wider one.
+
+``@load`` marks what was found behind the spring of a machine with two bodies.
+"""
 NOISES: Mapping[str, Conditions] = {
     "white": Conditions(),
     "coloured": Conditions(coloured=1.5),
@@ -65,6 +74,9 @@ leaves two to fit; ``wrong number`` hides nothing, one declared number is wrong;
 have no cam.
 """
 
+KIND_TIERS = ("kind clean", "kind single", "kind single half", "kind pair", "kind not listed")
+"""Tiers of the machines under a digital loop, kind by kind."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -73,9 +85,9 @@ class Case:
     Parameters
     ----------
     tier
-        One of :data:`TIERS`.
+        One of :data:`TIERS` or :data:`KIND_TIERS`.
     machine
-        Name of the rig's machine.
+        Name of the rig's machine, or of a kind.
     effects
         What is hidden.
     strength
@@ -83,7 +95,7 @@ class Case:
     seed
         Of the rig.
     noise
-        Name in :data:`NOISES`.
+        Name in :data:`NOISES`, or a condition of a kind.
     """
 
     tier: str
@@ -97,7 +109,7 @@ class Case:
     def name(self) -> str:
         """Unique name, by which a run goes on where it was interrupted."""
         hidden = "+".join(self.effects) or "nothing"
-        noise = "" if self.noise == "white" else self.noise
+        noise = "" if self.noise in ("white", "plain") else self.noise
         return ":".join(
             filter(None, [self.tier, hidden, f"{self.strength:g}", noise, self.machine, str(self.seed)])
         )
@@ -164,7 +176,7 @@ def _of_seed(seed: int) -> Iterator[Case]:
 
 
 def sample(pool: Sequence[Case], count: int) -> list[Case]:
-    """Return so many cases, spread evenly over the tiers, and in each over what is hidden; always the same.
+    """Return so many cases, spread evenly over tiers and kinds, in each over what is hidden; always the same.
 
     Parameters
     ----------
@@ -175,8 +187,12 @@ def sample(pool: Sequence[Case], count: int) -> list[Case]:
     """
     draw = np.random.default_rng(2026)
     queues = []
-    for tier in dict.fromkeys(case.tier for case in pool):
-        own = [case for case in pool if case.tier == tier]
+    groups = [
+        (case.tier, case.machine if case.tier in KIND_TIERS and case.machine not in ACTUATORS else "")
+        for case in pool
+    ]
+    for group in dict.fromkeys(groups):
+        own = [case for case, of in zip(pool, groups, strict=True) if of == group]
         times: Counter[tuple[str, ...]] = Counter()
         ranked = []
         for i in draw.permutation(len(own)):

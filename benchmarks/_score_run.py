@@ -8,11 +8,14 @@ import tempfile
 import time
 import traceback
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from benchmarks._score_cases import NOISES, Case
+from benchmarks._score_digest import digest
+from benchmarks._score_kinds import named_with_place
 from benchmarks._score_truth import covered, true_numbers
 from benchmarks._score_yardsticks import YARDSTICKS, MissingError, table_of
 from models.test_rig import test_rig_deck
@@ -24,8 +27,12 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from tests.rig import ACTUATORS, THREE_RECORDS, make_records, mistaken, write_set
 from tests.rig.commands import RECORDS
+from tests.rig.kind_cases import ALL_KINDS, write_kind_case
 from tests.rig.machines import MACHINES, write_machine_set
 from tests.rig.records import stream_of_mistakes
+
+SAYS_HELD = find_spec("nlsdesign.bench.identification.records.sampling") is not None
+"""Whether `records.toml` can say that a current is held; every other seed says it then."""
 
 
 class TooLongError(Exception):
@@ -47,6 +54,7 @@ def run(case: Case, limit: int = 0, yardsticks: bool = False) -> dict[str, Any]:
     result: dict[str, Any] = {
         "case": case.name, "tier": case.tier, "machine": case.machine, "hidden": list(case.effects),
         "strength": case.strength, "seed": case.seed, "noise": case.noise,
+        "code": digest(),
     }  # fmt: skip
     if limit:
         signal.signal(signal.SIGPROF, _give_up)
@@ -63,6 +71,7 @@ def run(case: Case, limit: int = 0, yardsticks: bool = False) -> dict[str, Any]:
             result["seconds"] = time.perf_counter() - begin
             result["cpu_seconds"] = _worked() - worked
             result |= content(verdict)
+            result["named"] = [named_with_place(case, e.name, e.location) for e in verdict.effects]
             result["covered"] = covered(verdict, true_numbers(case))
             result["yardsticks"] = _yardsticks(declared, records) if yardsticks else {}
     except Exception as error:
@@ -86,6 +95,13 @@ def write_case(folder: Path, case: Case) -> str:
     case
         What to hide.
     """
+    if case.machine in ALL_KINDS:
+        says_held = SAYS_HELD and case.seed % 2 == 1
+        write_kind_case(
+            folder, case.machine, case.effects, case.strength, case.seed,
+            condition=case.noise, says_held=says_held,
+        )  # fmt: skip
+        return ""
     conditions = NOISES[case.noise]
     if case.machine in MACHINES:
         write_machine_set(folder, MACHINES[case.machine], case.hidden, case.seed, conditions=conditions)

@@ -82,7 +82,9 @@ def in_class(result: Result, names: list[str]) -> bool:
 
 def invented(result: Result, names: list[str]) -> bool:
     """Return whether something was named that is not there."""
-    return any(name in CATALOGUE and not describes(name, result["hidden"]) for name in names)
+    return any(
+        name.partition("@")[0] in CATALOGUE and not describes(name, result["hidden"]) for name in names
+    )
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:

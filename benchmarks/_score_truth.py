@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from benchmarks._score_cases import Case
 from nlsdesign.bench.discrepancy import Verdict
 from tests.rig import ACTUATORS, Hidden, truth
+from tests.rig.kind_cases import ALL_KINDS, truth_of
 from tests.rig.machines import MACHINES, true_numbers_of_machine
 
 INTERVAL = 1.96
@@ -41,6 +42,9 @@ def true_numbers(case: Case) -> TrueNumbers:
     case
         Whose records they are behind.
     """
+    if case.machine in ALL_KINDS:
+        truth_of_kind = truth_of(case.machine, case.effects, case.strength, case.seed)
+        return truth_of_kind.sizes, truth_of_kind.numbers
     if case.machine in MACHINES:
         return true_numbers_of_machine(MACHINES[case.machine], case.hidden, case.seed)
     built, hidden = truth(ACTUATORS[case.machine], case.hidden, case.seed)

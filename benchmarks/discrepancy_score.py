@@ -8,9 +8,12 @@ counted once.
     python -m benchmarks.discrepancy_score --seeds 300-309 --processes 2 --limit 300 --out score.jsonl
     python -m benchmarks.discrepancy_score --seeds 300-309 --tier pair --tier triple --out score.jsonl
     python -m benchmarks.discrepancy_score --out score.jsonl --table docs/discrepancy.md
+    python -m benchmarks.discrepancy_score --kinds all --seeds 0:20 --out kinds.jsonl --table docs/scores.md
 
-Each result is one line of JSON, written as soon as it is there; a run goes on where it was interrupted. A
-case that fails is a line with the reason. Every case runs in one process.
+With ``--kinds`` the machines are those of ``tests/rig/kinds.py``, under a digital loop that holds its
+current, some of them in MuJoCo. Each result is one line of JSON, written as soon as it is there; a run goes
+on where it was interrupted. A line that was counted with other code is no result any more: its case is run
+again. A case that fails is a line with the reason. Every case runs in one process.
 """
 
 from __future__ import annotations
@@ -20,12 +23,15 @@ import json
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks._score_cases import TIERS, Case, cases, sample
+from benchmarks._score_cases import KIND_TIERS, TIERS, Case, cases, sample
+from benchmarks._score_digest import digest
+from benchmarks._score_kinds import all_kinds, codes, kind_cases, kind_table
 from benchmarks._score_run import run
 from benchmarks._score_table import Result, table
 from nlsdesign.foundation.work_sharing import DaskScheduler, PointOutcome, Processes, shared_map
@@ -36,19 +42,33 @@ def main() -> None:
     """Run the cases that have no result yet, and write the table."""
     given = _arguments()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))  # and the workers end with it
-    results = _read(given.out)
+    results, wanted = _read(given.out), _wanted(given)
+    if wanted:
+        today = digest()
+        older = [r for r in results if r.get("code") != today]
+        results = [r for r in results if r.get("code") == today]
+        if older:
+            print(f"{len(older)} cases were counted with other code and do not count", flush=True)
     done = {r["case"] for r in results}
-    todo = [case for case in _wanted(given) if case.name not in done]
+    todo = [case for case in wanted if case.name not in done]
     if todo:
         print(f"{len(todo)} cases to run, {len(results)} are there", flush=True)
+    begin = time.perf_counter()
+    number = 0
     with given.out.open("a", encoding="utf8") as file:
         for result in _results(todo, given):
             file.write(json.dumps(result) + "\n")
             file.flush()
             results.append(result)
             outcome = result.get("error") or f"{result['verdict']} {'+'.join(result['named'])}"
-            print(f"{result['case']}: {outcome} ({result['seconds']:.0f} s)", flush=True)
-    text = table(results)
+            number += 1
+            rest = (time.perf_counter() - begin) / number * (len(todo) - number) / 60.0
+            print(
+                f"{number}/{len(todo)} {result['case']}: {outcome} "
+                f"({result['seconds']:.0f} s; {rest:.0f} min left)",
+                flush=True,
+            )
+    text = page(results)
     if given.table:
         head = given.table.read_text(encoding="utf8") if given.table.exists() else ""
         head = head.partition(MARK)[0].rstrip() + f"\n\n{MARK}\n" if MARK in head else f"{MARK}\n"
@@ -58,13 +78,30 @@ def main() -> None:
     print(text)
 
 
+def page(results: list[Result]) -> str:
+    """Return what is written behind the mark: the code that was counted, then the tables.
+
+    Parameters
+    ----------
+    results
+        As read from the JSON lines.
+    """
+    counted = [f"Counted with the code `{code}`: {n} cases.  " for code, n in codes(results).items()]
+    cam = [r for r in results if r["tier"] not in KIND_TIERS]
+    tables = [table(cam)] if cam else []
+    return "\n".join([*counted, "", *tables, *kind_table(results)]).rstrip() + "\n"
+
+
 MARK = "<!-- written by benchmarks.discrepancy_score from here on -->"
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--seeds", type=seeds_of, default=[], help="for instance 200-210 or 200,205")
-    parser.add_argument("--tier", action="append", choices=TIERS, help="may be repeated; all")
+    parser.add_argument(
+        "--seeds", type=seeds_of, default=[], help="200-210 with 210, 0:20 without 20, or 200,205"
+    )
+    parser.add_argument("--kinds", help="kinds of machines in place of the cam rig, with commas; or: all")
+    parser.add_argument("--tier", action="append", choices=(*TIERS, *KIND_TIERS), help="may be repeated; all")
     parser.add_argument("--effect", action="append", help="only what hides this; may be repeated")
     parser.add_argument("--machine", action="append", help="only this machine; may be repeated")
     parser.add_argument("--sample", type=int, help="so many cases, spread evenly over all that is asked for")
@@ -83,7 +120,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def seeds_of(text: str) -> list[int]:
-    """Return the seeds that a text like ``200-202,7`` means.
+    """Return the seeds that a text like ``200-202,7`` or ``0:20`` means; the latter is without 20.
 
     Parameters
     ----------
@@ -92,13 +129,20 @@ def seeds_of(text: str) -> list[int]:
     """
     seeds: list[int] = []
     for piece in text.split(","):
+        if ":" in piece:
+            seeds += range(*map(int, piece.split(":")))
+            continue
         first, _, last = piece.partition("-")
         seeds += range(int(first), int(last or first) + 1)
     return seeds
 
 
 def _wanted(given: argparse.Namespace) -> list[Case]:
-    pool = cases(given.seeds, given.tier or TIERS)
+    if given.kinds:
+        kinds = all_kinds() if given.kinds == "all" else given.kinds.split(",")
+        pool = [c for c in kind_cases(given.seeds, kinds) if c.tier in (given.tier or KIND_TIERS)]
+    else:
+        pool = cases(given.seeds, given.tier or TIERS)
     if given.effect:
         pool = [case for case in pool if set(given.effect) & set(case.effects)]
     if given.machine:
@@ -113,7 +157,7 @@ def _read(file: Path) -> list[Result]:
 
 
 def _results(todo: list[Case], given: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    work = partial(run, limit=given.limit, yardsticks=not given.no_yardsticks)
+    work = partial(run, limit=given.limit, yardsticks=not (given.no_yardsticks or given.kinds))
     if given.processes < 1 and given.scheduler is None:
         yield from map(work, todo)
         return
@@ -132,7 +176,8 @@ def _lost(case: Case, outcome: PointOutcome) -> dict[str, Any]:
     return {
         "case": case.name, "tier": case.tier, "machine": case.machine, "hidden": list(case.effects),
         "strength": case.strength, "seed": case.seed, "noise": case.noise,
-        "seconds": outcome.seconds, "cpu_seconds": outcome.seconds, "error": outcome.reason, "trace": "",
+        "code": digest(), "seconds": outcome.seconds, "cpu_seconds": outcome.seconds,
+        "error": outcome.reason, "trace": "",
     }  # fmt: skip
 
 

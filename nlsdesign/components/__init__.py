@@ -66,7 +66,7 @@ from .mechanics.friction import (
     QuadraticDrag,
     StribeckFriction,
 )
-from .mechanics.gear import Gear, LossyGear
+from .mechanics.gear import Gear, LossyGear, Rack, Screw, Transmission
 from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
@@ -170,6 +170,7 @@ __all__ = [
     "Pulley",
     "QuadraticDrag",
     "QuasilinearRelaxation",
+    "Rack",
     "RateFeedback",
     "ReadingLimits",
     "Regularised",
@@ -179,6 +180,7 @@ __all__ = [
     "Rising",
     "Rounded",
     "SampleAndHold",
+    "Screw",
     "SelfHeating",
     "Sensor",
     "Series",
@@ -201,6 +203,7 @@ __all__ = [
     "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
+    "Transmission",
     "TransportDelay",
     "Turned",
     "TwoSidedCam",

@@ -11,6 +11,7 @@ import csv
 import hashlib
 import json
 import os
+import re
 import secrets
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -24,6 +25,12 @@ from .errors import ExportError, NlsError
 
 MOST_BYTES = 2**26
 """Largest text file: 64 MiB, a thousand times a large deck. Records have a bound of their own."""
+
+STAMP = "/* Exported by nlsdesign "
+"""Begin of the last comment of generated C."""
+
+_STAMPED = re.compile(rf"{re.escape(STAMP)}[^*]*\*/\s*\Z")
+"""That comment and nothing behind it: code that a forger adds there stays in the text."""
 
 
 def is_there(path: Path) -> bool:
@@ -121,6 +128,11 @@ def file_state(path: Path, *, command: str = "") -> FileState:
         return "changed"
     other = command and _writers(path.parent).get(path.name, command) != command
     return "of another command" if other else "as written"
+
+
+def without_stamp(text: str) -> str:
+    """Return a generated file without its last comment, which tells the time of the export."""
+    return _STAMPED.sub("", text)
 
 
 def listed_files(folder: Path) -> list[Path]:

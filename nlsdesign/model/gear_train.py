@@ -1,4 +1,4 @@
-"""Bodies that turn together: one state pair for all bodies that rigid gears join.
+"""Bodies that move together: one state pair for all bodies that rigid gears, racks and screws join.
 
 With the acceleration α of the leading body, what each gear carries follows from the bodies behind it, so the
 balance of the leading body is one rising equation for α: linear where no gear has a loss, piecewise linear
@@ -15,7 +15,7 @@ import casadi as ca
 from ..components.assembly.named_parts import Assembly
 from ..components.core.element import Scope
 from ..components.mechanics.bodies import Free, Motion
-from ..components.mechanics.gear import Gear, LossyGear
+from ..components.mechanics.gear import LossyGear, Transmission
 from ..components.transmission.stretchy_cable import newton_root
 from ..foundation.symbolic import Expression, depends, solve_monotone, symbol
 
@@ -28,7 +28,7 @@ class Joint:
     """
 
     name: str
-    gear: Gear
+    gear: Transmission
     outward: bool
     behind: Wheel
 
@@ -56,7 +56,7 @@ class Wheel:
 
 def trains(assembly: Assembly) -> dict[str, Wheel]:
     """Return each train of two or more bodies by the name of its leading body, the one written first."""
-    gears = [(name, part) for name, part in assembly.parts if isinstance(part, Gear)]
+    gears = [(name, part) for name, part in assembly.parts if isinstance(part, Transmission)]
     leading: dict[str, Wheel] = {}
     taken: set[str] = set()
     for name, part in assembly.parts:
@@ -65,7 +65,7 @@ def trains(assembly: Assembly) -> dict[str, Wheel]:
     return leading
 
 
-def _wheel(assembly: Assembly, name: str, gears: list[tuple[str, Gear]], taken: set[str]) -> Wheel:
+def _wheel(assembly: Assembly, name: str, gears: list[tuple[str, Transmission]], taken: set[str]) -> Wheel:
     taken.add(name)
     body = assembly[name]
     assert isinstance(body, Free)
@@ -84,7 +84,7 @@ def train_motions(
     """Return the motion of each body of a train, and its turns per turn of the leading body."""
     motions = {root.name: (lead, ca.SX(1))}
     for front, joint in root.gears():
-        ratio = scopes[joint.name].parameter("ratio")
+        ratio = joint.gear.turns(scopes[joint.name])
         turns = motions[front.name][1] * (1 / ratio if joint.outward else ratio)
         motions[joint.behind.name] = Motion(turns * lead.motion, turns * lead.rate), turns
     return motions
@@ -107,7 +107,7 @@ class _Load:
         lacking -= self.torques[wheel.name]
         for joint in wheel.joints:
             inside = self.scopes[joint.name]
-            ratio = inside.parameter("ratio")
+            ratio = joint.gear.turns(inside)
             wanted = self.missing(joint.behind, carried)
             first = wheel if joint.outward else joint.behind
             speed = self.turns[first.name] * self.speed
@@ -142,17 +142,26 @@ def balance_train(
         (w.body.inertia_of(scopes[w.name]) * turns[w.name] ** 2 for w in root.wheels()), start=ca.SX(0)
     )
     own.signal(
-        "train_inertia", moved, "kg*m^2", f"inertia of all that is geared to {root.name}, seen from there"
+        "train_inertia",
+        moved,
+        root.body.domain.inertia_unit,
+        f"inertia of all that is geared to {root.name}, seen from there",
     )
+    bodies = {w.name: w.body for w in root.wheels()}
     for name, (motion, turn) in motions.items():
-        scopes[name].signal("angle", motion.motion, "rad", f"angle of {name}")
-        scopes[name].signal("speed", motion.rate, "rad/s", f"speed of {name}")
-        scopes[name].signal("acceleration", turn * acceleration, "rad/s^2", f"acceleration of {name}")
+        domain, (place, _) = bodies[name].domain, bodies[name].motion_names
+        scopes[name].signal(place, motion.motion, domain.motion_unit, f"{place} of {name}")
+        scopes[name].signal("speed", motion.rate, domain.rate_unit, f"speed of {name}")
+        unit = f"{domain.rate_unit[:-2]}/s^2"
+        scopes[name].signal("acceleration", turn * acceleration, unit, f"acceleration of {name}")
     for name, gear in ((joint.name, joint.gear) for _, joint in root.gears()):
         given, got = carried[name]
         first, second = (motions[end][0].rate for end in gear.between)
-        scopes[name].signal("input_torque", given, "N*m", f"what {gear.between[0]} gives to {name}")
-        scopes[name].signal("torque", got, "N*m", f"what {gear.between[1]} gets from {name}")
+        gives, gets = gear.joins
+        scopes[name].signal(
+            f"input_{gives.effort}", given, gives.effort_unit, f"what {gear.between[0]} gives to {name}"
+        )
+        scopes[name].signal(gets.effort, got, gets.effort_unit, f"what {gear.between[1]} gets from {name}")
         scopes[name].signal("loss", given * first - got * second, "W", f"heat in {name}")
 
 

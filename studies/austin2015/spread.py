@@ -75,6 +75,7 @@ def over_spread(
     design = nls.observer.design_observer_with_details(model, gain=CertifiedGain())
     text = deck.read_text(encoding="utf-8")
     proved = certify(model, design, assumptions=declared_assumptions(model, design), deck=(deck.stem, text))
-    code = nls.export_c(proved.stated(design.model), out / "certified", name="observer")
+    real = proved.proof.assumptions.real
+    code = nls.export_c(proved.stated(design.model), out / "certified", name="observer", real=real)
     file = proved.write_beside(code.header, code.source)
     return ObserverOverSpread(chosen, errors, drops, proved, code, file)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from nlsdesign.components import (
     MATERIAL,
     ROTATION,
+    TRANSLATION,
     Assembly,
     Body,
     Cam,
     Controller,
     DrivePart,
     Element,
-    Gear,
+    Encoder,
     GearedMotor,
     Inertia,
     Mass,
@@ -21,6 +22,7 @@ from nlsdesign.components import (
     Sensor,
     Spring,
     Tie,
+    Transmission,
     specimen,
     through,
     tie,
@@ -34,6 +36,9 @@ EXAMPLES: list[Part] = []
 
 def around(part: Part) -> Assembly:
     """The smallest system in which the part does something."""
+    if isinstance(part, Encoder) and part.domain == TRANSLATION:
+        spring = tie(Spring(stiffness=2500.0), "carriage")
+        return assembly("bench", carriage=Mass(mass=0.4), spring=spring, part=part)
     if isinstance(part, Sensor):
         spring = tie(through(Pulley(radius=0.01), rubber=Spring(stiffness=2500.0)), "motor")
         motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055)
@@ -51,8 +56,9 @@ def around(part: Part) -> Assembly:
     if isinstance(part, DrivePart):
         motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055, chain=(("part", part),))
         return assembly("bench", motor=motor, spring=tie(Spring(stiffness=3.4, domain=ROTATION), "motor"))
-    if isinstance(part, Gear):
-        bodies = {name: Inertia(inertia=6e-4) for name in part.between}
+    if isinstance(part, Transmission):
+        kinds = {ROTATION: Inertia(inertia=6e-4), TRANSLATION: Mass(mass=0.4)}
+        bodies = {name: kinds[domain] for name, domain in zip(part.between, part.joins, strict=True)}
         return assembly("bench", **bodies, part=part)
     if isinstance(part, Tie):
         return assembly("bench", shaft=Inertia(inertia=6e-4), part=part)
@@ -68,5 +74,7 @@ def around(part: Part) -> Assembly:
 def named(part: Part) -> str:
     """Class, readings and domain of an example, as its name."""
     held = [type(getattr(part, field)).__name__ for field in readings(type(part))]
-    domain = [part.domain.name] if isinstance(part, Element | Body) and len(part.domains()) > 1 else []
+    domain = (
+        [part.domain.name] if isinstance(part, Element | Body | Encoder) and len(part.domains()) > 1 else []
+    )
     return "-".join([type(part).__name__, *held, *domain])

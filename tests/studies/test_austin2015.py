@@ -11,8 +11,9 @@ import pytest
 from nlsdesign.cli.studies import claims, run_study
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import deck_digest, declare
-from nlsdesign.feedback.observer import read_certificate, verify
-from nlsdesign.foundation.deck import load_deck
+from nlsdesign.export import export_c
+from nlsdesign.feedback.observer import CodeToCompare, read_certificate, verify
+from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.model import flatten
 from tests.command_line import Run, run
 
@@ -142,7 +143,9 @@ def test_the_certificate_holds_and_the_generated_observer_learns(
     for name in ("published", "designed"):
         proved, untouched = read_certificate(out / name / "certified" / "certificate.json")
         assert untouched
-        verdict = verify(proved, untouched=untouched, code=out / name / "certified")
+        model = flatten(declare(read_deck(proved.deck[1], Path(f"{proved.deck[0]}.toml"))))
+        code = CodeToCompare(out / name / "certified", export_c)
+        verdict = verify(proved, untouched=untouched, model=model, code=code)
         assert verdict.holds, str(verdict)
         certified = (out / name / "certified" / "observer.h").read_text("utf-8").splitlines()[0]
         assert proved.statement[0] in certified

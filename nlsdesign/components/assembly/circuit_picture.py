@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ..core.part import Part
 from ..core.tie import Tie
-from ..mechanics.gear import Gear
+from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from .circuit import Circuit, Leaf, Row, circuit_of
 
@@ -73,7 +73,7 @@ def assembly_svg(name: str, parts: Sequence[tuple[str, Part]]) -> str:
         if isinstance(part, Tie):
             circuit = circuit_of(part.element, label)
             ends = part.between[0], part.between[1] if len(part.between) == 2 else "frame"
-        elif isinstance(part, Gear):
+        elif isinstance(part, Transmission):
             circuit, ends = Leaf(label, "around"), part.between
         else:
             continue

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from ..core.part import Part
 from ..core.tie import Tie
-from ..mechanics.gear import Gear
+from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from .circuit import circuit_lines, circuit_of
 
@@ -34,7 +34,7 @@ def draw(title: str, parts: Sequence[tuple[str, Part]], *, width: int | None = N
                 drawn = [f"    {line}" for line in circuit_lines(circuit, *_ends(part))]
                 lines += drawn if width is None else _broken(drawn, max(width, _NARROWEST))
             lines += _branches(part.element, "    ")
-        elif isinstance(part, Gear):
+        elif isinstance(part, Transmission):
             lines.append(f"  {part.between[0]} ══ [{name}] ══ {part.between[1]}   {part.title()}")
         elif isinstance(part, Sensor):
             lines.append(f"  {name} ◁ {part.of}   {part.title()}")

@@ -22,7 +22,7 @@ from ..core.part import Part
 from ..core.part_numbers import ParameterInfo, Reading, domain_by_units, readings, templates
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, Free
-from ..mechanics.gear import Gear
+from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
 from .library_rubber import FIELDS, takes_material, with_library_rubber
@@ -254,12 +254,12 @@ class Builder:
         kind = self.classes[name]
         if issubclass(kind, Sensor) and not isinstance(table.get("of"), str):
             self.problem(path, f"{name} needs 'of'", next_step='add of = "...", the signal that it reads')
-        if issubclass(kind, Gear) and not _is_pair(table.get("between")):
+        if issubclass(kind, Transmission) and not _is_pair(table.get("between")):
             self.problem(path, f"{name} needs 'between'", next_step='add between = ["motor", "wheel"]')
         return kind
 
     def _keys(self, path: str, kind: type[Part]) -> list[str]:
-        tied = (issubclass(kind, Element) and "." not in path) or issubclass(kind, Gear)
+        tied = (issubclass(kind, Element) and "." not in path) or issubclass(kind, Transmission)
         free = any("domains" in field.metadata for field in dataclasses.fields(kind))
         return ["component"] + ["between"] * tied + ["of"] * issubclass(kind, Sensor) + ["domain"] * free
 
@@ -354,6 +354,6 @@ def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str
         return {"cam": children["cam"], "behind": behind[0]}
     if issubclass(kind, Free):
         return {"chain": tuple(children.items())}
-    if issubclass(kind, Gear):
+    if issubclass(kind, Transmission):
         return {"between": tuple(table["between"])}
     return {"of": table["of"]} if issubclass(kind, Sensor) else {}

@@ -8,7 +8,7 @@ from ...foundation.quantity import Quantity
 from ...foundation.spread import RelativeSpread
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, GearedMotor
-from ..mechanics.gear import Gear
+from ..mechanics.gear import Gear, Transmission
 from ..mechanics.motor import ElectricMotor
 from .named_parts import Assembly
 
@@ -85,7 +85,7 @@ def _ends(machine: Assembly) -> Iterator[str]:
 def _driven(machine: Assembly) -> set[str]:
     """Return the bodies that a motor turns, directly or through gears."""
     names = {name for name, part in machine.parts if isinstance(part, GearedMotor | ElectricMotor)}
-    gears = [part.between for _, part in machine.parts if isinstance(part, Gear)]
+    gears = [part.between for _, part in machine.parts if isinstance(part, Transmission)]
     for _ in gears:
         names |= {end for pair in gears if set(pair) & names for end in pair}
     return names

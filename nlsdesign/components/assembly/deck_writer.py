@@ -14,7 +14,7 @@ from ...foundation.text_files import write_text
 from ..core.element import Element
 from ..core.part import Part
 from ..core.tie import Tie
-from ..mechanics.gear import Gear
+from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from .deck_reader import Builder
 from .named_parts import Assembly, arrangement_problems
@@ -93,7 +93,7 @@ def deck_digest(assembly: Assembly, changed: Mapping[str, Quantity] | None = Non
 def _parts_lines(assembly: Assembly, changed: Mapping[str, Quantity]) -> list[str]:
     lines: list[str] = []
     for name, part in assembly.parts:
-        if isinstance(part, Tie | Gear):
+        if isinstance(part, Tie | Transmission):
             ends = ", ".join(text_of(end) for end in part.between)
             inner = part.element if isinstance(part, Tie) else part
             structure = [f"between = [{ends}]"]

@@ -13,7 +13,7 @@ from ..core.element import Element, Parallel
 from ..core.part import LONGEST, Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, Fixed
-from ..mechanics.gear import Gear, gear_problems
+from ..mechanics.gear import Transmission, transmission_problems
 from ..sensing.sensors import Sensor
 from .circuit_picture import NotebookCircuits
 from .circuit_text import draw
@@ -238,7 +238,7 @@ def arrangement_problems(
         if isinstance(part, Tie):
             if not set(unreadable) & set(part.between):
                 yield from ((name, error) for error in _tie_problems(name, part, bodies))
-        elif not isinstance(part, Body | Sensor | Gear):
+        elif not isinstance(part, Body | Sensor | Transmission):
             yield (
                 name,
                 ArrangementError(
@@ -247,7 +247,7 @@ def arrangement_problems(
                     next_step="tie an element to bodies with tie(element, 'motor', 'load')",
                 ),
             )
-    yield from gear_problems(parts, unreadable)
+    yield from transmission_problems(parts, unreadable)
     yield from chain_problems(parts)
     yield from _twofold(parts)
 
@@ -291,7 +291,7 @@ def _tie_problems(name: str, part: Tie, bodies: Mapping[str, Body]) -> Iterator[
                 f"part '{name}'",
                 f"relates {part.element.domain.motion} and {part.element.domain.effort}, "
                 f"but '{end}' has a {body.domain.motion}",
-                next_step="put a cam or pulley (through) in between",
+                next_step="put a cam or pulley (through) in between, or join bodies with a Rack or a Screw",
             )
     if all(isinstance(body, Fixed) for body in ends) or len(set(part.between)) < len(part.between):
         yield ArrangementError(

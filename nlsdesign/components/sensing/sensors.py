@@ -22,10 +22,10 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity, same_dimension
 from ...foundation.symbolic import Expression
-from ..core.domain import Domain
+from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
 from ..core.part import Part, parameter
-from ..core.part_numbers import NotDeclared, Reading, read_as
+from ..core.part_numbers import NotDeclared, Reading, one_of, read_as
 
 
 class Numbers(Protocol):
@@ -57,8 +57,7 @@ class Sensor(Part):
 
     of: str
 
-    @classmethod
-    def sees(cls, unit: str) -> bool:
+    def sees(self, unit: str) -> bool:
         """Tell whether it can read a signal in this unit.
 
         Parameters
@@ -66,7 +65,7 @@ class Sensor(Part):
         unit
             Of the signal.
         """
-        return not cls.units or any(same_dimension(unit, own) for own in cls.units)
+        return not self.units or any(same_dimension(unit, own) for own in self.units)
 
     @abstractmethod
     def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
@@ -157,9 +156,9 @@ class ReadingLimits(Reading):
     0.1
     """
 
-    lowest_reading: Quantity = parameter("rad", "smallest possible reading", minimum=-1e5, maximum=1e5)
-    highest_reading: Quantity = parameter("rad", "largest possible reading", minimum=-1e5, maximum=1e5)
-    largest_rate: Quantity = parameter("rad/s", "fastest motion", minimum=1e-6, maximum=1e6)
+    lowest_reading: Quantity = parameter("{motion}", "smallest possible reading", minimum=-1e5, maximum=1e5)
+    highest_reading: Quantity = parameter("{motion}", "largest possible reading", minimum=-1e5, maximum=1e5)
+    largest_rate: Quantity = parameter("{rate}", "fastest motion", minimum=1e-6, maximum=1e6)
     stale_time: Quantity = parameter(
         "s",
         "time without change while the drive changes",
@@ -192,23 +191,35 @@ class ReadingLimits(Reading):
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder(Sensor):
-    """Incremental encoder: reading = q·round(θ/q). The reading has no derivative; use the angle for that.
+    """Incremental encoder: reading = q·round(x/q), of an angle or of a position along a line.
 
-    :class:`ReadingLimits` may be declared, for the guards of generated code.
+    The reading has no derivative; use the motion for that. :class:`ReadingLimits` may be declared, for the
+    guards of generated code.
+
+    Examples
+    --------
+    >>> from nlsdesign import quantity
+    >>> Encoder(of="carriage.position", quantum=quantity(5, "um")).sees("m")
+    True
     """
 
-    units: ClassVar[tuple[str, ...]] = ("rad",)
+    units: ClassVar[tuple[str, ...]] = ("rad", "m")
 
-    quantum: Quantity = parameter("rad", "angle of one count", minimum=1e-9, maximum=1.0)
+    domain: Domain = one_of(ROTATION, TRANSLATION)
+    quantum: Quantity = parameter("{motion}", "motion of one count", minimum=1e-9, maximum=1.0)
     limits: Reading = read_as(NotDeclared, ReadingLimits, default=NotDeclared())
 
+    def sees(self, unit: str) -> bool:
+        """Tell whether a motion is in the unit of the count."""
+        return same_dimension(unit, self.domain.motion_unit)
+
     def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
-        """Return the angle rounded to whole counts."""
+        """Return the motion rounded to whole counts."""
         quantum = scope.parameter("quantum")
         return quantum * ca.floor(value / quantum + 0.5)
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
-        """Return the angles rounded to whole counts."""
+        """Return the motion rounded to whole counts."""
         quantum = self.quantum.number
         rounded: Array = quantum * np.floor(values / quantum + 0.5)
         return rounded

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...foundation.quantity import Quantity
+from ...foundation.text_files import STAMP
 from ...model.flat import FlatModel
 from ...model.origin import Origin
 from .c_text import comment, string, wrapped
@@ -23,9 +24,9 @@ SHORT = 12
 _LONGEST_ROW = 6
 """Numbers of a row that are shown; of a longer row the first three and the last."""
 
-_STAMP = "SHA-256 of all above this comment:"
+_DIGEST = "SHA-256 of all above this comment:"
 _STAMPED = re.compile(
-    rf"/\* Exported [^\n]*; (?:no deck|deck ([0-9a-f]{{12}}))\. {re.escape(_STAMP)}\n"
+    rf"/\* Exported [^\n]*; (?:no deck|deck ([0-9a-f]{{12}}))\. {re.escape(_DIGEST)}\n"
     r"   ([0-9a-f]{64}) \*/\n*\Z"
 )
 _DATE_VARIABLE = "SOURCE_DATE_EPOCH"
@@ -55,7 +56,7 @@ def stamped(text: str, model: FlatModel) -> str:
     deck = f"deck {model.origin.digest[:SHORT]}" if model.origin else "no deck"
     digest = hashlib.sha256(text.encode()).hexdigest()
     date = f"{export_date():%Y-%m-%d %H:%M} UTC"
-    return f"{text}/* Exported by nlsdesign {version()} on {date}; {deck}. {_STAMP}\n   {digest} */\n"
+    return f"{text}{STAMP}{version()} on {date}; {deck}. {_DIGEST}\n   {digest} */\n"
 
 
 class Stamp(NamedTuple):

@@ -63,7 +63,10 @@ OVER_CONSTRAINED = {
         lambda: geared(WHEEL, WHEEL, gear=Gear(between=("one", "one"), ratio=2.0)),
         r"gear 'gear'.*geared to each other already",
     ),
-    "a sliding body": (lambda: geared(WHEEL, Mass(mass=1.0)), r"turns angles, 'other' has a position"),
+    "a sliding body": (
+        lambda: geared(WHEEL, Mass(mass=1.0)),
+        r"joins an angle and an angle; .*'other' has a position -> take Rack or Screw",
+    ),
     "one end": (lambda: Gear(between=("one",), ratio=2.0), r"has 1 ends; a gear has two"),  # type: ignore[arg-type]
 }
 

@@ -55,6 +55,8 @@ _SMOOTH = 1e-3
 """Weight of second differences, relative to that of the samples: decides where no record has been."""
 _REACH = 5.0
 """Bounds of the control values, in the largest of them."""
+_ROUNDING = 1e-9
+"""Least distance between two bounds of a regression."""
 _SOURCE = "fitted to bench records; a table, no law"
 
 
@@ -166,7 +168,8 @@ def unnamed_part(assembly: Assembly, fit: Fit, bench: Bench, block: str) -> Cand
     creep = UnnamedFriction.rounding[place.domain]
     numbers = [p for p in fit.parameters if p.name in evidence[0].driven.free]
     parts = [_Part.of(e, fit, numbers, m) for e, m in zip(evidence, known, strict=True)]
-    chosen = _chosen(parts, numbers, (low, high, creep))
+    shifts = _Shifts.of(numbers, fit)
+    chosen = _chosen(parts, shifts, (low, high, creep))
     if chosen is None:
         return None
     form, values = chosen
@@ -238,6 +241,25 @@ def _basis(motion: Array, low: float, high: float, spans: int) -> Array:
     return result
 
 
+class _Shifts(NamedTuple):
+    """What the free numbers may still move by, in the scale in which they are fitted."""
+
+    precise: Array
+    least: Array
+    most: Array
+
+    @classmethod
+    def of(cls, numbers: Sequence[Parameter], fit: Fit) -> _Shifts:
+        """Return it from fitted numbers: beyond the bounds of their fit they would spare the table."""
+        rows = [
+            (p.sigma**-2.0, p.inward(p.lower) - at, p.inward(p.upper) - at)
+            for p in numbers
+            for at in [p.inward(fit.values[p.name])]
+        ]
+        precise, least, most = np.array(rows, dtype=float).reshape(len(rows), 3).T
+        return cls(precise, np.minimum(least, -_ROUNDING), np.maximum(most, _ROUNDING))
+
+
 @dataclass(frozen=True, eq=False)
 class _Part:
     """What one record says, in units of the noise floor: rows, and slopes of the free numbers."""
@@ -279,12 +301,12 @@ def _folds(parts: Sequence[_Part]) -> list[list[_Fold]]:
 
 
 def _chosen(
-    parts: Sequence[_Part], numbers: Sequence[Parameter], bounds: tuple[float, float, float]
+    parts: Sequence[_Part], shifts: _Shifts, bounds: tuple[float, float, float]
 ) -> tuple[_Form, Array] | None:
     """Return the smallest form within one standard error of the best, with its control values."""
     scored, folds = [], _folds(parts)
     for form in _FORMS:
-        regression = _Regression.of(form, parts, numbers, bounds)
+        regression = _Regression.of(form, parts, shifts, bounds)
         gains = regression.without_table(form.size).squares(folds) - regression.squares(folds)
         error = math.sqrt(len(gains)) * float(np.std(gains, ddof=1))
         scored.append((form, float(gains.sum()), error, regression))
@@ -306,37 +328,42 @@ class _Regression:
         What each record leaves over.
     ridge
         Priors of the numbers, smoothness of the table.
-    least
-        Lower bounds.
+    bounds
+        Lower and upper ones.
     """
 
     def __init__(
-        self, columns: Sequence[Array], targets: Sequence[Array], ridge: Array, least: Array
+        self,
+        columns: Sequence[Array],
+        targets: Sequence[Array],
+        ridge: Array,
+        bounds: tuple[Array, Array],
     ) -> None:
-        self._columns, self._targets, self._ridge, self._least = columns, targets, ridge, least
+        self._columns, self._targets, self._ridge, self._bounds = columns, targets, ridge, bounds
 
     @classmethod
     def of(
         cls,
         form: _Form,
         parts: Sequence[_Part],
-        numbers: Sequence[Parameter],
+        shifts: _Shifts,
         bounds: tuple[float, float, float],
     ) -> _Regression:
         """Return the regression of a form of table."""
         columns, size = [p.columns(form, bounds) for p in parts], form.size
         squares = sum(np.sum(c[:, :size] ** 2, axis=0) for c in columns)
         scale = float(np.mean(squares)) or 1.0
-        precise = [p.sigma**-2.0 if math.isfinite(p.sigma) else 0.0 for p in numbers]
-        ridge = np.diag([0.0] * size + precise) + 1e-9 * scale * np.eye(size + len(numbers))
+        ridge = np.diag(np.concatenate([np.zeros(size), shifts.precise]))
+        ridge += 1e-9 * scale * np.eye(len(ridge))
         ridge[:size, :size] += _SMOOTH * scale * form.roughness()
-        least = np.concatenate([form.least(), np.full(len(numbers), -np.inf)])
-        return cls(columns, [p.residual for p in parts], ridge, least)
+        least = np.concatenate([form.least(), shifts.least])
+        most = np.concatenate([np.full(size, np.inf), shifts.most])
+        return cls(columns, [p.residual for p in parts], ridge, (least, most))
 
     def without_table(self, size: int) -> _Regression:
         """Return the regression of the numbers alone."""
         columns = [np.hstack([np.zeros((len(c), size)), c[:, size:]]) for c in self._columns]
-        return _Regression(columns, self._targets, self._ridge, self._least)
+        return _Regression(columns, self._targets, self._ridge, self._bounds)
 
     def solved(self, without: Sequence[_Fold] = ()) -> Array:
         """Return control values and shifts of the numbers from all records but the rows of a fold."""
@@ -350,7 +377,7 @@ class _Regression:
         strength, axes = np.linalg.eigh(matrix)
         root = np.sqrt(np.maximum(strength, 1e-13 * strength[-1]))
         result: Array = lsq_linear(
-            root[:, None] * axes.T, (axes.T @ vector) / root, bounds=(self._least, np.inf), method="bvls"
+            root[:, None] * axes.T, (axes.T @ vector) / root, bounds=self._bounds, method="bvls"
         ).x
         return result
 

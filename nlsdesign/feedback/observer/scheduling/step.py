@@ -76,13 +76,14 @@ def speed_change(rate: Expression, speed: Expression, sample_time: float) -> Exp
     Friction is stiff near zero speed: held at its value it would throw the speed from side to side. So it
     comes last (Lie splitting), its step is the exponential Rosenbrock–Euler one, Δω = T·f·(e^x − 1)/x with
     x = T·∂f/∂ω, which is exact where f is linear, and it may stop the speed but not turn it around. Here f is
-    the rate that friction gives the speed.
+    the rate that friction gives the speed. At rest the slope is that beside it: a speed of zero and one of
+    1e-21 rad/s, which differ by rounding, must give the same covariance.
     """
     x = sample_time * ca.jacobian(rate, speed)
     # Away from zero, where the quotient is undefined; its limit there is one.
     x = x - 1e-9 * (ca.fabs(x) < 1e-9)
     after = speed + sample_time * rate * ca.expm1(x) / x
-    return after * (after * speed > 0) - speed
+    return after * (after * speed >= 0) - speed
 
 
 Spectrum: TypeAlias = NDArray[np.complex128]

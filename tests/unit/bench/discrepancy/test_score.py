@@ -13,6 +13,7 @@ import pytest
 
 from benchmarks import discrepancy_score
 from benchmarks._score_cases import CATALOGUE, PAIRS, TIERS, TRIPLES, Case, cases, known_effects, sample
+from benchmarks._score_digest import digest
 from benchmarks._score_run import opened, run, write_case
 from benchmarks._score_table import table, wilson
 from benchmarks._score_truth import covered, true_numbers
@@ -135,7 +136,7 @@ def test_a_run_goes_on_where_it_was_interrupted(
 
     def instant(case: Case, limit: int, yardsticks: bool) -> dict[str, Any]:
         ran.append(case.name)
-        return result(case.tier, list(case.effects), list(case.effects), case=case.name)
+        return result(case.tier, list(case.effects), list(case.effects), case=case.name, code=digest())
 
     monkeypatch.setattr(discrepancy_score, "run", instant)
     monkeypatch.setattr(

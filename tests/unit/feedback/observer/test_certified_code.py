@@ -58,6 +58,27 @@ def test_forged_c_with_a_hash_written_anew_fails(run: Run, tmp_path: Path) -> No
         assert "is not what the deck gives" in failing[0]["detail"]
 
 
+def test_code_is_verified_a_year_later_in_another_time_zone(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    assert run(*WORDS, "--out", str(tmp_path))[0] == 0
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1731600000")
+    monkeypatch.setenv("TZ", "Pacific/Auckland")
+    certificate, source = tmp_path / "certificate.json", tmp_path / "observer.c"
+    words = ("observer", "verify", str(certificate), "--deck", DECK, "--c", str(tmp_path))
+    status, out, _ = run(*words)
+    assert status == 0, out
+    assert "written anew from the deck" in out
+    for forged in (" int added;\n", "/* Exported by nlsdesign 9. */\n"):
+        added = source.read_text() + forged
+        source.write_text(added)
+        proved, _ = read_certificate(certificate)
+        anew = {**proved.code, "observer.c": hashlib.sha256(source.read_bytes()).hexdigest()}
+        write_certificate(replace(proved, code=anew), certificate)
+        assert run(*words)[0] == 1
+
+
 def test_ranges_are_those_that_are_given(run: Run, tmp_path: Path) -> None:
     words = ("--angles", "-20 deg", "10 deg", "--speed", "3 rad/s", "--angle-error", "0.1 mrad")
     assert run(*WORDS, *words, "--out", str(tmp_path))[0] == 0
