@@ -35,7 +35,8 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import DeckError, brief, nearest
-from nlsdesign.foundation.quantity import Quantity, quantity, significant
+from nlsdesign.foundation.quantity import Quantity, quantity
+from nlsdesign.foundation.written_numbers import significant
 
 _CONTROL_VALUES = 80
 _CHANGEOVER = 2e-5  # rad; at 15 mm lever arm 0.3 µm of extension

@@ -12,6 +12,7 @@ import click
 from ..foundation.errors import ExportError, NlsError, UnitError, nearest, unknown_name
 from ..foundation.quantity import Quantity, same_dimension, typeset_unit
 from ..foundation.text_files import write_text
+from ..foundation.written_numbers import rounded
 from .output import examples, json_option, next_command, show_json
 from .readiness import shown_command
 from .units import parse_number, split_number
@@ -240,7 +241,7 @@ def _asked_inertia(question: AskedNumber, at: MotorInertia, ratio: Quantity) -> 
     place = click.prompt("Inertia given at", type=click.Choice([ROTOR, OUTPUT]), default=ROTOR)
     factor = 1.0 if place == at.place else ratio.number**2 if at.place == ROTOR else ratio.number**-2
     unit = "g*cm^2" if place == ROTOR else "kg*m^2"
-    usual = Quantity(float(f"{question.usual.number * factor:.4g}"), unit, question.usual.source)
+    usual = Quantity(rounded(question.usual.number * factor, 4), unit, question.usual.source)
     answer = _answer(replace(question, usual=usual))
     if not answer:
         return {}

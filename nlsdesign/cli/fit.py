@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from ..foundation.quantity import typeset_unit, with_error
+from ..foundation.quantity import typeset_unit
+from ..foundation.written_numbers import with_error
 from .exported_machine import MACHINE, ExportedMachine, export_machine, export_option
 from .named_paths import NamedPath
 from .observer import sample_time_option

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..foundation.arrays import Array
-from ..foundation.quantity import parse_unit, with_unit
+from ..foundation.written_numbers import in_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class LimitMargin:
 
     def shown(self, value: float) -> str:
         """Return a number in the unit of the limit as text."""
-        return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
+        return in_unit(value, self.shown_unit)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from ..design.statics.equilibrium import equilibrium_torque
 from ..foundation.arrays import Array
 from ..foundation.deck import Deck, deck_names, load_deck, read_deck, template_names
 from ..foundation.errors import NlsError, ValueRangeError, unknown_name
+from ..foundation.written_numbers import rounded
 from ..model import flatten
 from ..model.roles import series_cam
 from .question import LiveQuestion
@@ -97,9 +98,7 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     angles = np.linspace(0.0, last, _POINTS)
     torques = np.maximum(equilibrium_torque(blank.machine.model, cam.drive, angles), 0.0)
     torques[0] = 0.0
-    points = tuple(
-        TargetPoint(float(f"{a:.4g}"), float(f"{t:.4g}")) for a, t in zip(angles, torques, strict=True)
-    )
+    points = tuple(TargetPoint(rounded(a, 4), rounded(t, 4)) for a, t in zip(angles, torques, strict=True))
     question = replace(
         blank, points=points, free=(blank.contour, cam.pretension), limits=_stretch(blank.machine, angles)
     )
@@ -118,7 +117,7 @@ def _stretch(machine: ChosenMachine, angles: Array) -> dict[str, float]:
         return {}
     allowed = min(_ROOM * strain, BREAKS)
     size = 10.0 ** (math.floor(math.log10(allowed)) - 1)
-    return {MaximumStrain.__name__: float(f"{size * math.ceil(allowed / size):.3g}")}
+    return {MaximumStrain.__name__: rounded(size * math.ceil(allowed / size), 3)}
 
 
 def _deck(name: str) -> Deck:

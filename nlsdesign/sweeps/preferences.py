@@ -10,7 +10,8 @@ import numpy as np
 
 from ..foundation.arrays import Array, Indices, Mask
 from ..foundation.errors import ValueRangeError, unknown_name
-from ..foundation.quantity import three_digits, with_unit
+from ..foundation.quantity import with_unit
+from ..foundation.written_numbers import three_digits
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.foundation.quantity import three_digits
+from nlsdesign.foundation.written_numbers import three_digits
 from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, TextSection
 
 from .observer import STIFFER, WIDER

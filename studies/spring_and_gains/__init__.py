@@ -22,7 +22,7 @@ from nlsdesign.design import CamDesign
 from nlsdesign.feedback.control import LoopChoice, best_choices
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import NlsError
-from nlsdesign.foundation.quantity import three_digits
+from nlsdesign.foundation.written_numbers import three_digits
 from nlsdesign.presentation.report import FigureSection, TableSection
 
 from ..alternative_rubber.bench import Bench, Rubber

@@ -15,9 +15,10 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.deck import Written
 from ...foundation.errors import ExportError, MeasurementError, NlsError
-from ...foundation.quantity import Quantity, parse_unit, three_digits, to_resolution, typeset_unit, with_unit
+from ...foundation.quantity import Quantity, parse_unit, typeset_unit, with_unit
 from ...foundation.spread import NormalSpread, RelativeSpread
 from ...foundation.text_files import text_of, write_text
+from ...foundation.written_numbers import rounded, three_digits, to_resolution
 from ...model.derived_deck import derived
 from ...simulation import Prior
 from .bench_response import shared_factors
@@ -213,7 +214,7 @@ def _calibrated_row(
     members = [n for n in names if n.partition("[")[0] == name]
     spread = max((after.spread_of(n) for n in members), key=lambda each: each.share(1.0))
     if isinstance(spread, RelativeSpread):
-        spread = RelativeSpread(float(f"{spread.relative:.3g}"))
+        spread = RelativeSpread(rounded(spread.relative, 3))
     short = len(values) <= 4
     was = str(old) if short else f"{len(values)} numbers in {typeset_unit(old.unit)}"
     declared = f"{was} {old.spread_text}: {old.source}"
@@ -312,7 +313,7 @@ def _joint_text(result: CalibratedMachine) -> str:
         + straight,
         "names": names,
         "values": [value(n) for n in names],
-        "covariance": [[float(f"{c:.10g}") for c in row] for row in shown.covariance],
+        "covariance": [[rounded(c, 10) for c in row] for row in shown.covariance],
         **({"sizes": sizes} if any(sizes) else {}),
     }
     return json.dumps(content, indent=None, ensure_ascii=False) + "\n"

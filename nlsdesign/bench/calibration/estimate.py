@@ -14,7 +14,8 @@ from scipy.stats import chi2
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, MeasurementError, ValueRangeError, unknown_name
-from ...foundation.quantity import three_digits, with_unit
+from ...foundation.quantity import with_unit
+from ...foundation.written_numbers import three_digits
 from ...model import flatten
 from ...simulation import Prior, declared_prior
 from ..identification import RecordSet, load_record

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from ...foundation.quantity import Quantity
 from ...foundation.spread import RelativeSpread
+from ...foundation.written_numbers import rounded
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear, Transmission
@@ -115,7 +116,7 @@ def _inertias(machine: Assembly) -> Iterator[str]:
             n = part.gear_ratio.number
             fast = n * n * part.torque_constant.number * part.current_limit.number / part.inertia.number
             if fast > _FASTEST:
-                reflected = Quantity(float(f"{part.inertia.number * n * n:.4g}"), part.inertia.unit)
+                reflected = Quantity(rounded(part.inertia.number * n * n, 4), part.inertia.unit)
                 yield (
                     f"{name}.inertia: {part.inertia} is that at the gear's output; the rotor would then have "
                     f"{_in_grams(part.inertia.number / n**2)} and speed up with {fast:.2g} rad/s², more than "
@@ -126,7 +127,7 @@ def _inertias(machine: Assembly) -> Iterator[str]:
             current = min(part.current_limit.number, part.voltage_limit.number / part.resistance.number)
             slow = part.torque_constant.number * current / part.inertia.number
             if slow < _SLOWEST:
-                own = Quantity(float(f"{part.inertia.number / n / n:.4g}"), part.inertia.unit)
+                own = Quantity(rounded(part.inertia.number / n / n, 4), part.inertia.unit)
                 yield (
                     f"{name}.inertia: {part.inertia} is that of the rotor, in front of the gear, which the "
                     f"largest current speeds up with {slow:.2g} rad/s² only -> if it is that at the gear's "

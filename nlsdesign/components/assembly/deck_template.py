@@ -12,6 +12,7 @@ from ...foundation.deck import Deck, read_deck, template_names
 from ...foundation.errors import DeckError, NlsError, unknown_name
 from ...foundation.locations import folder
 from ...foundation.quantity import Quantity
+from ...foundation.written_numbers import rounded
 from ..mechanics.bodies import GearedMotor
 from ..mechanics.gear import Gear
 from ..mechanics.motor import ElectricMotor
@@ -95,7 +96,7 @@ class DeckTemplate:
             if name not in numbers:
                 usual = self.deck.quantity(name)
                 source = f"{usual.source}; {how}, for another gear ratio"
-                value = float(f"{usual.number * factor:.6g}")
+                value = rounded(usual.number * factor, 6)
                 carried[name] = Quantity(value, usual.unit, source, usual.spread)
         return carried
 
@@ -178,7 +179,7 @@ class MotorInertia:
         else:
             factor, how = 1.0 / squared, f"divided by the gear ratio squared, {ratio}^2"
         return Quantity(
-            float(f"{given.number * factor:.12g}"),
+            rounded(given.number * factor, 12),
             given.unit,
             f"{given.source}; {given} at the {at}, {how}",
             given.spread.times(factor),

@@ -11,8 +11,9 @@ from scipy.optimize import nnls
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import Quantity, significant
+from ...foundation.quantity import Quantity
 from ...foundation.spread import EXACT, Spread
+from ...foundation.written_numbers import significant
 from ..core.contacts import Rounded
 from ..core.springs import FittedLaw, FittedRange, StrainStiffening
 from .hyperelastic import Ogden, Yeoh

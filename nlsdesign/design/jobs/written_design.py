@@ -14,6 +14,7 @@ from ...components.assembly.deck_writer import write_deck
 from ...foundation.errors import NlsError
 from ...foundation.quantity import parse_unit, with_unit
 from ...foundation.text_files import discard, make_folder, write_text
+from ...foundation.written_numbers import rounded
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
 from ..drawing.machined_cam import MachinedCam
@@ -157,23 +158,18 @@ def design_summary(design: CamDesign) -> dict[str, Any]:
     """
     spread = {}
     if design.tolerance is not None:
-        spread = {f"{100 * q.share:g} %": _rounded(q.value) for q in design.tolerance.quantiles}
+        spread = {f"{100 * q.share:g} %": rounded(q.value, 6) for q in design.tolerance.quantiles}
     return {
         "met": design.met,
-        "torque_error_rms": _rounded(design.rms),
+        "torque_error_rms": rounded(design.rms, 6),
         "miss": None if design.miss is None else str(design.miss),
         "advice": [] if design.miss is None else list(design.miss.advice),
         "values": {name: quantity.value for name, quantity in design.values.items()},
         "active_limits": list(design.active_limits),
-        "largest_cable_force": _rounded(float(design.curves.forces.max())),
-        "energy": _rounded(design.curves.energy),
+        "largest_cable_force": rounded(float(design.curves.forces.max()), 6),
+        "energy": rounded(design.curves.energy, 6),
         "rms_error_over_spreads": spread,
     }
-
-
-def _rounded(value: float) -> float:
-    """Return a number with six digits, which are the same on every processor."""
-    return float(f"{value:.6g}")
 
 
 def trim_remarks(design: CamDesign) -> Iterator[str]:

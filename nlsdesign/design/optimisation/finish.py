@@ -13,7 +13,8 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import NlsError
-from ...foundation.quantity import Quantity, significant
+from ...foundation.quantity import Quantity
+from ...foundation.written_numbers import significant
 from ...model import FlatModel, flatten
 from ...model.derived_deck import derived
 from ..statics.contour import Contour, contour_from_curvature

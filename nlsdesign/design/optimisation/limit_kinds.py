@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.written_numbers import in_unit
 from ..curves.numbers import plain
 from .limits import Limit, OneNumber
 
@@ -64,7 +64,7 @@ class LimitKind:
         """Return a number in the unit in which people read it."""
         if self.shown_unit == "%":
             return f"{100.0 * value:.4g} %"
-        return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
+        return in_unit(value, self.shown_unit)
 
     @property
     def read_unit(self) -> str:

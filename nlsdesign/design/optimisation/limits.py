@@ -10,8 +10,9 @@ from typing import ClassVar
 import casadi as ca
 
 from ...foundation.errors import ValueRangeError, unknown_name
-from ...foundation.quantity import Quantity, parse_unit, typeset_unit, with_unit
+from ...foundation.quantity import Quantity, typeset_unit
 from ...foundation.symbolic import Expression
+from ...foundation.written_numbers import in_unit
 from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint, anchor_of
 
@@ -30,7 +31,7 @@ class Bound:
 
     def shown(self, value: float) -> str:
         """Return a number in the unit of the limit as text."""
-        return with_unit(f"{value / parse_unit(self.unit).factor:.4g}", self.unit)
+        return in_unit(value, self.unit)
 
     def __str__(self) -> str:
         return f"{self.limit}: {self.of} {'<=' if self.upper else '>='} {self.shown(self.value)}"

@@ -15,7 +15,8 @@ from ...components.transmission.cam import Cam, TwoSidedCam
 from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ArrangementError, ValueRangeError
-from ...foundation.quantity import Quantity, significant
+from ...foundation.quantity import Quantity
+from ...foundation.written_numbers import significant
 from .contour import Contour, contour_from_lever_arm
 
 Made = TypeVar("Made", bound=Cam)

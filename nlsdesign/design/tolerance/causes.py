@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.quantity import parse_unit, with_unit
 from ...foundation.spread import Spread
+from ...foundation.written_numbers import in_unit
 
 
 def shown_unit(unit: str) -> str:
@@ -58,7 +58,7 @@ class Cause(ABC):
         """The standard deviation as text, in per cent where it is relative."""
         if self.unit == "1":
             return f"{100 * self.deviation:.3g} %"
-        return with_unit(f"{self.deviation / parse_unit(self.unit).factor:.3g}", self.unit)
+        return in_unit(self.deviation, self.unit, 3)
 
     def __str__(self) -> str:
         return f"{self.name} ± {self.size} ({self.source})"

@@ -26,6 +26,7 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
+from ...foundation.written_numbers import rounded
 from ...model.flat import FlatModel, Variable
 from ...model.structure import SpringNames
 
@@ -171,4 +172,4 @@ def _largest(model: FlatModel, points: Sequence[_Point]) -> Sizes:
 
 
 def _rounded(size: float) -> float:
-    return float(f"{size:.1e}") or 1.0
+    return rounded(size, 2) or 1.0

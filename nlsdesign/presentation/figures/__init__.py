@@ -2,6 +2,7 @@
 
 from matplotlib.figure import Figure
 
+from ...foundation.written_numbers import compact
 from .before_after import RecordError, gap_bars
 from .cam_motion import CamMotion, cam_motion_of, cam_positions, torque_curve
 from .curves import (
@@ -32,7 +33,6 @@ from .loop_evaluation import (
 )
 from .over_angle import errors_over_spread, observability_over_angle, ranked_intervals, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time, run_over_time
-from .style import compact
 from .svg import inline_svg, write_figures
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 

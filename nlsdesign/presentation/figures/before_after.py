@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_unit
+from ...foundation.written_numbers import three_digits, with_digits
 from .style import (
     AFTER,
     BEFORE,
@@ -26,7 +27,6 @@ from .style import (
     legend,
     panels,
     root_mean_square,
-    significant,
     styled,
 )
 from .svg import thinned
@@ -107,7 +107,7 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
         ]
         for bar, top, height in zip(drawn, tops, heights, strict=True):
             axes.annotate(
-                significant(height), (bar.get_x() + bar.get_width() / 2, top), (0, 2), color=INK.light,
+                three_digits(height), (bar.get_x() + bar.get_width() / 2, top), (0, 2), color=INK.light,
                 fontsize=8, ha="center", va="bottom", textcoords="offset points",
                 rotation=90.0 if len(ordered) > _MOST_LEVEL else 0.0,
             )  # fmt: skip
@@ -132,7 +132,9 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
     axes.set_ylabel(f"rms {quantity} in {unit}" if unit else f"rms {quantity}")
     legend(axes)
     held_out = [
-        f"{e.record} {significant(e.before)} to {significant(e.after)} {unit}" for e in ordered if e.held_out
+        f"{e.record} {three_digits(e.before)} to {three_digits(e.after)} {unit}"
+        for e in ordered
+        if e.held_out
     ]
     return described(
         figure, f"Error of each record before and after. Held out: {'; '.join(held_out) or 'none'}."
@@ -182,7 +184,7 @@ def held_out_series(record: HeldOut) -> Figure:
         *([("after", record.after, AFTER.light, DASHES[0])] if changed else []),
     ):
         residual = record.measured - values
-        rms = f"{significant(root_mean_square(residual))} {unit}"
+        rms = f"{three_digits(root_mean_square(residual))} {unit}"
         errors.append(f"{rms} {label}")
         upper.plot(*thinned(record.time, values), color=tone, linestyle=dash, linewidth=1.2, label=label)
         lower.plot(
@@ -234,7 +236,7 @@ def binned_errors(before: Curve, after: Curve, *, across: str, unit: str, name: 
     axes.margins(x=0.02)
     axes.set_xlabel(across)
     _finish(axes, f"mean error in {typeset_unit(unit)}", "Mean error in bins")
-    sizes = [significant(root_mean_square(y), 2) for _, y in (before, after)]
+    sizes = [with_digits(root_mean_square(y), 2) for _, y in (before, after)]
     return described(
         figure,
         f"Mean error of {name} over {across}: {sizes[0]} {typeset_unit(unit)} rms before, "

@@ -13,7 +13,7 @@ from ...design.statics.contour import turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, parse_unit, typeset_unit, with_unit
-from ...foundation.written_numbers import shared_prefix
+from ...foundation.written_numbers import shared_prefix, three_digits
 from .style import (
     AFTER,
     BEFORE,
@@ -32,7 +32,6 @@ from .style import (
     legend,
     look,
     panels,
-    significant,
     styled,
 )
 
@@ -284,7 +283,7 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
         ends[k] = factor * upper
     for place, value, end in zip(places, values, ends, strict=True):
         axes.annotate(
-            significant(value, 3), (end, place), (4, 0), color=INK.light, fontsize=8, va="center",
+            three_digits(value), (end, place), (4, 0), color=INK.light, fontsize=8, va="center",
             textcoords="offset points",
         )  # fmt: skip
     axes.set_yticks(places, names)
@@ -298,9 +297,9 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     return described(
         figure,
         f"95 % quantile of the rms torque error of {len(result.errors)} made springs: "
-        f"{significant(factor * built.value, 3)} {unit} as built, {significant(factor * best[0], 3)} {unit} "
+        f"{three_digits(factor * built.value)} {unit} as built, {three_digits(factor * best[0])} {unit} "
         f"at best ({best[1]}). Largest cause alone: {causes[0].cause.name}, "
-        f"{significant(factor * causes[0].alone, 3)} {unit}.",
+        f"{three_digits(factor * causes[0].alone)} {unit}.",
     )
 
 
@@ -337,11 +336,11 @@ def torque_band(result: ToleranceResult) -> Figure:
     lower.set_title("Made minus target")
     lower.set_xlabel("angle in degrees")
     legend(upper, columns=2)
-    after = f", {significant(factor * widest[1], 3)} {unit} after the trim" if len(widest) > 1 else ""
+    after = f", {three_digits(factor * widest[1])} {unit} after the trim" if len(widest) > 1 else ""
     return described(
         figure,
         f"Band of the torque over the angle up to {degrees[-1]:.0f}° within which 90 % of the made springs "
-        f"lie, with the target; at most {significant(factor * widest[0], 3)} {unit} wide as built{after}. "
+        f"lie, with the target; at most {three_digits(factor * widest[0])} {unit} wide as built{after}. "
         "Errors below.",
     )
 
@@ -383,7 +382,7 @@ def motor_over_task(curve: TaskCurve) -> Figure:
     legend(axes[0])
     axes[-1].set_xlabel("time in s")
     summary = "; ".join(
-        f"{name}: {significant(motor.heat)} J of heat, {significant(motor.peak_power)} W at most"
+        f"{name}: {three_digits(motor.heat)} J of heat, {three_digits(motor.peak_power)} W at most"
         for name, motor in zip(_LABELS, cycles, strict=True)
         if motor is not None
     )
@@ -410,7 +409,7 @@ def curve_of_task(curve: TaskCurve) -> Figure:
     beside = "no linear spring keeps the limits"
     if curve.linear is not None and curve.linear_stiffness is not None:
         line = np.array([np.min(curve.linear.cycle.torque), np.max(curve.linear.cycle.torque)])
-        beside = f"best linear spring, {significant(curve.linear_stiffness)} N·m/rad"
+        beside = f"best linear spring, {three_digits(curve.linear_stiffness)} N·m/rad"
         at = np.degrees(line / curve.linear_stiffness)
         axes.plot(at, line, color=BEFORE.light, linestyle=DASHES[1], linewidth=1.2, label=beside)
     axes.set_ylabel("torque in N·m")
@@ -472,7 +471,7 @@ def _steps(front: ParetoFront) -> list[list[int]]:
 
 
 def _range(front: ParetoFront, values: np.ndarray) -> str:
-    ends = dict.fromkeys(significant(float(value)) for value in (values.min(), values.max()))
+    ends = dict.fromkeys(three_digits(float(value)) for value in (values.min(), values.max()))
     unit = front.units[2]
     return with_unit(" to ".join(ends), "" if unit == "1" else unit)
 
@@ -480,7 +479,7 @@ def _range(front: ParetoFront, values: np.ndarray) -> str:
 def _title_of_goal(front: ParetoFront) -> str:
     low, high = front.shown.min(axis=0), front.shown.max(axis=0)
     ranges = (
-        f"{goal} {with_unit(f'{significant(float(a))} to {significant(float(b))}', unit)}"
+        f"{goal} {with_unit(f'{three_digits(float(a))} to {three_digits(float(b))}', unit)}"
         for goal, unit, a, b in zip(front.goals, front.units, low, high, strict=True)
     )
     return f"Front of {len(front.points)} designs: " + ", ".join(ranges) + "."

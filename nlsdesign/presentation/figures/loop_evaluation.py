@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from ...feedback.control.evaluation.margins import CoupledStability, LoopMargins, OutputImpedance
 from ...feedback.control.evaluation.onset import SaturationLine
 from ...feedback.control.evaluation.responses import SineResponse
+from ...foundation.written_numbers import three_digits
 from .style import (
     DASHES,
     HOLDS,
@@ -22,7 +23,6 @@ from .style import (
     log_axis,
     look,
     panels,
-    significant,
     styled,
 )
 
@@ -46,7 +46,7 @@ def torque_responses(responses: Sequence[SineResponse], line: SaturationLine | N
     words = []
     for number, response in enumerate(responses):
         tone, dash, point = look(number)
-        label = f"{significant(response.amplitude)} N·m"
+        label = f"{three_digits(response.amplitude)} N·m"
         for panel, values in ((axes[0], response.decibel), (axes[1], response.phase_degrees)):
             panel.plot(response.frequency, values, color=tone, linestyle=dash, marker=point, label=label)
         lost = [f for f, v in zip(response.frequency, response.verdicts, strict=True) if not v.holds]
@@ -124,8 +124,8 @@ def margins_over_angle(result: Sequence[LoopMargins]) -> Figure:
             panel.plot(degrees, values, color=tone, linestyle=dash, label=f"at {margins.opening}")
         good = np.isfinite(margins.gain)
         words.append(
-            f"Cut at {margins.opening}: least gain margin {significant(float(margins.gain[good].min()))} dB, "
-            f"unstable at {int(np.sum(~margins.linear.stable()))} of {len(degrees)} angles."
+            f"Cut at {margins.opening}: least gain margin {three_digits(float(margins.gain[good].min()))} "
+            f"dB, unstable at {int(np.sum(~margins.linear.stable()))} of {len(degrees)} angles."
             if np.any(good) else f"Cut at {margins.opening}: unstable at all angles."
         )  # fmt: skip
     for panel, title in zip(
@@ -175,7 +175,7 @@ def passivity_words(first: float) -> str:
     """Return in words from which frequency on a loop is active."""
     if np.isnan(first):
         return "unstable, so it has no impedance"
-    return f"active from {significant(first)} Hz on" if np.isfinite(first) else "passive"
+    return f"active from {three_digits(first)} Hz on" if np.isfinite(first) else "passive"
 
 
 def _crosses(axes: Axes, frequencies: Sequence[float], number: int) -> None:
@@ -191,6 +191,6 @@ def _response_words(label: str, response: SineResponse, lost: Sequence[float]) -
     good = np.isfinite(response.decibel)
     if not np.any(good):
         return f"{label}: settles at no frequency."
-    low, high = (significant(float(end(response.decibel[good]))) for end in (np.min, np.max))
+    low, high = (three_digits(float(end(response.decibel[good]))) for end in (np.min, np.max))
     tail = f"; does not settle at {len(lost)} frequencies" if lost else ""
     return f"{label}: {low} to {high} dB{tail}."

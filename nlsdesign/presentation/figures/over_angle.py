@@ -13,8 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from ...feedback.analysis import Chart, RankDrops
 from ...feedback.observer import ErrorStability, SpreadErrors
 from ...foundation.errors import ValueRangeError
-from ...foundation.written_numbers import shared_prefix
-from .style import AFTER, DASHES, INK, MUTED, described, legend, log_axis, look, panels, significant, styled
+from ...foundation.written_numbers import shared_prefix, three_digits, with_digits
+from .style import AFTER, DASHES, INK, MUTED, described, legend, log_axis, look, panels, styled
 
 
 @styled
@@ -109,11 +109,11 @@ def _slowest(chart: Chart, mode: str, label: str) -> str:
     values, degrees = chart[f"{mode}.decay"], np.degrees(chart.at)
     worst, ratios = int(np.argmax(values)), chart[f"{mode}.damping_ratio"]
     least = int(np.argmin(ratios))
-    text = f"{label}, {mode.replace('_', ' ')}: slowest eigenvalue {significant(float(values[worst]))} 1/s"
+    text = f"{label}, {mode.replace('_', ' ')}: slowest eigenvalue {three_digits(float(values[worst]))} 1/s"
     text += f" at {degrees[worst]:.0f}°"
     if ratios[least] < 1.0:
         pitch = float(chart[f"{mode}.frequency"][least])
-        text += f", damping at least {significant(float(ratios[least]), 2)} ({significant(pitch)} Hz)"
+        text += f", damping at least {with_digits(float(ratios[least]), 2)} ({three_digits(pitch)} Hz)"
     return f"{text}."
 
 
@@ -135,7 +135,7 @@ def observer_stability(checks: Mapping[str, ErrorStability], *, sample_time: flo
         axes.plot(np.degrees(check.angles), decay, color=color, linestyle=dash, label=f"{label} ({known})")
         at = int(np.argmin(decay))
         where = f"{np.degrees(check.angles[at]):.0f}°"
-        summaries.append(f"{label}: slowest {significant(float(decay[at]))} 1/s at {where}, {known}.")
+        summaries.append(f"{label}: slowest {three_digits(float(decay[at]))} 1/s at {where}, {known}.")
     if all(np.all(check.radius < 1.0) for check in checks.values()):
         log_axis(axes)
     else:
@@ -174,7 +174,7 @@ def _condition(axes: Axes, chart: Chart, number: int, label: str, exact: RankDro
     height = np.full(len(unobservable), 0.97 - 0.07 * number)
     crosses: Any = {"linestyle": "none", "marker": "x", "markersize": 5, "markeredgewidth": 1.6}
     axes.plot(unobservable, height, transform=axes.get_xaxis_transform(), color=tone, **crosses)
-    best = f"best condition number {significant(float(np.min(condition)), 2)}"
+    best = f"best condition number {with_digits(float(np.min(condition)), 2)}"
     if exact is not None:
         return f"{label}: {'; '.join(exact.lines())}; {best}."
     if not len(unobservable):
@@ -273,7 +273,7 @@ def _short(cause: str) -> str:
 
 
 def _range(values: np.ndarray) -> str:
-    low, high = (significant(float(end)) for end in (np.min(values), np.max(values)))
+    low, high = (three_digits(float(end)) for end in (np.min(values), np.max(values)))
     return low if low == high else f"{low} to {high}"
 
 

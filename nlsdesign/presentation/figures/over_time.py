@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_unit
+from ...foundation.written_numbers import three_digits, with_digits
 from ...simulation import Trace
 from .style import (
     AFTER,
@@ -26,7 +27,6 @@ from .style import (
     look,
     panels,
     root_mean_square,
-    significant,
     styled,
 )
 from .svg import thinned
@@ -52,7 +52,7 @@ def observer_error(time: Array, true: Array, estimates: Mapping[str, Array]) -> 
     for number, (label, values) in enumerate(estimates.items()):
         tone, dash, _ = look(number)
         error = values - true
-        rms = f"{significant(1e3 * root_mean_square(error))} mN·m"
+        rms = f"{three_digits(1e3 * root_mean_square(error))} mN·m"
         summaries.append(f"{label} {rms}")
         upper.plot(*thinned(time, values), color=tone, linestyle=dash, label=label, linewidth=1.3)
         lower.plot(
@@ -68,7 +68,7 @@ def observer_error(time: Array, true: Array, estimates: Mapping[str, Array]) -> 
     lower.set_xlabel("time in s")
     return described(
         figure,
-        f"True and estimated torque over {significant(float(time[-1] - time[0]))} s, and the error. "
+        f"True and estimated torque over {three_digits(float(time[-1] - time[0]))} s, and the error. "
         f"Root mean square error: {'; '.join(summaries)}.",
     )
 
@@ -95,11 +95,12 @@ def over_time(time: Array, curves: Mapping[str, Array], *, quantity: str, unit: 
     _finish(axes, f"{quantity} in {unit}", quantity[:1].upper() + quantity[1:])
     axes.set_xlabel("time in s")
     sizes = "; ".join(
-        f"{n} from {significant(float(v.min()))} to {significant(float(v.max()))}" for n, v in curves.items()
+        f"{n} from {three_digits(float(v.min()))} to {three_digits(float(v.max()))}"
+        for n, v in curves.items()
     )
     return described(
         figure,
-        f"{quantity} over {significant(float(time[-1] - time[0]))} s in {unit}: {sizes}.",
+        f"{quantity} over {three_digits(float(time[-1] - time[0]))} s in {unit}: {sizes}.",
     )
 
 
@@ -200,13 +201,13 @@ def closed_loop(
         _differences(axes[2], run.time, differences, (bound, typeset_unit(unit) or "1"))
     axes[-1].set_xlabel("time in s")
     errors = [
-        significant(1e3 * root_mean_square(values - run.true)) for values in (run.desired, run.estimated)
+        three_digits(1e3 * root_mean_square(values - run.true)) for values in (run.desired, run.estimated)
     ]
     return described(
         figure,
-        f"Closed loop over {significant(float(run.time[-1] - run.time[0]))} s. The true torque follows "
+        f"Closed loop over {three_digits(float(run.time[-1] - run.time[0]))} s. The true torque follows "
         f"the desired one within {errors[0]} mN·m rms, the estimate the true one within {errors[1]} mN·m. "
-        f"The current reaches {significant(float(np.max(np.abs(run.current))))} A.",
+        f"The current reaches {three_digits(float(np.max(np.abs(run.current))))} A.",
     )
 
 
@@ -219,7 +220,7 @@ def _differences(
         size = np.abs(values)
         # Zero has no place on a logarithmic axis.
         x, y = thinned(time, np.where(size > 0.0, size, np.nan))
-        largest = f"{significant(float(np.max(size)), 2)} at most"
+        largest = f"{with_digits(float(np.max(size)), 2)} at most"
         axes.plot(x, y, color=tone, linestyle=dash, linewidth=1.0, label=f"{label}: {largest}")
     every = np.concatenate([*(np.abs(values) for values in differences.values()), [bound or 0.0]])
     positive = every[every > 0.0]
@@ -227,7 +228,7 @@ def _differences(
         log_axis(axes)
         axes.set_ylim(float(positive.min()) / 3.0, 3.0 * float(positive.max()))
     if bound is not None:
-        label = f"bound {significant(bound, 2)}"
+        label = f"bound {with_digits(bound, 2)}"
         axes.axhline(bound, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)), label=label)
     _finish(axes, f"|difference| in {unit}", "Co-simulation against one monolithic simulation")
 
@@ -284,11 +285,11 @@ def run_over_time(run: Trace, names: Sequence[str]) -> Figure:
         for name in members:
             tone, dash, _ = look(len(sizes))  # no two signals of the figure look alike
             panel.plot(*thinned(run.time, run[name]), color=tone, linestyle=dash, linewidth=1.3, label=name)
-            low, high = (significant(float(end)) for end in (np.min(run[name]), np.max(run[name])))
+            low, high = (three_digits(float(end)) for end in (np.min(run[name]), np.max(run[name])))
             sizes.append(f"{name} from {low} to {high} {typeset_unit(unit)}".strip())
         shown = typeset_unit(unit)
         panel.set_ylabel(f"in {shown}" if shown else "without unit")
         legend(panel)
     axes[-1].set_xlabel("time in s")
-    span = significant(float(run.time[-1] - run.time[0]))
+    span = three_digits(float(run.time[-1] - run.time[0]))
     return described(figure, f"{len(sizes)} signals over {span} s: {'; '.join(sizes)}.")

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...foundation.arrays import Array, Indices, Mask
 from ...foundation.errors import ValueRangeError, visible
 from ...foundation.quantity import typeset_unit
+from ...foundation.written_numbers import compact
 from .style import (
     AFTER,
     BEFORE,
@@ -31,7 +32,6 @@ from .style import (
     MUTED,
     PURPLE,
     SURFACE,
-    compact,
     described,
     legend,
     panels,

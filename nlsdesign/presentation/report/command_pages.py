@@ -10,8 +10,8 @@ import numpy as np
 from ...bench.discrepancy.reporting.refit import Refit
 from ...feedback.analysis import Chart, RankDrops, SensorRanking
 from ...feedback.observer import SpreadErrors
-from ...foundation.quantity import three_digits, typeset_unit
-from ...foundation.written_numbers import prefixed, shared_prefix, without_power
+from ...foundation.quantity import typeset_unit
+from ...foundation.written_numbers import prefixed, shared_prefix, three_digits, without_power
 from ...model import FlatModel
 from ..figures import (
     RecordError,

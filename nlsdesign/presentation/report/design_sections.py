@@ -12,8 +12,7 @@ import numpy as np
 
 from ...design import CamDesign, Cause, ToleranceResult
 from ...foundation.errors import NlsError
-from ...foundation.quantity import three_digits
-from ...foundation.written_numbers import prefixed, shared_prefix
+from ...foundation.written_numbers import prefixed, shared_prefix, three_digits
 from ...model import flatten
 from ..figures import (
     CamMotion,

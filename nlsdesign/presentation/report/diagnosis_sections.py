@@ -14,9 +14,10 @@ from ...bench.discrepancy.reporting.circumstances import settings_of
 from ...bench.discrepancy.reporting.fitted_numbers import FittedNumber, fitted_numbers
 from ...bench.discrepancy.reporting.verdict import Gap, RecordGap, Verdict, best_forms, let_go, suspicions
 from ...foundation.errors import unknown_name
-from ...foundation.quantity import three_digits, typeset_unit, with_error
+from ...foundation.quantity import typeset_unit
+from ...foundation.written_numbers import compact, three_digits, with_error
 from ...model import FlatModel, flatten
-from ..figures import RecordError, compact, gap_bars
+from ..figures import RecordError, gap_bars
 from ..figures.before_after import (
     CandidateShare,
     HeldOut,
@@ -24,7 +25,6 @@ from ..figures.before_after import (
     candidate_shares,
     held_out_series,
 )
-from ..figures.style import significant
 from .sections import (
     Chapter,
     FigureSection,
@@ -167,8 +167,8 @@ def _blocks(verdict: Verdict) -> TableSection:
     rows = []
     for name in verdict.blocks:
         gap, kind = verdict.gap(name), kind_in_words(verdict.actuator, name)
-        size = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
-        times = (significant(each) for each in gap.times)
+        size = (three_digits(each) for each in (gap.before, gap.after, gap.noise_floor))
+        times = (three_digits(each) for each in gap.times)
         unit = typeset_unit(gap.unit) or "1"
         rows.append((f"`{name}`{f', {kind}' if kind else ''}", *size, unit, *times))
     columns = ("block", "before", "after", "noise", "unit", "before / noise", "after / noise")
@@ -377,8 +377,8 @@ def _all_gaps(verdict: Verdict) -> TableSection:
 
 
 def _gap_row(gap: RecordGap) -> tuple[str, ...]:
-    numbers = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
-    times = significant(gap.after / gap.noise_floor)
+    numbers = (three_digits(each) for each in (gap.before, gap.after, gap.noise_floor))
+    times = three_digits(gap.after / gap.noise_floor)
     return (
         gap.block,
         gap.record,

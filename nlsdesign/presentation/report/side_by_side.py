@@ -13,7 +13,8 @@ from ...bench.discrepancy.effects.plain_names import title
 from ...design.statics.equilibrium import torque_function
 from ...foundation.arrays import Array
 from ...foundation.errors import NlsError, ValueRangeError
-from ...foundation.quantity import Quantity, three_digits, with_error, with_unit
+from ...foundation.quantity import Quantity, with_unit
+from ...foundation.written_numbers import three_digits, with_error
 from ...model import FlatModel
 from ..figures import RecordError, curves, gap_bars
 from .page import write_report

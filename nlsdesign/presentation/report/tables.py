@@ -11,8 +11,8 @@ from urllib.parse import quote
 
 from ...foundation.errors import unknown_name, visible
 from ...foundation.quantity import Quantity, sources, typeset_unit
+from ...foundation.written_numbers import compact, three_digits
 from ...simulation import Trace
-from ..figures.style import compact, significant
 from .sections import Html, PagePosition, Section, TableSection
 
 _LONGEST_ROW = 8
@@ -117,8 +117,8 @@ def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: st
     cells = tuple(
         (
             row.what,
-            "–" if row.paper is None else significant(row.paper),
-            significant(row.here),
+            "–" if row.paper is None else three_digits(row.paper),
+            three_digits(row.here),
             typeset_unit(row.unit),
             row.remark,
         )

@@ -8,7 +8,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.quantity import three_digits, typeset_unit, with_unit
+from ...foundation.quantity import typeset_unit, with_unit
+from ...foundation.written_numbers import three_digits
 from ...sweeps import SweepColumn, SweepTable
 from ...sweeps.answer_statistics import AnswerSurface, BoundedQuantile, answer_quantiles, answer_surface
 from ...sweeps.preferences import NearIsBetter, RankedPoints

@@ -21,11 +21,11 @@ from nlsdesign.foundation.quantity import (
     parse_unit,
     quantity,
     same_dimension,
-    significant,
     sources,
     typeset_unit,
     with_unit,
 )
+from nlsdesign.foundation.written_numbers import significant
 
 KG, M, S, A, K, RAD = range(6)
 

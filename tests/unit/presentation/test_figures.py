@@ -17,11 +17,12 @@ from matplotlib.colors import to_hex
 
 from nlsdesign.design import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
+from nlsdesign.foundation.written_numbers import with_digits
 from nlsdesign.presentation import figures
 from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
 from nlsdesign.presentation.figures.cam_motion import MARKER, cam_motion, cam_picture
 from nlsdesign.presentation.figures.over_angle import observer_stability
-from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look, significant
+from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look
 from nlsdesign.presentation.figures.svg import svg_text, thinned
 from tests import figure_samples as samples
 from tests.selection import quick_only
@@ -219,7 +220,7 @@ def test_a_gap_in_a_line_stays_a_gap() -> None:
     ],
 )
 def test_numbers_as_people_write_them(value: float, digits: int, shown: str) -> None:
-    assert significant(value, digits) == shown
+    assert with_digits(value, digits) == shown
 
 
 def test_numbers_without_zeros_at_their_end() -> None:

@@ -23,8 +23,9 @@ from ....components import Assembly, Element, Parallel, UnnamedFriction, Unnamed
 from ....components.core.domain import Domain
 from ....foundation.arrays import Array, Indices
 from ....foundation.errors import ArrangementError
-from ....foundation.quantity import Quantity, significant, with_unit
+from ....foundation.quantity import Quantity, with_unit
 from ....foundation.symbolic import depends
+from ....foundation.written_numbers import significant
 from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ....model.structure import body_moved_by

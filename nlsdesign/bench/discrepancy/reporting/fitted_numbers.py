@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ....components.assembly.named_parts import Assembly
-from ....foundation.quantity import to_resolution, with_unit
+from ....foundation.quantity import with_unit
+from ....foundation.written_numbers import to_resolution
 from ....model.derived_deck import named_by_content
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter

@@ -8,7 +8,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ....components.assembly.named_parts import Assembly
-from ....foundation.quantity import significant, three_digits, to_resolution, with_error, with_unit
+from ....foundation.quantity import with_unit
+from ....foundation.written_numbers import significant, three_digits, to_resolution, with_error
 from ..effects.plain_names import capitalised, effect_in_words, title
 
 _CLEAR = 2.0

@@ -11,7 +11,8 @@ import numpy as np
 
 from ....components.assembly.named_parts import Assembly
 from ....foundation.arrays import Array
-from ....foundation.quantity import significant, three_digits, typeset_unit
+from ....foundation.quantity import typeset_unit
+from ....foundation.written_numbers import significant, three_digits
 from ....model import flatten
 from ...identification.equation_error.block_noise import rate_span
 from ...identification.filters import derivative

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from ....components.assembly.named_parts import Assembly
-from ....foundation.quantity import to_resolution
+from ....foundation.written_numbers import to_resolution
 from ...identification.equation_error.evidence import Bench
 from ...identification.least_squares import Fit
 from ..effects.effect import Candidate, Unknown

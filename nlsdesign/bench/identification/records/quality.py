@@ -24,6 +24,7 @@ from scipy.ndimage import median_filter
 
 from ....foundation.arrays import Array, Indices, Mask
 from ....foundation.errors import MeasurementError
+from ....foundation.written_numbers import rounded
 from ..residuals import noise_of, quantum_of
 
 _GAP = 1.5
@@ -155,8 +156,8 @@ def _slower(steps: Array, usual: float) -> str:
     longest = float(np.max(steps))
     if longest > _BRIDGED * usual:
         return ""
-    rate = float(f"{1.0 / longest:.2g}")
-    rate = rate if rate * longest <= 1.0 else float(f"{0.95 / longest:.2g}")
+    rate = rounded(1.0 / longest, 2)
+    rate = rate if rate * longest <= 1.0 else rounded(0.95 / longest, 2)
     return f", or put it on a slower clock: resample_Hz = {rate:g} in records.toml"
 
 
@@ -629,7 +630,7 @@ def _too_coarse(place: str, column: Sampled, values: Array, time: Array) -> Iter
     period = np.pi * float(np.ptp(values)) / fastest
     if period < _LEAST_PERIOD:
         rate = (len(time) - 1) / float(time[-1] - time[0])
-        wanted = float(f"{rate * _LEAST_PERIOD / period:.2g}")
+        wanted = rounded(rate * _LEAST_PERIOD / period, 2)
         text = f"has about {period:.2g} samples a period where it is fastest, too few for its rates"
         yield Finding(place, f"{text}: record at {wanted:g} Hz or more")
 

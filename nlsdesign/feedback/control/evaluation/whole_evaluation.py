@@ -16,6 +16,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.text_files import write_table
+from ....foundation.written_numbers import rounded
 from ....model.roles import motor_of
 from ....simulation.buffered import Translate, as_it_is
 from ..closed_loop import ClosedLoop
@@ -216,7 +217,7 @@ def evaluate_loop(
     """
     reach, side, last = largest_torque(fixed.plant), only_side(fixed.plant), over.last
     shares = (0.1, 0.3) if side else (0.2, 0.6)
-    amplitudes = over.amplitudes or [float(f"{share * reach:.2g}") for share in shares]
+    amplitudes = over.amplitudes or [rounded(share * reach, 2) for share in shares]
     largest = [a * (side * (1.0 + BIAS) or 1.0) for a in amplitudes]
     inertia = fixed.plant.values[motor_of(fixed.plant)[1].inertia]
     loads = np.array(over.inertias) if over.inertias else inertia * np.geomspace(0.1, 1e3, 13)

@@ -19,6 +19,7 @@ from scipy import sparse
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
+from ....foundation.written_numbers import rounded
 from ..scheduling.angle_form import AngleScheduledPlant
 from ..scheduling.step import ConstantGain, linear
 from .exact import corners
@@ -298,7 +299,7 @@ class CertifiedGain:
         """
         problem = gain_problem(plant, sample_time, angles, condition=self.condition)
         gain = np.array(scaling(plant))[:, None] * self._fast_enough(problem).gain
-        return ConstantGain(tuple(tuple(_rounded(v) for v in row) for row in gain))
+        return ConstantGain(tuple(tuple(rounded(v, 7) for v in row) for row in gain))
 
     def _fast_enough(self, problem: GainProblem) -> GainAndLyapunov:
         wanted = 2.0 * math.pi * self.bandwidth
@@ -382,8 +383,3 @@ def _hull(matrices: Array) -> Array:
     share = (flat - centre) @ used.T
     ends = corners(list(share.min(axis=0)), list(share.max(axis=0)))
     return np.array([centre + np.array(end) @ used for end in ends]).reshape(-1, n, n)
-
-
-def _rounded(value: float) -> float:
-    """Return a number to seven digits: what is written is what is proved."""
-    return float(f"{value:.7g}")

@@ -17,6 +17,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
+from ....foundation.written_numbers import rounded
 from ....model import FlatModel
 from ....model.paper_form import PaperFormNames
 from ....model.roles import measured_motion, spring_torque
@@ -193,7 +194,7 @@ def _designed(system: ErrorSystem, decay: float | None, condition: float) -> tup
         else:
             trials = [decay]
         for each in trials:
-            rate = float(f"{each:.6g}")
+            rate = rounded(each, 6)
             solution = _solved(system, matrices, rate, condition, corrected)
             if solution is not None and decays(system, solution, rate):
                 return solution, rate
@@ -295,4 +296,4 @@ def covers(claimed: ErrorSystem, again: ErrorSystem) -> bool:
 
 def _digits(values: Array, count: int) -> Array:
     """Return numbers to so many digits: what is written is what is proved."""
-    return np.array([[float(f"{v:.{count}g}") for v in row] for row in values])
+    return np.array([[rounded(v, count) for v in row] for row in values])

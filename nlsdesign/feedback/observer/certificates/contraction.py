@@ -15,7 +15,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError
-from ....foundation.written_numbers import shared_prefix, without_power
+from ....foundation.written_numbers import rounded, shared_prefix, without_power
 from ....model import FlatModel
 from ..scheduling.scheduled import ObserverDesign
 from ..scheduling.step import ConstantGain
@@ -253,8 +253,8 @@ def _proved(
         p = lyapunov_function(errors, math.exp(-2.0 * rate * time), condition / 1.001)
         if p is None:
             return None
-        rounded = np.array([[float(f"{v:.10g}") for v in row] for row in p])
-        return rounded if contracts(polytope, rounded, rate) else None
+        written = np.array([[rounded(v, 10) for v in row] for row in p])
+        return written if contracts(polytope, written, rate) else None
 
     if decay is not None:
         lyapunov = proposed(decay)
@@ -271,7 +271,7 @@ def _proved(
             f"decay {decay:g} 1/s", f"cannot be proved; the fastest that can is {best[0]:.4g} 1/s",
             next_step=f"ask for at most {0.98 * best[0]:.3g} 1/s",
         )  # fmt: skip
-    slower = float(f"{0.98 * best[0]:.6g}")
+    slower = rounded(0.98 * best[0], 6)
     lyapunov = proposed(slower)
     return best if lyapunov is None else (slower, lyapunov)
 

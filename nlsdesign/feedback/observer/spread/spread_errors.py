@@ -15,9 +15,8 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.data_frames import Axis, data_set
 from ....foundation.errors import ArrangementError, ConvergenceError, unknown_name
-from ....foundation.quantity import three_digits
 from ....foundation.text_files import write_table, write_text
-from ....foundation.written_numbers import shared_prefix
+from ....foundation.written_numbers import shared_prefix, three_digits
 from ....model import FlatModel
 from ....model.roles import measured_motion, series_spring
 from ....simulation.buffered import Translate, as_it_is
