@@ -15,6 +15,9 @@ UV := uv==0.13.8
 # One thread for each worker: two workers on two cores are slower, not faster, when BLAS starts four threads.
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
+# The environment is installed without bytecode, and tests and commands start hundreds of processes: where none may be
+# written, each compiles NumPy, SciPy, SymPy and this package anew, which takes several times as long as loading them.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help study test thorough tutorial kernels mutation lint bench masters targets wheels docs gallery environment lock clean distclean

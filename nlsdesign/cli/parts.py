@@ -55,11 +55,12 @@ def parts(name: str | None, as_json: bool) -> None:
 
 
 def _kind(part: type[Part]) -> str:
-    from ..components import Body, Cam, Element, Gear, Sensor
+    from ..components import Body, Cam, Element, Sensor, Transmission
     from ..components.mechanics.drive_chain import DrivePart
 
     kinds: dict[str, type[Part]] = {
-        "element": Element, "body": Body, "gear": Gear, "cam": Cam, "sensor": Sensor, "drive": DrivePart,
+        "element": Element, "body": Body, "gear": Transmission, "cam": Cam, "sensor": Sensor,
+        "drive": DrivePart,
     }  # fmt: skip
     return next(kind for kind, base in kinds.items() if issubclass(part, base))
 

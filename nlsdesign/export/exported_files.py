@@ -21,7 +21,7 @@ from typing import Any
 from ..components.assembly.deck_writer import deck_digest, declare
 from ..foundation.deck import read_deck
 from ..foundation.errors import ExportError, NlsError
-from ..model.derived_deck import digits_in_name
+from ..model.origin import digits_in_name
 from .c.provenance import SHORT, stamp_of
 from .files import BROKEN_ARCHIVE
 from .fmi.authorship import ORIGIN_FILE, ORIGIN_FORMAT

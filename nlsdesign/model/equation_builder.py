@@ -9,12 +9,11 @@ import casadi as ca
 
 from ..components.assembly.named_parts import Assembly
 from ..components.core.element import UNBOUNDED, Range, Tie
-from ..components.core.part import Part
 from ..components.core.switches import Jump, Kink, StictionConstraint
 from ..foundation.errors import ArrangementError
 from ..foundation.symbolic import Expression, depends, symbol
 from .flat import Variable
-from .owners import number_names
+from .structure import number_names
 
 TYPICAL_SIZE = {"m": 1e-2, "m/s": 0.1, "N": 10.0, "Pa": 1e5}
 """Nominal size of a state by its unit, where one of the unit is far off; for tolerances and scaling."""
@@ -39,19 +38,16 @@ class EquationBuilder:
         self.owners: dict[str, str] = {}
         self.order = {path: number for number, (path, _) in enumerate(assembly.walk())}
         for path, part in assembly.walk():
-            self._declare(path, part)
-
-    def _declare(self, path: str, part: Part) -> None:
-        inner = part.element if isinstance(part, Tie) else part
-        for field_name, info in inner.infos().items():
-            given = part.parameters()[field_name]
-            for name, value in zip(number_names(path, inner, field_name), given.values, strict=True):
-                variable = Variable(
-                    name, info.unit, info.description, value, abs(value) or 1.0, info.minimum, info.maximum,
-                    given.source, given.spread,
-                )  # fmt: skip
-                self.parameters[name] = (variable, ca.SX.sym(name))
-                self.owners[name] = path
+            inner = part.element if isinstance(part, Tie) else part
+            for field_name, info in inner.infos().items():
+                given = part.parameters()[field_name]
+                for name, value in zip(number_names(path, inner, field_name), given.values, strict=True):
+                    variable = Variable(
+                        name, info.unit, info.description, value, abs(value) or 1.0,
+                        info.minimum, info.maximum, given.source, given.spread,
+                    )  # fmt: skip
+                    self.parameters[name] = (variable, ca.SX.sym(name))
+                    self.owners[name] = path
 
     def cleaned(self, expression: Expression) -> Expression:
         """Return an expression with all defined unknowns replaced by their solutions."""

@@ -17,13 +17,52 @@ from ..foundation.spread import EXACT, Spread, as_spread
 from ..foundation.symbolic import Expression
 from .notebook_view import model_html
 from .origin import Origin
-from .plausibility import Plausibility
 from .readings import ReadingNames
 from .structure import MovingBody, SpringNames
-from .switching import Switching
 
 if TYPE_CHECKING:
     from .symbolic_view import Equations
+
+
+@dataclass(frozen=True)
+class Plausibility:
+    """How fast a measured input can change, and how long it can stay the same.
+
+    The range in which a reading can lie is ``minimum`` to ``maximum`` of its variable. An input without
+    plausibility is a command: outside its range it is taken at the limit.
+
+    Parameters
+    ----------
+    largest_rate
+        Largest rate of the measured quantity, in its unit per second.
+    resolution
+        Change from sample to sample that is always possible, such as two counts, in the unit.
+    stale_time
+        Time in s after which a reading that has not changed at all counts as stale, if meanwhile what moves
+        the machine has changed.
+    moved_by
+        Name of the input or state that moves the machine, for instance the current of its motor; ``None``
+        where that is not known: then a reading is stale after the time in any case.
+    noticeable
+        Change of ``moved_by`` that a working sensor cannot fail to show.
+
+    Raises
+    ------
+    ValueRangeError
+        If a number is not positive; only the resolution may be zero.
+    """
+
+    largest_rate: float = math.inf
+    resolution: float = 0.0
+    stale_time: float = math.inf
+    moved_by: str | None = None
+    noticeable: float = 0.0
+
+    def __post_init__(self) -> None:
+        small = 0.0 <= self.resolution < math.inf and 0.0 <= self.noticeable < math.inf
+        if not (self.largest_rate > 0.0 and self.stale_time > 0.0 and small):
+            rule = "needs a positive rate and time; resolution and noticeable change must not be negative"
+            raise ValueRangeError(f"{self}", rule)
 
 
 @dataclass(frozen=True)
@@ -201,6 +240,66 @@ class Symbols(NamedTuple):
     output: Expression
     signal: Expression
     residual: Expression
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A place at which the equations of a model are not smooth.
+
+    Parameters
+    ----------
+    name
+        Full name of the element or sensor.
+    words
+        What has happened when a mode begins: pairs of mode (−1, 0, 1) and text; a rebound is at 2.
+    jumps
+        Whether the derivatives jump or a rate is held there, so that the equations can only be integrated by
+        a method that locates it. A mere corner costs other methods accuracy, but they get across.
+    """
+
+    name: str
+    words: tuple[tuple[int, str], ...]
+    jumps: bool
+
+    def event_text(self, mode: int) -> str:
+        """Return what has happened when a mode begins."""
+        return dict(self.words)[mode]
+
+
+@dataclass(frozen=True, eq=False)
+class Switching:
+    """The switches of a model and its equations while their modes do not change.
+
+    Parameters
+    ----------
+    switches
+        k of them.
+    branch
+        ``casadi.Function`` (t, x, u, p, m) -> (f, c, v): derivative with all modes held at m, for each
+        switch a number that is not negative as long as its mode lasts, and the rate that it may hold.
+    natural
+        (t, x, u, p) -> m: the modes at a state; the equations of the flat model are those of these modes.
+    landing
+        (t, x, u, p, m) -> (v, target, leads, reach, slope) for the switches that hold a rate: the rate,
+        shape (k,), what it is after landing, the mode that follows when it is let go, the change of all
+        derivatives per effort, shape (states, k), and ∂v/∂x, shape (k, states). Zero for the others.
+    holds
+        For each switch whether it holds a rate.
+    shown
+        (t, x, u, p, m) -> (y, s): outputs and signals with all modes held at m.
+    """
+
+    switches: tuple[Switch, ...]
+    branch: ca.Function
+    natural: ca.Function
+    landing: ca.Function
+    holds: tuple[bool, ...]
+    shown: ca.Function
+
+    @property
+    def jumps(self) -> tuple[str, ...]:
+        """Names of the switches that only a method which locates them can integrate."""
+        return tuple(s.name for s in self.switches if s.jumps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -453,3 +552,43 @@ def _with_start(variable: Variable, given: float | Quantity) -> Variable:
     if source and value != variable.start:
         source = changed_source(with_unit(f"{variable.start:.6g}", variable.unit), source)
     return replace(variable, start=value, source=source)
+
+
+def casadi_dae(model: FlatModel) -> dict[str, ca.SX]:
+    """Return a continuous model as the mapping that ``casadi.integrator`` takes.
+
+    Parameters
+    ----------
+    model
+        Continuous, without tables.
+
+    Returns
+    -------
+    dict
+        SX columns: ``t``, ``x``, ``u``, ``p``, ``ode``, and ``y`` with the outputs, in the order of
+        ``model.states``, ``inputs``, ``parameters`` and ``outputs``. Take ``y`` out for an integrator.
+
+    Raises
+    ------
+    ValueRangeError
+        If the model is sampled or has tables.
+
+    Examples
+    --------
+    >>> import casadi, nlsdesign as nls
+    >>> model = nls.flatten(nls.declare(nls.load_deck("dfki_pendulum")))
+    >>> dae = nls.model.casadi_dae(model)
+    >>> outputs = dae.pop("y")
+    >>> run = casadi.integrator("run", "cvodes", dae, 0.0, 0.1)
+    >>> end = run(x0=model.start(model.states), u=[0.5], p=model.start(model.parameters))["xf"]
+    >>> end.shape
+    (2, 1)
+    """
+    if model.sample_time is not None or model.tables:
+        raise ValueRangeError(
+            f"model '{model.name}'",
+            "is sampled, an integrator takes a continuous one",
+            next_step="call model.equations, which gives the states one sample later",
+        )
+    s = model.symbols()
+    return {"t": s.time, "x": s.state, "u": s.input, "p": s.parameter, "ode": s.derivative, "y": s.output}

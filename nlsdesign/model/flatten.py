@@ -7,6 +7,7 @@ vectors is that of the deck, whatever the order in which laws happen to ask for 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -20,15 +21,13 @@ from ..components.sensing.sensors import Sensor
 from ..foundation.errors import ArrangementError, UnitError, nearest, unknown_name
 from ..foundation.quantity import typeset_unit
 from ..foundation.symbolic import Expression, depends
-from .declared_origin import DeclaredOrigin
 from .equation_builder import EquationBuilder, PartScope
-from .flat import FlatModel, Variable
+from .flat import FlatModel, Switching, Variable
 from .gear_train import balance_train, train_motions, trains
-from .owners import Owners
+from .origin import DeclaredOrigin
 from .readings import readings_of
-from .spring_structure import springs_of
 from .stiction import Laws, natural_modes, switch_laws, switching
-from .structure import moving_bodies
+from .structure import Owners, moving_bodies, springs_of
 
 
 def flatten(
@@ -64,7 +63,41 @@ def flatten(
     builder = EquationBuilder(assembly)
     _write_mechanics(assembly, builder)
     _write_sensors(assembly, builder)
-    return _model(assembly, builder, inputs, outputs)
+    open_states = [name for name in builder.states if name not in builder.derivatives]
+    if open_states:
+        raise ArrangementError(open_states[0], "no equation gives its derivative")
+    laws = switch_laws(builder)
+    readings = [f"{name}.reading" for name, part in assembly.parts if isinstance(part, Sensor)]
+    ties = [f"{n}.{p.element.domain.effort}" for n, p in assembly.parts if isinstance(p, Tie)]
+    chosen = _chosen("input", inputs, builder.inputs, builder.in_order(builder.inputs))
+    given = _chosen("output", outputs, builder.named(), readings or ties)
+    builder.signals = {name: builder.signals[name] for name in builder.in_order(builder.signals)}
+    solved = _solved(builder, laws, chosen, given)
+    moving = [s for n, (_, s) in builder.states.items() if isinstance(assembly[builder.owners[n]], Body)]
+    roots = [*solved.signals, *solved.outputs, *moving, *solved.laws.lasts]
+    states = _needed_states(builder, solved.derivatives, roots)
+    equations, switches = _equations(builder, solved, states, chosen)
+    names = [*(f"der({n})" for n in states), *given, *builder.signals, *builder.checks]
+    _check(assembly, builder, equations, names=names)
+    owners = Owners(
+        builder.owned(builder.parameters), builder.owned(states), builder.owned(chosen),
+        builder.owned(builder.signals),
+    )  # fmt: skip
+    return FlatModel(
+        name=assembly.name,
+        description=assembly.description,
+        states=tuple(builder.states[n][0] for n in states),
+        inputs=tuple(builder.inputs[n][0] for n in chosen),
+        parameters=tuple(v for v, _ in builder.parameters.values()),
+        outputs=tuple(_variable_of(builder, n) for n in given),
+        signals=tuple(v for v, _ in builder.signals.values()),
+        equations=equations,
+        switching=switches,
+        bodies=moving_bodies(assembly, owners),
+        springs=springs_of(assembly, owners),
+        readings=readings_of(assembly),
+        origin=DeclaredOrigin(assembly),
+    )
 
 
 def _write_mechanics(assembly: Assembly, builder: EquationBuilder) -> None:
@@ -120,12 +153,6 @@ def _variable_of(builder: EquationBuilder, name: str) -> Variable:
     raise unknown_name("signal", name, builder.named())
 
 
-def _default_outputs(assembly: Assembly) -> list[str]:
-    readings = [f"{name}.reading" for name, part in assembly.parts if isinstance(part, Sensor)]
-    ties = [f"{n}.{p.element.domain.effort}" for n, p in assembly.parts if isinstance(p, Tie)]
-    return readings or ties
-
-
 def _chosen(
     kind: str, given: Sequence[str] | None, valid: Iterable[str], default: Sequence[str]
 ) -> list[str]:
@@ -150,66 +177,6 @@ def _needed_states(
                 needed.add(name)
                 wanted.append(derivatives[name])
     return [name for name in builder.in_order(builder.states) if name in needed]
-
-
-def _model(
-    assembly: Assembly, builder: EquationBuilder, inputs: Sequence[str] | None, outputs: Sequence[str] | None
-) -> FlatModel:
-    open_states = [name for name in builder.states if name not in builder.derivatives]
-    if open_states:
-        raise ArrangementError(open_states[0], "no equation gives its derivative")
-    laws = switch_laws(builder)
-    kept = _chosen("input", inputs, builder.inputs, builder.in_order(builder.inputs))
-    given = _chosen("output", outputs, builder.named(), _default_outputs(assembly))
-    builder.signals = {name: builder.signals[name] for name in builder.in_order(builder.signals)}
-    solved = _solved(builder, laws, kept, given)
-    laws = solved.laws
-    moving = [s for n, (_, s) in builder.states.items() if isinstance(assembly[builder.owners[n]], Body)]
-    roots = [*solved.signals, *solved.outputs, *moving, *laws.lasts]
-    states = _needed_states(builder, solved.derivatives, roots)
-    columns = [
-        ca.SX.sym("time"),
-        ca.vertcat(*[builder.states[n][1] for n in states]),
-        ca.vertcat(*[builder.inputs[n][1] for n in kept]),
-        ca.vertcat(*[e for _, e in builder.parameters.values()]),
-        ca.SX.sym("w", 0),
-    ]
-    rows = [[solved.derivatives[n] for n in states], solved.outputs, solved.signals, solved.checks]
-    switches = switching(laws, columns, rows, states) if laws.switches else None
-    rows = _natural(laws, rows)
-    equations = ca.Function(
-        "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-    )  # fmt: skip
-    _check_unique(builder)
-    values = [v.start for v, _ in builder.parameters.values()]
-    named = [*(f"der({n})" for n in states), *given, *builder.signals, *builder.checks]
-    broken = [n for n, v in zip(named, _probe(equations, values), strict=True) if not math.isfinite(v)]
-    if broken:
-        raise ArrangementError(
-            f"assembly '{assembly.name}'",
-            f"the equations are singular: {broken[0]} has no finite value",
-            next_step="look there for springs or dashpots of zero stiffness in series",
-        )
-    owners = Owners(
-        builder.owned(builder.parameters), builder.owned(states), builder.owned(kept),
-        builder.owned(builder.signals),
-    )  # fmt: skip
-    return FlatModel(
-        name=assembly.name,
-        description=assembly.description,
-        states=tuple(builder.states[n][0] for n in states),
-        inputs=tuple(builder.inputs[n][0] for n in kept),
-        parameters=tuple(v for v, _ in builder.parameters.values()),
-        outputs=tuple(_variable_of(builder, n) for n in given),
-        signals=tuple(v for v, _ in builder.signals.values()),
-        equations=equations,
-        switching=switches,
-        bodies=moving_bodies(assembly, owners),
-        springs=springs_of(assembly, owners),
-        readings=readings_of(assembly),
-        origin=DeclaredOrigin(assembly),
-    )
 
 
 @dataclass(frozen=True)
@@ -247,30 +214,53 @@ def _solved(builder: EquationBuilder, laws: Laws, inputs: Sequence[str], outputs
     )
 
 
-def _natural(laws: Laws, rows: list[list[Expression]]) -> list[list[Expression]]:
-    """Return the rows with the modes that belong to the state."""
-    if not laws.modes or not depends(ca.vertcat(*[e for row in rows for e in row]), ca.vertcat(*laws.modes)):
-        return rows
+def _equations(
+    builder: EquationBuilder, solved: _Solved, states: Sequence[str], inputs: Sequence[str]
+) -> tuple[ca.Function, Switching | None]:
+    """Return the equations with the modes that belong to the state, and with modes that are held."""
+    laws = solved.laws
+    columns = [
+        ca.SX.sym("time"),
+        ca.vertcat(*[builder.states[n][1] for n in states]),
+        ca.vertcat(*[builder.inputs[n][1] for n in inputs]),
+        ca.vertcat(*[e for _, e in builder.parameters.values()]),
+        ca.SX.sym("w", 0),
+    ]
+    rows = [[solved.derivatives[n] for n in states], solved.outputs, solved.signals, solved.checks]
+    switches = switching(laws, columns, rows, states) if laws.switches else None
     everything = ca.vertcat(*[e for row in rows for e in row])
-    everything = ca.cse(ca.SX(ca.substitute(everything, ca.vertcat(*laws.modes), natural_modes(laws))))
-    items = iter(ca.vertsplit(everything))
-    return [[next(items) for _ in row] for row in rows]
+    if laws.modes and depends(everything, ca.vertcat(*laws.modes)):
+        everything = ca.cse(ca.SX(ca.substitute(everything, ca.vertcat(*laws.modes), natural_modes(laws))))
+        items = iter(ca.vertsplit(everything))
+        rows = [[next(items) for _ in row] for row in rows]
+    equations = ca.Function(
+        "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],
+        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    )  # fmt: skip
+    return equations, switches
 
 
-def _check_unique(builder: EquationBuilder) -> None:
-    seen: set[str] = set()
-    for group in (builder.states, builder.inputs, builder.parameters, builder.signals):
-        for name in group:
-            if name in seen:
-                raise ArrangementError(
-                    f"name '{name}'", "is used twice", next_step="rename the part or the number"
-                )
-            seen.add(name)
+def _check(
+    assembly: Assembly, builder: EquationBuilder, equations: ca.Function, *, names: Sequence[str]
+) -> None:
+    """Raise unless all variables have different names, and all numbers near rest are finite.
 
-
-def _probe(equations: ca.Function, parameters: Sequence[float]) -> list[float]:
-    """Return every number that the equations give near rest, with the parameters as they are."""
+    ``names``: of the numbers that the equations give.
+    """
+    groups = (builder.states, builder.inputs, builder.parameters, builder.signals)
+    for name, count in Counter(name for group in groups for name in group).items():
+        if count > 1:
+            raise ArrangementError(
+                f"name '{name}'", "is used twice", next_step="rename the part or the number"
+            )
     # Not at rest itself, where a law may have a corner.
     arguments = [ca.DM.ones(equations.sparsity_in(i)) * 1e-3 for i in range(equations.n_in())]
-    arguments[3] = ca.DM(parameters)
-    return [float(v) for result in equations.call(arguments) for v in ca.densify(result).nonzeros()]
+    arguments[3] = ca.DM([v.start for v, _ in builder.parameters.values()])
+    values = [float(v) for result in equations.call(arguments) for v in ca.densify(result).nonzeros()]
+    singular = [name for name, value in zip(names, values, strict=True) if not math.isfinite(value)]
+    if singular:
+        raise ArrangementError(
+            f"assembly '{assembly.name}'",
+            f"the equations are singular: {singular[0]} has no finite value",
+            next_step="look there for springs or dashpots of zero stiffness in series",
+        )

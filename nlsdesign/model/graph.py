@@ -1,4 +1,4 @@
-"""What a function of SX computes, operation by operation: the one reader of CasADi's instructions.
+"""What a function of SX computes, operation by operation: the one reader of its instructions.
 
 CasADi keeps values in places of a working memory that it uses again and again. Here every value has a number
 of its own, that of its instruction, and :func:`fold` goes through them in the order of computation. Who

@@ -6,11 +6,12 @@ answer open, one sentence says which role was looked for, what there is, and how
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TypeVar
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple, TypeVar
 
 from ..foundation.errors import ArrangementError, unknown_name
-from .flat import FlatModel
+from .flat import FlatModel, Plausibility, Variable
 from .structure import CamNames, MotorNames, MovingBody, SpringNames
 
 Named = TypeVar("Named")
@@ -152,12 +153,56 @@ def _listed(kind: str, names: Sequence[str], which: str = "") -> str:
     if not names:
         return f"there is no {kind} {which}".rstrip()
     plural = "bodies" if kind == "body" else f"{kind}s"
-    return f"there are {len(names)} {plural} {which}".rstrip() + ": " + _quoted(names)
+    listed = ", ".join(f"'{name}'" for name in names)
+    return f"there are {len(names)} {plural} {which}".rstrip() + f": {listed}"
 
 
 def _choice(examples: Sequence[str], otherwise: str) -> str:
     return f"name one, for instance {examples[0]}" if examples else otherwise
 
 
-def _quoted(names: Iterable[str]) -> str:
-    return ", ".join(f"'{name}'" for name in names)
+class DeclaredReading(NamedTuple):
+    """What is declared of the sensor that shows a motion.
+
+    Parameters
+    ----------
+    quantum
+        One count, 0 where none is declared.
+    limits
+        Lowest and highest reading, largest rate and stale time; ``None`` where they are not declared.
+    """
+
+    quantum: float
+    limits: tuple[float, float, float, float] | None
+
+
+_LIMITS = ("lowest_reading", "highest_reading", "largest_rate", "stale_time")
+
+
+def declared_reading(model: FlatModel, measured: str) -> DeclaredReading:
+    """Return what the deck declares of the sensor that shows a motion."""
+    for reading in model.readings:
+        for sensor in reading.sensors if reading.measured == measured else ():
+            names = [f"{sensor}.{name}" for name in _LIMITS]
+            quantum = model.values.get(f"{sensor}.quantum", 0.0)
+            if all(name in model.values for name in names):
+                lowest, highest, rate, stale = (model.values[name] for name in names)
+                return DeclaredReading(quantum, (lowest, highest, rate, stale))
+            if quantum:
+                return DeclaredReading(quantum, None)
+    return DeclaredReading(0.0, None)
+
+
+def with_declared_reading(variable: Variable, model: FlatModel, measured: str) -> Variable:
+    """Return an input that is measured, with range and largest rate that the deck declares of its readings.
+
+    Not the stale time: without knowing what drives the machine a sensor that is dead looks like one at rest.
+
+    ``variable``: input of a controller or an observer; unchanged where nothing is declared.
+    """
+    declared = declared_reading(model, measured)
+    if declared.limits is None:
+        return variable
+    lowest, highest, rate, _ = declared.limits
+    can = Plausibility(largest_rate=rate, resolution=2.0 * declared.quantum)
+    return replace(variable, minimum=lowest, maximum=highest, plausibility=can)

@@ -17,7 +17,7 @@ from ..components.core.switches import StictionConstraint
 from ..foundation.errors import ArrangementError
 from ..foundation.symbolic import Expression, depends
 from .equation_builder import EquationBuilder
-from .switching import Switch, Switching
+from .flat import Switch, Switching
 
 _SMOOTH = "take the smooth form of the law: smoothed(assembly)"
 

@@ -15,9 +15,9 @@ import casadi as ca
 
 from ..foundation.errors import ArrangementError, unknown_name
 from ..foundation.symbolic import Expression, depends
-from .flat import FlatModel, Symbols, Variable
+from .flat import FlatModel, Switching, Symbols, Variable
+from .graph import applied
 from .structure import ModelParts
-from .switching import Switching
 
 
 def named(model: FlatModel, symbols: Symbols) -> dict[str, Expression]:
@@ -104,7 +104,8 @@ def replace_state(model: FlatModel, old: str, signal: str) -> FlatModel:
     derivative = _exchanged(s.derivative, place, rate)
     kept = [i for i, v in enumerate(model.signals) if v.name != signal]
     row = _column([*(s.signal[i] for i in kept), s.state[place]])
-    columns = _substituted([derivative, s.output, row, s.residual], s.state[place], solved)
+    # All columns at once, so that they go on sharing their common parts.
+    columns = ca.substitute([derivative, s.output, row, s.residual], [s.state[place]], [solved])
     variable = replace(model.variable(signal), start=_at_start(model, signal))
     changed = s._replace(
         state=_exchanged(s.state, place, new),
@@ -258,11 +259,6 @@ def _exchanged(column: Expression, place: int, item: Expression) -> Expression:
     return _column([item if i == place else column[i] for i in range(column.shape[0])])
 
 
-def _substituted(columns: Sequence[Expression], old: Expression, new: Expression) -> list[Expression]:
-    """Substitute in all columns at once, so that they go on sharing their common parts."""
-    return [ca.SX(c) for c in ca.substitute(list(columns), [old], [new])]
-
-
 def _at_start(model: FlatModel, name: str) -> float:
     return model.evaluate([v.start for v in model.states])[name]
 
@@ -336,5 +332,4 @@ def _grow(root: Expression, grown: dict[int, Expression], changed: set[int]) -> 
             grown[key] = node
             continue
         changed.add(key)
-        parts = [grown[each] for _, each in below]
-        grown[key] = ca.SX.unary(node.op(), *parts) if len(parts) == 1 else ca.SX.binary(node.op(), *parts)
+        grown[key] = applied(node.op(), [grown[each] for _, each in below])

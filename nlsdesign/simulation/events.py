@@ -20,7 +20,7 @@ import numpy as np
 from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError
 from ..model import FlatModel
-from ..model.switching import Switch, Switching
+from ..model.flat import Switch, Switching
 from .buffered import Buffered
 
 LOCATED = 1e-12

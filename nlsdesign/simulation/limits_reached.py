@@ -11,7 +11,7 @@ import numpy as np
 from ..foundation.arrays import Array
 from ..foundation.quantity import with_unit
 from ..model import FlatModel
-from ..model.declared_limits import declared_reading
+from ..model.roles import declared_reading
 from .trace import Trace
 
 _ROUNDING = 1e-9

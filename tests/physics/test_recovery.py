@@ -18,7 +18,6 @@ import pytest
 import nlsdesign as nls
 from nlsdesign.components import Encoder, ReadingLimits
 from nlsdesign.components.assembly.changed_copies import with_moved_load
-from nlsdesign.export.c.c_text import member_paths
 from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_JUMPED,
@@ -31,6 +30,7 @@ from nlsdesign.export.c.guarded_step import (
     GuardedModel,
     index_bit,
 )
+from nlsdesign.export.c.writer import member_paths
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.control import TorqueGains, joined
 from nlsdesign.feedback.observer import design_adaptive_observer, design_observer_with_details

@@ -18,7 +18,7 @@ from ...foundation.errors import ExportError, MeasurementError, NlsError
 from ...foundation.quantity import Quantity, parse_unit, three_digits, to_resolution, typeset_unit, with_unit
 from ...foundation.spread import NormalSpread, RelativeSpread
 from ...foundation.text_files import text_of, write_text
-from ...model.derived_deck import derived
+from ...model.origin import derived
 from ...simulation import Prior
 from .bench_response import shared_factors
 from .estimate import FITS, Estimate

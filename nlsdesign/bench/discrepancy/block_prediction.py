@@ -27,7 +27,7 @@ def shown_values(model: FlatModel, record: Record, signal: str) -> Array:
     The inverse of each sensor of the chain, the last one first, earlier by the sum of their delays. States of
     sensors, such as a drift so far, are taken as they start.
     """
-    reading, values = reading_of(model.readings, signal), np.asarray(record.trace[signal])
+    reading, values = reading_of(model.readings, signal), record.at_samples(signal)
     if not reading.sensors:
         return values
     numbers = {v.name: ca.SX(v.start) for v in (*model.parameters, *model.states)}

@@ -22,7 +22,7 @@ from ...components.assembly.deck_writer import write_deck
 from ...foundation.errors import ConvergenceError, MeasurementError
 from ...foundation.text_files import make_folder, write_text
 from ...model import flatten
-from ...model.derived_deck import derived
+from ...model.origin import derived
 from ..identification.equation_error.evidence import Bench
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet

@@ -109,17 +109,21 @@ class Windows:
         self.number = -(-(n - 1) // self.count)
         self.places = np.arange(self.number) * self.count
         inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
+        ends = np.stack([inputs[:, :-1], inputs[:, 1:]])
         for i, variable in enumerate(model.inputs):
             if variable.name in wiring.inputs:
                 drive = wiring.inputs[variable.name]
                 span = rate_span([record], drive.signal) if drive.order else 0.0
-                values = record.trace[drive.signal]
+                values = record.at_samples(drive.signal)
                 inputs[i] = derivative(values, record.step, order=drive.order, span=span)
-        padded = np.minimum(np.arange(self.number * self.count + 1), n - 1)
-        filled = inputs[:, padded]
-        self.ends = ca.DM(np.vstack([filled[:, :-1], filled[:, 1:]]))
+                ends[:, i] = inputs[i, :-1], inputs[i, 1:]
+                if not drive.order:
+                    ends[:, i] = record.sampling_of(drive.signal).over_steps(record.trace[drive.signal])
+        # Steps behind the last sample fill up the last window; nothing is read there.
+        padded = np.minimum(np.arange(self.number * self.count), n - 2)
+        self.ends = ca.DM(np.vstack([ends[0][:, padded], ends[1][:, padded]]))
         self.inputs = ca.DM(inputs)
-        self.measured = np.array([record.trace[name] for name in wiring.outputs])
+        self.measured = np.array([record.as_computed(name) for name in wiring.outputs])
         # Motion and speed that are measured tell where a window begins.
         self.seen = _seen(model, wiring, record)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ...model import FlatModel
 from ...model.roles import series_cam
-from ...model.spring_structure import SpecimenNames
+from ...model.structure import SpecimenNames
 from .limits import (
     Limit,
     MaximumCableTension,

@@ -15,7 +15,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import NlsError
 from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
-from ...model.derived_deck import derived
+from ...model.origin import derived
 from ..curves.target import Target
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam

@@ -1,4 +1,11 @@
-"""The front of two or three goals: how it is searched, and what it is as data."""
+"""The front of two or three goals: how it is searched, and what it is as data.
+
+Each goal is first met alone. Between the best and the worst value that it has in these designs each goal
+but the first then gets a ladder of bounds, and for every combination of bounds the first goal is met as well
+as it can be (ε-constraint). A point starts from its nearest neighbour; one that failed, or that another point
+betters within its own bounds, is solved again from there.
+Source: Haimes et al. 1971 (ε-constraint).
+"""
 
 from __future__ import annotations
 

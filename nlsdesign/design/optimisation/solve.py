@@ -9,7 +9,7 @@ from ...components.assembly.named_parts import Assembly
 from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
 from ...foundation.processes import parallel_map
 from ...model import flatten
-from ...model.derived_deck import derived
+from ...model.origin import derived
 from ...model.roles import series_cam
 from ..curves.target import Target
 from ..statics.declared_cam import with_contour

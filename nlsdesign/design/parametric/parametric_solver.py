@@ -13,7 +13,7 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.quantity import Quantity
-from ...model.derived_deck import derived
+from ...model.origin import derived
 from ..optimisation.limits import MaximumCableTension, MaximumStrain, MaximumStress
 from ..optimisation.result import CamDesign, DesignCurves, LimitState
 from ..statics.contour import Contour, contour_from_curvature

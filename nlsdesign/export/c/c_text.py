@@ -1,22 +1,17 @@
-"""C99 text: number types, literals, identifiers, comments, and structures.
-
-Members of structures are named as the variables: ``spring.rubber.relaxing.dashpot.strain``.
-"""
+"""C99 text: number types, literals, identifiers, comments and heads of functions."""
 
 from __future__ import annotations
 
 import math
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from ...foundation.errors import ExportError, nearest
-from ...model.flat import Variable
 
 # C99 and C++ together: the headers are meant to be included from both.
 _KEYWORDS = frozenset(
@@ -144,76 +139,3 @@ def string(text: str) -> str:
     """Return a C string literal of one line."""
     flat = " ".join(text.split())
     return '"' + flat.replace("\\", "\\\\").replace('"', '\\"').replace("??", '?""?') + '"'
-
-
-@dataclass
-class _Branch:
-    leaf: Variable | None = None
-    branches: dict[str, _Branch] = field(default_factory=dict)
-
-
-def _tree(variables: Iterable[Variable]) -> _Branch:
-    root = _Branch()
-    for variable in variables:
-        branch = root
-        for part in variable.name.split("."):
-            member = identifier(re.sub(r"\[(\d+)\]$", r"_\1", part))
-            branch = branch.branches.setdefault(member, _Branch())
-        if branch.leaf is not None:
-            raise ExportError(
-                f"'{branch.leaf.name}' and '{variable.name}'",
-                "become the same member of a C structure",
-                next_step="rename one of them",
-            )
-        branch.leaf = variable
-    return root
-
-
-def _leaf_name(member: str, branch: _Branch) -> str:
-    # A name that is also a prefix of longer names gets a trailing underscore.
-    return member + "_" if branch.branches else member
-
-
-def member_paths(variables: Sequence[Variable]) -> dict[str, str]:
-    """Return the path of each variable inside its structure in C; two of one path are an ``ExportError``."""
-    paths: dict[str, str] = {}
-
-    def walk(branch: _Branch, path: str) -> None:
-        for member, below in branch.branches.items():
-            if below.leaf is not None:
-                paths[below.leaf.name] = path + _leaf_name(member, below)
-            walk(below, f"{path}{member}.")
-
-    walk(_tree(variables), "")
-    return {variable.name: paths[variable.name] for variable in variables}
-
-
-def structure(
-    name: str, variables: Sequence[Variable], real: Real, title: str, *, numbered: bool = False
-) -> list[str]:
-    """Return the lines of one ``typedef struct``, its members numbered in the order of the model or not."""
-    numbers = {variable.name: f"{i}: " if numbered else "" for i, variable in enumerate(variables)}
-    lines = [f"/* {comment(title)} */", "typedef struct {"]
-    if not variables:
-        lines.append("    char none; /* C99 knows no empty structure */")
-
-    def walk(branch: _Branch, indent: str) -> None:
-        for member, below in branch.branches.items():
-            if below.leaf is not None:
-                remark = numbers[below.leaf.name] + _remark(below.leaf)
-                lines.append(f"{indent}{real} {_leaf_name(member, below)}; /* {remark} */")
-            if below.branches:
-                lines.append(f"{indent}struct {{")
-                walk(below, indent + "    ")
-                lines.append(f"{indent}}} {member};")
-
-    walk(_tree(variables), "    ")
-    return [*lines, f"}} {name};"]
-
-
-def _remark(variable: Variable) -> str:
-    limits = ""
-    if variable.minimum > -float("inf") or variable.maximum < float("inf"):
-        limits = f", {variable.minimum:.6g} to {variable.maximum:.6g}"
-    source = f"; {variable.source}" if variable.source else ""
-    return comment(f"[{variable.unit}{limits}] {variable.description}{source}")

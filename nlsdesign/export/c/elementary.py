@@ -20,7 +20,7 @@ from fractions import Fraction
 from functools import lru_cache
 from types import MappingProxyType
 
-from ..files import filled
+from ..files import filled, shell
 from .c_text import Real
 
 _LN2 = Fraction("0.693147180559945309417232121458176568075500134360255254120680009493")
@@ -133,9 +133,10 @@ _POLYNOMIALS: Mapping[str, Mapping[str, tuple[float, ...]]] = MappingProxyType(
 _VARIABLE = {"exp": "r", "erfc": "t"}
 
 
-def own_functions(real: Real) -> frozenset[str]:
+@lru_cache(maxsize=1)
+def own_functions() -> frozenset[str]:
     """Return the names of the functions of ``math.h`` that ours replace."""
-    return frozenset(_definitions(real)[1])
+    return frozenset(re.findall(r"^static .* portable_(\w+)@f@\(", shell("elementary.c"), re.MULTILINE))
 
 
 def elementary_functions(real: Real, lines: Iterable[str]) -> list[str]:

@@ -9,10 +9,9 @@ inside their only use, float literals for float, ``c ? a : b`` for a choice.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 
@@ -104,11 +103,15 @@ class _Graph:
         return count
 
 
+@dataclass
 class _Printer:
-    def __init__(self, graph: _Graph, real: Real, prefix: str, own: Collection[str]) -> None:
-        self.graph, self.real, self.prefix, self.own = graph, real, prefix, own
-        self.texts: dict[int, _Text] = {}
-        self.lines: list[str] = []
+    """Writes values as C text; ``texts`` holds what stands for each value, ``lines`` the named constants."""
+
+    real: Real
+    prefix: str
+    own: Collection[str]
+    texts: dict[int, _Text] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
 
     def number(self, index: int, strength: int) -> str:
         """Return a value as a number."""
@@ -213,7 +216,7 @@ def print_statements(
     An operation or a constant without a counterpart in C is an ``ExportError``.
     """
     graph = _Graph(function, inputs)
-    printer, uses, results = _Printer(graph, real, prefix, own), graph.uses(), set(graph.results.values())
+    printer, uses, results = _Printer(real, prefix, own), graph.uses(), set(graph.results.values())
     for index, node in enumerate(graph.nodes):
         if not uses[index]:
             continue
@@ -227,8 +230,3 @@ def print_statements(
         for (result, nonzero), index in sorted(graph.results.items())
     ]
     return printer.lines + stored
-
-
-def named_indices(lines: Sequence[str], letter: str) -> set[int]:
-    """Return the numbers i of all names such as ``w<i>`` in statements."""
-    return {int(number) for line in lines for number in re.findall(rf"(?<![\w.]){letter}(\d+)\b", line)}

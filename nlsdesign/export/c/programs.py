@@ -69,7 +69,7 @@ def selftest_source(c: CWriter) -> str:
     real, inputs = c.real, sample_inputs(c.model, c.real)
     run = GuardedModel(c.model, real)
     results = [run.step(row) for row in inputs.tolist()]
-    outputs = np.array([y for y, _ in results]).reshape(len(results), len(c.outputs))
+    outputs = np.array([y for y, _ in results]).reshape(len(results), len(c.paths.outputs))
     size = np.abs(outputs).max(axis=0, initial=0.0)
     relative = DOUBLE_TOLERANCE if real is Real.DOUBLE else FLOAT_TOLERANCE
     tolerance = [relative * float(v) + real.epsilon**2 for v in size]
@@ -79,10 +79,10 @@ def selftest_source(c: CWriter) -> str:
         "expected": real.table("expected", outputs.tolist()),
         "tolerance": real.table("tolerance", [tolerance]),
         "status": ", ".join(f"0x{status:x}u" for _, status in results),
-        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(c.inputs)],
+        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(c.paths.inputs)],
         "comparisons": [
             f"differs |= !({real.function('fabs')}(outputs.{path} - expected[k][{i}]) <= tolerance[0][{i}]);"
-            for i, path in enumerate(c.outputs)
+            for i, path in enumerate(c.paths.outputs)
         ],
     }
     return c.filled("controller_selftest.c", values)
@@ -117,7 +117,7 @@ def write_examples(source: CSource) -> list[Path]:
         "title": f"/* {comment(source.model.description)} */",
         "read": [
             f"inputs.{path} = {source.real.literal(0.0)}; /* {comment(v.description)}, {v.unit} */"
-            for v, path in zip(source.model.inputs, source.writer.inputs, strict=True)
+            for v, path in zip(source.model.inputs, source.writer.paths.inputs, strict=True)
         ],
         "nanoseconds": str(round(1e9 * float(source.model.sample_time or 0.0))),
         "microseconds": str(round(1e6 * float(source.model.sample_time or 0.0))),

@@ -1,28 +1,34 @@
-"""The writer of the C of one discrete model: its names, its look-ups, its equations and its statements."""
+"""The writer of the C of one discrete model: names and types, then the statements of its functions.
+
+Members of structures are named as the variables: ``spring.rubber.relaxing.dashpot.strain``.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import casadi as ca
 
+from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Symbols, Variable
 from ..files import filled
-from .c_text import Real, member_paths, structure
+from .c_text import Real, comment, identifier
 from .elementary import own_functions
-from .instructions import named_indices, print_statements
+from .guarded_step import AGREEING, GAP, MOST, ReadingNumbers, index_bit, mover, reading_numbers
+from .instructions import print_statements
 from .table_lookup import CTable, c_tables, look_up
 
 Group = Literal["inputs", "outputs", "parameters", "states"]
 
-MISSED = "q"
+_MISSED = "q"
 """First letter of the numbers that are 1 while an input stands in for a refused reading."""
-DERIVED = "d"
+_DERIVED = "d"
 """First letter of the numbers that follow from the parameters alone."""
 
 
@@ -55,6 +61,23 @@ class CSource:
         return CWriter(self.model, self.name, self.real)
 
 
+class MemberPaths(NamedTuple):
+    """Paths of the members inside the four structures, each in the order of the model."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    states: tuple[str, ...]
+
+
+class MeasuredInput(NamedTuple):
+    """A measured input: which one, the numbers of its guard, and what moves it, as C text."""
+
+    number: int
+    limits: ReadingNumbers
+    driver: str
+
+
 @dataclass(frozen=True, eq=False)
 class StepEquations:
     """Next states and outputs, without what the parameters alone decide: that is computed when they are set.
@@ -79,35 +102,36 @@ class CWriter:
     real: Real = Real.DOUBLE
 
     @cached_property
-    def inputs(self) -> tuple[str, ...]:
-        """Members of the structure of inputs, in the order of the model."""
-        return tuple(member_paths(self.model.inputs).values())
+    def paths(self) -> MemberPaths:
+        """Paths of the members of the structures."""
+        m = self.model
+        groups = (m.inputs, m.outputs, m.parameters, m.states)
+        return MemberPaths(*(tuple(member_paths(group).values()) for group in groups))
 
     @cached_property
-    def outputs(self) -> tuple[str, ...]:
-        """Members of the structure of outputs, in the order of the model."""
-        return tuple(member_paths(self.model.outputs).values())
-
-    @cached_property
-    def parameters(self) -> tuple[str, ...]:
-        """Members of the structure of parameters, in the order of the model."""
-        return tuple(member_paths(self.model.parameters).values())
-
-    @cached_property
-    def states(self) -> tuple[str, ...]:
-        """Members of the structure of states, in the order of the model."""
-        return tuple(member_paths(self.model.states).values())
-
-    @cached_property
-    def readings(self) -> dict[str, int]:
-        """Number of each input that is measured, in order, by name."""
-        names = [v.name for v in self.model.inputs if v.plausibility is not None]
-        return {name: number for number, name in enumerate(names)}
+    def readings(self) -> dict[str, MeasuredInput]:
+        """Inputs that are measured, in order, by name."""
+        measured: dict[str, MeasuredInput] = {}
+        for v in self.model.inputs:
+            limits = reading_numbers(v, float(self.model.sample_time or 0.0), self.real)
+            if limits is not None:
+                moved, driver = mover(self.model, v), self.real.literal(0.0)
+                if moved is not None:
+                    group, index = moved
+                    driver = f"state->{group}.{getattr(self.paths, group)[index]}"
+                measured[v.name] = MeasuredInput(len(measured), limits, driver)
+        return measured
 
     @cached_property
     def tables(self) -> list[CTable]:
         """Tables of the model."""
         return c_tables(self.model, self.real)
+
+    @cached_property
+    def arguments(self) -> dict[str, str]:
+        """Names of the constants that hold states and inputs in a function, by name of the variable."""
+        arguments = {v.name: f"x{i}" for i, v in enumerate(self.model.states)}
+        return arguments | {v.name: f"u{i}" for i, v in enumerate(self.model.inputs)}
 
     @cached_property
     def equations(self) -> StepEquations:
@@ -117,7 +141,7 @@ class CWriter:
         if model.expected is not None and self.readings:
             gap = ca.SX.sym("gap", len(self.readings))
             expected = ca.SX(ca.densify(model.expected(s.state, s.input, s.parameter, s.table)))
-            stands_in = {name: gap[number] > 0.5 for name, number in self.readings.items()}
+            stands_in = {name: gap[reading.number] > 0.5 for name, reading in self.readings.items()}
             used = ca.SX(
                 ca.vertcat(
                     *[
@@ -139,16 +163,38 @@ class CWriter:
             | dict(values),
         )
 
-    def structure(self, group: Group, title: str, *, numbered: bool) -> list[str]:
-        """Return the type of the inputs, outputs, parameters or states."""
+    def structure(self, group: Group, title: str, *, numbered: bool = False) -> list[str]:
+        """Return the type of a group of variables, numbered in the order of the model or not."""
         variables: Sequence[Variable] = getattr(self.model, group)
-        return structure(f"{self.name}_{group}", variables, self.real, title, numbered=numbered)
+        numbers = {variable.name: f"{i}: " if numbered else "" for i, variable in enumerate(variables)}
+        lines = [f"/* {comment(title)} */", "typedef struct {"]
+        if not variables:
+            lines.append("    char none; /* C99 knows no empty structure */")
+
+        def walk(branch: _Branch, indent: str) -> None:
+            for member, below in branch.branches.items():
+                if below.leaf is not None:
+                    remark = numbers[below.leaf.name] + _remark(below.leaf)
+                    lines.append(f"{indent}{self.real} {_leaf_name(member, below)}; /* {remark} */")
+                if below.branches:
+                    lines.append(f"{indent}struct {{")
+                    walk(below, indent + "    ")
+                    lines.append(f"{indent}}} {member};")
+
+        walk(_tree(variables), "    ")
+        return [*lines, f"}} {self.name}_{group};"]
+
+    def initialiser(self, group: Group, values: Sequence[float]) -> list[str]:
+        """Return designated initialisers for the structure of a group."""
+        paths: Sequence[str] = getattr(self.paths, group)
+        lines = [f".{path} = {self.real.literal(value)}," for path, value in zip(paths, values, strict=True)]
+        return lines or [".none = 0"]
 
     def statements(
         self, function: ca.Function, inputs: Sequence[Sequence[str]], targets: Sequence[Sequence[str]]
     ) -> list[str]:
         """Return statements that compute all results of a function, with elementary functions of our own."""
-        return print_statements(function, inputs, targets, real=self.real, own=own_functions(self.real))
+        return print_statements(function, inputs, targets, real=self.real, own=own_functions())
 
     def equation_lines(
         self, function: ca.Function, further: Sequence[Sequence[str]], targets: Sequence[Sequence[str]]
@@ -164,19 +210,150 @@ class CWriter:
         statements = self.statements(function, [*names.values(), looked_up, *further], targets)
         return look_up(self.tables, self.arguments, named_indices(statements, "w")), statements
 
-    @cached_property
-    def arguments(self) -> dict[str, str]:
-        """Names of the constants that hold states and inputs in a function, by name of the variable."""
-        arguments = {v.name: f"x{i}" for i, v in enumerate(self.model.states)}
-        return arguments | {v.name: f"u{i}" for i, v in enumerate(self.model.inputs)}
-
     def loads(self, following: Iterable[str]) -> list[str]:
         """Return the constants that statements read: inputs, states, parameters, in this order."""
         lines, following = [], list(following)
         for letter, group in (("u", "inputs"), ("x", "states"), ("p", "parameters")):
-            used, paths = named_indices(following, letter), getattr(self, group)
+            used, paths = named_indices(following, letter), getattr(self.paths, group)
             lines += [f"const {self.real} {letter}{i} = state->{group}.{paths[i]};" for i in sorted(used)]
         return lines
+
+
+def guard_functions(c: CWriter) -> list[str]:
+    """Return the functions that judge commands, readings and parameters, as far as there are any."""
+    limits: list[str] = []
+    for number, reading, _ in c.readings.values():
+        parts = (reading.lowest, reading.highest, reading.change, reading.noticeable)
+        row = ", ".join(c.real.literal(part) for part in parts)
+        limits.append(f"static const reading_limits reading_{number} = {{{row}, {reading.patience}u}};")
+    values: dict[str, str | list[str]] = {
+        "LARGEST": "FLT_MAX" if c.real is Real.FLOAT else "DBL_MAX",
+        "fabs": c.real.function("fabs"),
+        "AGREEING": str(AGREEING),
+        "GAP": str(GAP),
+        "MOST": str(MOST),
+        "readings": limits,
+    }
+    wanted = {
+        "controller_guard.c": len(c.model.inputs) > len(c.readings),
+        "controller_reading.c": bool(c.readings),
+        "controller_parameter.c": bool(c.model.parameters),
+    }
+    texts = [c.filled(shell, values) for shell, is_wanted in wanted.items() if is_wanted]
+    return [line for text in texts for line in (*text.splitlines(), "")]
+
+
+def take_statements(c: CWriter) -> list[str]:
+    """Return the statements that take the inputs: commands, then readings, with which the model may begin."""
+    real, begins = c.real, c.model.begin is not None
+    resumes = bool(c.readings) and begins
+    commands, readings = ["uint32_t resuming = 0u;"] if resumes else [], []
+    for i, (v, path) in enumerate(zip(c.model.inputs, c.paths.inputs, strict=True)):
+        bit, taken = f"0x{index_bit(i):x}u, &status", f"&state->inputs.{path}"
+        if v.name not in c.readings:
+            limits = f"{real.bound(v.minimum)}, {real.bound(v.maximum)}"
+            commands.append(f"usable(inputs->{path}, {limits}, {taken}, {bit});")
+            continue
+        number, _, driver = c.readings[v.name]
+        remembered = f"&reading_{number}, &state->readings[{number}]"
+        call = f"plausible(inputs->{path}, {driver}, {remembered}, {taken}, {bit});"
+        readings.append(f"{'resuming |=' if resumes else '(void)'} {call}")
+    ready = [f"state->readings[{number}].seen != 0u" for number, _, _ in c.readings.values()]
+    values = {
+        "condition": " && ".join(["state->begun == 0u", *ready]),
+        "begin": [f"{c.name}_begin(state);"] if begins else [],
+        "resume": c.filled("controller_resuming.c", {}).splitlines() if resumes else [],
+    }
+    beginning = c.filled("controller_beginning.c", values).splitlines()
+    return [*(commands + readings or ["(void)inputs;"]), *beginning]
+
+
+def step_body(c: CWriter) -> tuple[list[str], set[int]]:
+    """Return the statements of the step and the indices of the looked-up numbers it uses.
+
+    Results are stored only if all are finite: a state that is not begins anew with the next sample, outputs
+    that are not are held.
+    """
+    real, equations = c.real, c.equations
+    s, gap, numbers = equations.symbols, equations.gap, equations.numbers
+    function = ca.Function(
+        "step", [s.state, s.input, s.parameter, s.table, gap, numbers], equations.results, {"cse": True}
+    )
+    targets = [[f"const {real} {y}{i}" for i in range(function.numel_out(k))] for k, y in enumerate("fy")]
+    further = [
+        [f"{letter}{i}" for i in range(group.numel())]
+        for letter, group in ((_MISSED, gap), (_DERIVED, numbers))
+    ]
+    tables, statements = c.equation_lines(function, further, targets)
+    ranges = dict.fromkeys((c.arguments[table.argument], *table.ends) for table in c.model.tables)
+    beyond = " || ".join(
+        f"{argument} < {real.literal(first)} || {argument} > {real.literal(last)}"
+        for argument, first, last in ranges
+    )
+    flag = [f"status |= ({beyond}) ? {c.name.upper()}_OUT_OF_TABLE : 0u;"] if beyond else []
+    missed, derived = (sorted(named_indices(statements, letter)) for letter in (_MISSED, _DERIVED))
+    one, zero = real.literal(1.0), real.literal(0.0)
+    body = [
+        *c.loads([*flag, *tables, *statements]),
+        *(f"const {real} {_MISSED}{i} = state->readings[{i}].missed > 0u ? {one} : {zero};" for i in missed),
+        *(f"const {real} {_DERIVED}{i} = state->derived[{i}];" for i in derived),
+        *flag,
+        *tables,
+        *statements,
+        "",
+    ]
+    # v - v is 0 for a finite v and NaN otherwise: one comparison for all, which NaN does not pass.
+    for letter, group, owners in (
+        ("f", "states", ("state->states.",)),
+        ("y", "outputs", ("state->outputs.", "outputs->")),
+    ):
+        paths: Sequence[str] = getattr(c.paths, group)
+        stores = [f"{owner}{path} = {letter}{i};" for i, path in enumerate(paths) for owner in owners]
+        differences = " + ".join(f"({letter}{i} - {letter}{i})" for i in range(len(paths)))
+        values = {"finite": f"{differences} >= {zero}", "stores": stores}
+        body += c.filled(f"controller_{group}.c", values).splitlines() if paths else []
+    if not c.paths.outputs:
+        body.append("(void)state, (void)outputs;")
+    return body, named_indices(statements, "w")
+
+
+def settled_functions(c: CWriter) -> list[str]:
+    """Return the functions that begin and resume, where the states depend on the readings."""
+    model = c.model
+    if model.begin is None:
+        return []
+    lines: list[str] = []
+    what = {"begin": "rests at its first readings", "resume": "goes on after a gap in its readings"}
+    # Without a measured input there are no gaps after which to resume.
+    for which, verb in enumerate(what if c.readings else ["begin"]):
+        s = model.symbols()
+        settled = ca.SX(ca.densify(model.begin(s.state, s.input, s.parameter, s.table)[which]))
+        changed = [i for i in range(len(model.states)) if not ca.is_equal(settled[i], s.state[i], 2)]
+        result = ca.SX(ca.vertcat(*[settled[i] for i in changed]))
+        function = ca.Function("settled", [s.state, s.input, s.parameter, s.table], [result], {"cse": True})
+        targets = [[f"state->states.{c.paths.states[i]}" for i in changed]]
+        tables, equations = c.equation_lines(function, [], targets)
+        body = [*c.loads([*tables, *equations]), *tables, *equations] or ["(void)state;"]
+        text = c.filled("controller_settled.c", {"verb": verb, "words": what[verb], "body": body})
+        lines += [*text.splitlines(), ""]
+    return lines
+
+
+def derived_statements(c: CWriter) -> list[str]:
+    """Return the statements that compute what follows from the parameters alone."""
+    equations = c.equations
+    count = equations.numbers.numel()
+    if not count:
+        return []
+    function = ca.Function("derived", [equations.symbols.parameter], [equations.values], {"cse": True})
+    names = [f"p{i}" for i in range(len(c.model.parameters))]
+    statements = c.statements(function, [names], [[f"state->derived[{i}]" for i in range(count)]])
+    return [*c.loads(statements), *statements]
+
+
+def named_indices(lines: Sequence[str], letter: str) -> set[int]:
+    """Return the numbers i of all names such as ``w<i>`` in statements."""
+    return {int(number) for line in lines for number in re.findall(rf"(?<![\w.]){letter}(\d+)\b", line)}
 
 
 def _without_parameter_numbers(
@@ -200,3 +377,53 @@ def _without_parameter_numbers(
         edges.append(edges[-1] + result.numel())
     parts = [rest[first:last] for first, last in pairwise(edges)]
     return parts, ca.SX(ca.vertcat(*symbols)), ca.SX(ca.vertcat(*values))
+
+
+@dataclass
+class _Branch:
+    leaf: Variable | None = None
+    branches: dict[str, _Branch] = field(default_factory=dict)
+
+
+def _tree(variables: Iterable[Variable]) -> _Branch:
+    root = _Branch()
+    for variable in variables:
+        branch = root
+        for part in variable.name.split("."):
+            member = identifier(re.sub(r"\[(\d+)\]$", r"_\1", part))
+            branch = branch.branches.setdefault(member, _Branch())
+        if branch.leaf is not None:
+            raise ExportError(
+                f"'{branch.leaf.name}' and '{variable.name}'",
+                "become the same member of a C structure",
+                next_step="rename one of them",
+            )
+        branch.leaf = variable
+    return root
+
+
+def _leaf_name(member: str, branch: _Branch) -> str:
+    # A name that is also a prefix of longer names gets a trailing underscore.
+    return member + "_" if branch.branches else member
+
+
+def member_paths(variables: Sequence[Variable]) -> dict[str, str]:
+    """Return the path of each variable inside its structure in C; two of one path are an ``ExportError``."""
+    paths: dict[str, str] = {}
+
+    def walk(branch: _Branch, path: str) -> None:
+        for member, below in branch.branches.items():
+            if below.leaf is not None:
+                paths[below.leaf.name] = path + _leaf_name(member, below)
+            walk(below, f"{path}{member}.")
+
+    walk(_tree(variables), "")
+    return {variable.name: paths[variable.name] for variable in variables}
+
+
+def _remark(variable: Variable) -> str:
+    limits = ""
+    if variable.minimum > -float("inf") or variable.maximum < float("inf"):
+        limits = f", {variable.minimum:.6g} to {variable.maximum:.6g}"
+    source = f"; {variable.source}" if variable.source else ""
+    return comment(f"[{variable.unit}{limits}] {variable.description}{source}")

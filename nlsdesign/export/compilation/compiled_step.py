@@ -99,10 +99,10 @@ class CompiledStep:
 def _conversions(c: CWriter) -> dict[str, list[str]]:
     """Return C that converts between the named structures and vectors in the order of the model."""
     return {
-        "parameters": [f"to->{path} = p[{i}];" for i, path in enumerate(c.parameters)],
-        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(c.inputs)],
-        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(c.outputs)],
-        "states": [f"x[{i}] = state->states.{path};" for i, path in enumerate(c.states)],
+        "parameters": [f"to->{path} = p[{i}];" for i, path in enumerate(c.paths.parameters)],
+        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(c.paths.inputs)],
+        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(c.paths.outputs)],
+        "states": [f"x[{i}] = state->states.{path};" for i, path in enumerate(c.paths.states)],
     }
 
 

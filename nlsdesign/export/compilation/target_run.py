@@ -194,8 +194,8 @@ def _run(source: CSource, processor: Processor, folder: Path, given: Array) -> T
         "real": real,
         "samples": str(len(given)),
         "given": real.table("given", given.tolist()),
-        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(c.inputs)],
-        "outputs": [f"say_real(outputs.{path});" for path in c.outputs],
+        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(c.paths.inputs)],
+        "outputs": [f"say_real(outputs.{path});" for path in c.paths.outputs],
     }
     first, *rows = emulated(image(source, processor, folder, main="target_run.c", values=values), processor)
     counted = _instructions(*first[1:4])

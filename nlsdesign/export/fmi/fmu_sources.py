@@ -9,10 +9,10 @@ import casadi as ca
 from ...foundation.errors import ExportError
 from ...model.flat import Symbols, Variable
 from ..c.c_text import Real, comment, identifier, string
-from ..c.controller_code import check_discrete, header_text, source_text, step_body
-from ..c.instructions import named_indices, print_statements
+from ..c.controller_code import check_discrete, header_text, source_text
+from ..c.instructions import print_statements
 from ..c.table_lookup import look_up, look_up_slopes
-from ..c.writer import CWriter
+from ..c.writer import CWriter, named_indices, step_body
 from ..files import filled, shell
 from .fmu_variables import FmuLayout
 
@@ -194,7 +194,7 @@ def _statements(
 
 def _discrete(layout: FmuLayout, c: CWriter) -> str:
     given = {each.variable.name for each in layout.outputs}
-    outputs = [path for path, v in zip(c.outputs, c.model.outputs, strict=True) if v.name in given]
+    outputs = [path for path, v in zip(c.paths.outputs, c.model.outputs, strict=True) if v.name in given]
     lookups, signals, looked_up = _signals(layout, c)
     _, known = step_body(c)
     directional, sloped = _directional(layout, c)
@@ -202,10 +202,10 @@ def _discrete(layout: FmuLayout, c: CWriter) -> str:
     missing = [table for table in c.tables if table.columns(looked_up) and not table.columns(known)]
     values = {
         "tables": [line for table in missing for line in (*table.data(), "")],
-        "parameters": [f"parameters.{path} = p[{i}];" for i, path in enumerate(c.parameters)],
-        "start": [f"memory->states.{path} = x[{i}];" for i, path in enumerate(c.states)],
-        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(c.inputs)],
-        "states": [f"x[{i}] = before.{path};" for i, path in enumerate(c.states)],
+        "parameters": [f"parameters.{path} = p[{i}];" for i, path in enumerate(c.paths.parameters)],
+        "start": [f"memory->states.{path} = x[{i}];" for i, path in enumerate(c.paths.states)],
+        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(c.paths.inputs)],
+        "states": [f"x[{i}] = before.{path};" for i, path in enumerate(c.paths.states)],
         "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(outputs)],
         "signals": [*lookups, *signals],
         "directional": directional,
@@ -224,8 +224,8 @@ def _directional(layout: FmuLayout, c: CWriter) -> tuple[list[str], set[int]]:
     }
     texts = {
         "x": _cells("x", len(model.states)),
-        "u": [f"memory->inputs.{path}" for path in c.inputs],
-        "p": [f"memory->parameters.{path}" for path in c.parameters],
+        "u": [f"memory->inputs.{path}" for path in c.paths.inputs],
+        "p": [f"memory->parameters.{path}" for path in c.paths.parameters],
     }
     count = s.table.numel()
     seeds = [ca.SX.sym(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
@@ -256,9 +256,9 @@ def _signals(layout: FmuLayout, c: CWriter) -> tuple[list[str], list[str], set[i
     _, signals = _own(layout, s)
     function = ca.Function("s", [s.state, s.input, s.parameter, s.table], [signals], {"cse": True})
     names = [
-        [f"before.{path}" for path in c.states],
-        [f"memory->inputs.{path}" for path in c.inputs],
-        [f"memory->parameters.{path}" for path in c.parameters],
+        [f"before.{path}" for path in c.paths.states],
+        [f"memory->inputs.{path}" for path in c.paths.inputs],
+        [f"memory->parameters.{path}" for path in c.paths.parameters],
     ]
     width = [f"w{i}" for i in range(s.table.numel())]
     statements = print_statements(function, [*names, width], [_cells("s", signals.numel())], real=Real.DOUBLE)

@@ -18,8 +18,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
-from ...model.flat import FlatModel, Variable
-from ...model.switching import Switch
+from ...model.flat import FlatModel, Switch, Variable
 from ..c.guarded_step import FIRST_INDEX_BIT, STATUS_BITS
 from .expression_walk import EVERYTHING, Interval, ranges
 from .terminals import with_flange_outputs

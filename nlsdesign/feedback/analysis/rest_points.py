@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...model import FlatModel
+from ...model.flat import Switching
 from ...model.linear import LinearModel
-from ...model.switching import Switching
 from .rest import evaluate_rows, rate_state, rest_states, typical_sizes
 
 JUMP = 1e-6

@@ -164,6 +164,7 @@ def test_every_part_that_a_deck_can_name_is_listed_with_its_law(run: Run) -> Non
     assert status == 0
     assert listed["TwoSidedCam"]["kind"] == "cam"
     assert all(entry["law"] for entry in listed.values())
+    assert "Rack (gear)" in run("parts", "Rack")[1]
     _, out, _ = run("parts", "StribeckFriction")
     assert "Sources: Stribeck 1902" in out
     assert "stribeck_speed" in out

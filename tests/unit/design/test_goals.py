@@ -9,17 +9,8 @@ import pytest
 
 from nlsdesign.components import Element, LinearElastic, TwoSidedCam, ViscousMaterial, series, specimen
 from nlsdesign.components.transmission.cam_drive import through
-from nlsdesign.design import (
-    BothStrokes,
-    EnergyLost,
-    Goal,
-    InsensitiveStiffness,
-    LeastMass,
-    LeastRubber,
-    LeastSize,
-    TorqueError,
-    design_cam,
-)
+from nlsdesign.design import BothStrokes, EnergyLost, Goal, LeastMass, LeastRubber, LeastSize, design_cam
+from nlsdesign.design.optimisation.goals import InsensitiveStiffness, TorqueError
 from nlsdesign.design.optimisation.problem import DesignProblem, design_problem
 from nlsdesign.design.optimisation.shape import Start
 from nlsdesign.foundation.errors import ArrangementError, UnitError, ValueRangeError

@@ -8,15 +8,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.design import (
-    ExponentialTorque,
-    PolynomialTorque,
-    PowerTorque,
-    TabulatedStiffness,
-    TabulatedTorque,
-    Target,
-    TorqueBand,
-)
+from nlsdesign.design import ExponentialTorque, PolynomialTorque, PowerTorque, Target, TorqueBand
+from nlsdesign.design.curves.target import TabulatedStiffness, TabulatedTorque
 from nlsdesign.foundation.errors import UnitError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 

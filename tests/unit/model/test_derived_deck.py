@@ -9,7 +9,7 @@ from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import deck_digest, deck_text, declare, write_deck
 from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.model import flatten
-from nlsdesign.model.derived_deck import derived, digits_in_name
+from nlsdesign.model.origin import derived, digits_in_name
 from tests.command_line import Run, run
 
 __all__ = ["run"]

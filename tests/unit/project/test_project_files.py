@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
+
+import pytest
 
 from nlsdesign.foundation.locations import version
 from tests import source
@@ -51,3 +56,14 @@ def test_an_altered_citation_is_noticed(root: Path) -> None:
     text = (root / "CITATION.cff").read_text(encoding="utf-8")
     assert re.search(rf"^version: {re.escape(version())}$", text, flags=re.MULTILINE)
     assert "doi" not in text.lower(), "a DOI was added: check it, and put it into the bibliography too"
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_what_make_starts_may_keep_its_bytecode(root: Path, tmp_path: Path) -> None:
+    """Else every process that a test starts compiles the libraries anew."""
+    probe = tmp_path / "probe.mk"
+    probe.write_text("include Makefile\nprobe:\n\t@echo \"it is '$$PYTHONDONTWRITEBYTECODE'\"\n")
+    command = ["make", "--no-print-directory", "-f", str(probe), "probe"]
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "MAKEFLAGS": ""}
+    done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.strip()) == (0, "it is ''"), done.stderr

@@ -110,6 +110,13 @@ def _nonlinearity(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, (Unknown(f"{fault}.nonlinearity", (0.0,), -0.45, 2.0, f"1 / {name}.reading"),))
 
 
+def _encoders_of_angles(assembly: Assembly) -> list[str]:
+    """Return the encoders whose disc may sit off its shaft: those of angles, where none is declared so."""
+    sensors = assembly.sensors()
+    encoders = _chain_without((Encoder,), Eccentricity)(assembly)
+    return [n for n in encoders if (e := sensors[n]) and isinstance(e, Encoder) and e.domain == ROTATION]
+
+
 def _eccentric_disc(assembly: Assembly, name: str) -> Iterator[Edit]:
     encoder = assembly.sensors()[name]
     for order in _disc_orders(assembly, assembly.measured(encoder.of)[0]):
@@ -190,7 +197,7 @@ angle_sensor_eccentricity = Effect(
     200,
     (
         Form(
-            _chain_without((Encoder,), Eccentricity),
+            _encoders_of_angles,
             _eccentric_disc,
             "force, torque and inertia that are off together, as a sine of the angle",
             "geometry; data sheets",

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ....components.assembly.named_parts import Assembly
 from ....foundation.quantity import to_resolution, with_unit
-from ....model.derived_deck import named_by_content
+from ....model.origin import named_by_content
 from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter
 from ..effects.effect import SOURCE

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ....components.assembly.named_parts import Assembly
 from ....foundation.errors import MeasurementError
 from ....model import FlatModel, flatten
-from ....model.derived_deck import derived
+from ....model.origin import derived
 from ....model.readings import reading_of
 from ...identification.equation_error.block import Drive
 from ...identification.equation_error.evidence import Bench

@@ -351,7 +351,7 @@ def _prediction(evidence: Evidence) -> tuple[Array, Array]:
     """Return the unfiltered output, and the filtered error in units of the noise floor."""
     output = evidence.predicted({})
     target = evidence.driven.block.target
-    error = (evidence.record.trace[target] if target else 0.0) - output
+    error = (evidence.record.as_computed(target) if target else 0.0) - output
     return output, (evidence.floor.filter @ error) / evidence.floor.sigma
 
 

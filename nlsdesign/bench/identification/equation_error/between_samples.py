@@ -44,7 +44,8 @@ _SHARE = 1e-3
 def refined(record: Record, times: int) -> Record:
     """Return a record with several samples in the place of one, between those that were measured.
 
-    ``times``: how many; 1 leaves it as it is.
+    ``times``: how many; 1 leaves it as it is. What was held or averaged becomes the smooth signal with the
+    same effect.
     """
     if times == 1:
         return record
@@ -60,12 +61,13 @@ def refined(record: Record, times: int) -> Record:
         record,
         trace=Trace(
             trace.time[0] + finer * record.step,
-            {name: _between(clock, trace[name], record.masked_in([name]), finer) for name in trace.signals},
+            {n: _between(clock, record.at_samples(n), record.masked_in([n]), finer) for n in trace.signals},
             trace.units,
             trace.name,
         ),
         resolution=resolution,
         masked={name: mask[below] | mask[above] for name, mask in record.masked.items()},
+        sampling={},
     )
 
 

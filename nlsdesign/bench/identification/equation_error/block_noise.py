@@ -385,7 +385,8 @@ def measured_inputs(block: Block, record: Record, span: float) -> Array:
     for i, variable in enumerate(model.inputs):
         if variable.name in block.drives:
             drive = block.drives[variable.name]
-            inputs[i] = derivative(record.trace[drive.signal], record.step, order=drive.order, span=span)
+            signal = record.at_samples(drive.signal)
+            inputs[i] = derivative(signal, record.step, order=drive.order, span=span)
     return inputs
 
 

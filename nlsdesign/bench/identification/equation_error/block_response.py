@@ -160,7 +160,7 @@ class DrivenBlock:
             drive = self.block.drives.get(variable.name)
             if drive is None:
                 continue
-            signal = record.trace[drive.signal]
+            signal = record.at_samples(drive.signal)
             now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
             delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
             if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):

@@ -47,7 +47,7 @@ class Evidence:
         samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
         response = self.driven.respond(samples, values)
         target = self.driven.block.target
-        error = (self.record.trace[target] if target else 0.0) - response.output
+        error = (self.record.as_computed(target) if target else 0.0) - response.output
         sigma = self.floor.sigma
         return (self.floor.filter @ error) / sigma, -(self.floor.filter @ response.slope) / sigma[:, None]
 

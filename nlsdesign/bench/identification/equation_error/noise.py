@@ -285,6 +285,8 @@ class Noise:
         Where that is known from.
     seen
         Lengths in s of the stretches in which the parts were seen.
+    taps
+        Weights of neighbouring samples with which a signal is read that is held or averaged.
     """
 
     level: Mapping[str, float]
@@ -292,6 +294,7 @@ class Noise:
     parts: Mapping[str, tuple[NoisePart, ...]] = field(default_factory=dict)
     evidence: Mapping[str, Evidence] = field(default_factory=dict)
     seen: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    taps: Mapping[str, Array] = field(default_factory=dict)
 
     def deviation(self, signal: str) -> float:
         """Return the standard deviation of the whole noise of a signal."""
@@ -304,15 +307,20 @@ class Noise:
 
         ``width`` of the Gaussian, ``span`` of rates and the ``step`` between samples are in s.
         """
-        weights = filter_weights(width, order, step, span)
+        weights = self._weights(signal, width, order, step, span)
         white = self.level[signal] * float(np.linalg.norm(weights))
         return math.sqrt(white**2 + variance_behind(self.parts.get(signal, ()), weights, step))
 
     def memory(self, signal: str, step: float, *, width: float) -> tuple[NoisePart, ...]:
         """Return the parts of the noise of a signal that remember, with their variances behind a filter."""
-        weights = filter_weights(width, 0, step)
+        weights = self._weights(signal, width, 0, step, 0.0)
         parts = self.parts.get(signal, ())
         return tuple(NoisePart(variance_behind([p], weights, step), p.time) for p in parts)
+
+    def _weights(self, signal: str, width: float, order: int, step: float, span: float) -> Array:
+        """Return the weights of the samples of a signal behind a derivative and a filter."""
+        weights, taps = filter_weights(width, order, step, span), self.taps.get(signal)
+        return weights if taps is None else np.convolve(weights, taps)
 
 
 def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
@@ -354,7 +362,8 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
             least = quanta[signal] / math.sqrt(12.0)
             level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
             lengths[signal] = tuple(s.step * len(s.samples) for s in at_rest + repeated)
-    return Noise(level, rounded, parts, evidence, lengths)
+    taps = {s: form.weights for r in seen for s, form in r.sampling.items() if s in level}
+    return Noise(level, rounded, parts, evidence, lengths, taps)
 
 
 def _length(stretches: Sequence[Stretch]) -> float:

@@ -75,7 +75,7 @@ def default_mapping(
     if not times:
         raise MeasurementError(file, "has no column of time", next_step="name it 't_s' or 'time [s]'")
     columns = [
-        Column(head, signal, str(unit), *_declared(model, signal))
+        Column(head, signal, str(unit), *_declared(model, signal), sampling=None)
         for head, name, unit in split_heads
         if head != times[0][0] and (signal := _signal(head, name, unit, model, file))
     ]

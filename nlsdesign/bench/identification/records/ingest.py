@@ -14,6 +14,7 @@ from ....simulation import Trace
 from .clocks import Channel, Resolution, lag_between, on_one_clock, resolutions
 from .mapping import Align, Column, ColumnMap
 from .quality import Checked, Finding, Sampled, check_channels, check_columns, check_time
+from .sampling import SAMPLED
 from .table_files import RecordTable
 
 _LEAST_STEP, _SHORT_STEP, _LONG_STEP = 1e-8, 1e-5, 0.5
@@ -183,7 +184,10 @@ def _on_new_clock(
         channels, change = _aligned(table, mapping, each, channels)
         changes.append(change)
     heads = {channels[c.signal].name: c for c in mapping.columns}
-    resampling = on_one_clock(list(channels.values()), rate)
+    # What is held or averaged is resampled as the smooth signal with the same effect.
+    ways = {c.signal: c.sampling or SAMPLED for c in mapping.columns}
+    smooth = [replace(channels[n], values=way.at_samples(channels[n].values)) for n, way in ways.items()]
+    resampling = on_one_clock(smooth, rate)
     signals = {heads[n].signal: v for n, v in resampling.values.items()}
     resolution = {}
     if changes or resampling.changes:

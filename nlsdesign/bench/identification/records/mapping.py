@@ -16,6 +16,7 @@ from ....foundation.errors import MeasurementError, UnitError, nearest
 from ....foundation.quantity import parse_unit, same_dimension, typeset_unit
 from ....foundation.text_files import text_of
 from ....model import FlatModel
+from .sampling import FORMS, SAMPLED, Sampling
 
 _FASTEST = 1e6
 """Highest rate in Hz of a common clock: beyond it a record of minutes does not fit into memory."""
@@ -87,6 +88,8 @@ class Column:
         The noise is also estimated from the records.
     time
         Head of the clock of this column, in the unit of ``[time]``; empty for the clock of ``[time]``.
+    sampling
+        How the signal runs between its samples; ``None`` where the records are to tell.
     """
 
     name: str
@@ -95,6 +98,7 @@ class Column:
     noise: float = 0.0
     quantum: float = 0.0
     time: str = ""
+    sampling: Sampling | None = SAMPLED
 
 
 @dataclass(frozen=True)
@@ -327,7 +331,7 @@ def _mapped(path: Path, head: str, given: Any) -> Column:
     for key in ("signal", "unit"):
         if key not in table:
             raise MeasurementError(where, f"has no {key}", next_step=f'add {key} = "..."')
-    _check_fields(where, table, ("signal", "unit", "noise", "quantum", "time"), ".")
+    _check_fields(where, table, ("signal", "unit", "noise", "quantum", "time", "between_samples"), ".")
     unit = text_at(where, "unit", table["unit"])
     try:
         factor = parse_unit(unit).factor
@@ -337,7 +341,22 @@ def _mapped(path: Path, head: str, given: Any) -> Column:
         ) from None
     noise, quantum = (_size(where, key, table.get(key, 0.0)) * factor for key in ("noise", "quantum"))
     signal, own = text_at(where, "signal", table["signal"]), text_at(where, "time", table.get("time", ""))
-    return Column(head, signal, unit, noise, quantum, own)
+    return Column(head, signal, unit, noise, quantum, own, _sampling(where, table.get("between_samples")))
+
+
+def _sampling(where: str, given: Any) -> Sampling | None:
+    """Return how a signal runs between its samples, ``None`` where nothing is said."""
+    if given is None:
+        return None
+    named = {form.name: form for form in FORMS}
+    text = text_at(where, "between_samples", given)
+    if text not in named:
+        meanings = "; ".join(f'"{form.name}" {form.words}' for form in FORMS)
+        raise MeasurementError(
+            f"{where}.between_samples", f"'{text}' is no way to run between samples",
+            did_you_mean=nearest(text, named), next_step=f"choose: {meanings}",
+        )  # fmt: skip
+    return named[text]
 
 
 def _size(where: str, field: str, given: Any) -> float:
@@ -346,6 +365,27 @@ def _size(where: str, field: str, given: Any) -> float:
     if size < 0.0:
         raise MeasurementError(f"{where}.{field}", f"{given!r} is negative", next_step=way_out)
     return size
+
+
+def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> ColumnMap:
+    """Return the mapping in which only how inputs run between their samples is left to the records to tell.
+
+    ``mapping``: its inputs are those of the model; a motion that is held is refused.
+    """
+    motions = {name for body in model.bodies for name in (body.motion, body.rate)}
+    shown = {r.signal for r in model.readings if r.measured in motions} | motions
+    given = mapping.inputs.commanded | mapping.inputs.shown
+    columns = []
+    for column in mapping.columns:
+        if column.sampling is not None and column.sampling.held_from is not None and column.signal in shown:
+            raise MeasurementError(
+                f"{file}: column '{column.name}'",
+                f"is declared '{column.sampling.name}', but a motion moves on between its samples",
+                next_step='write between_samples = "sampled", or leave it out',
+            )
+        known = column.sampling is not None or (column.signal in given and column.signal not in shown)
+        columns.append(column if known else replace(column, sampling=SAMPLED))
+    return replace(mapping, columns=tuple(columns))
 
 
 def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> None:

@@ -26,8 +26,9 @@ from .csv_files import default_mapping, heads_with_units, times_among, times_wit
 from .ingest import read_run
 from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
-from .mapping import Inputs, check_signals, read_mapping
+from .mapping import Inputs, check_signals, read_mapping, with_known_sampling
 from .quality import Finding
+from .sampling import SAMPLED, Sampling
 from .table_files import RecordTable, read_table, table_files, unread_tables
 
 _SHARE = 3
@@ -146,6 +147,8 @@ class Record:
     masked
         Samples of a signal that are faulty, shape (n,), by signal: they stand interpolated in the trace, and
         a residual that depends on one of them does not count.
+    sampling
+        How signals run between their samples, by signal; others are what they were at their stamps.
     """
 
     name: str
@@ -154,6 +157,7 @@ class Record:
     source: str = ""
     resolution: Mapping[str, Resolution] = field(default_factory=dict)
     masked: Mapping[str, Mask] = field(default_factory=dict)
+    sampling: Mapping[str, Sampling] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         # Names of files may hold anything.
@@ -163,6 +167,36 @@ class Record:
     def step(self) -> float:
         """Time between samples in s."""
         return float((self.trace.time[-1] - self.trace.time[0]) / (len(self.trace) - 1))
+
+    def sampling_of(self, signal: str) -> Sampling:
+        """Return how a signal runs between its samples.
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        """
+        return self.sampling.get(signal, SAMPLED)
+
+    def at_samples(self, signal: str) -> Array:
+        """Return what a smooth signal with the same effect as a measured one has at the samples, shape (n,).
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        """
+        return self.sampling_of(signal).at_samples(self.trace[signal])
+
+    def as_computed(self, signal: str) -> Array:
+        """Return what a prediction of a measured signal must equal at the samples, shape (n,).
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        """
+        return self.sampling_of(signal).as_computed(self.trace[signal])
 
     def resolution_of(self, signal: str) -> Resolution:
         """Return noise and size of a count of a signal, in SI.
@@ -328,7 +362,7 @@ def load_records(
     first = min(runs, key=lambda file: (-len(runs[file].heads), tuple(runs[file].heads)))
     chosen = default_mapping(runs[first].heads, model, first.name, given)
     check_signals(first.name, chosen.columns, model)
-    chosen = replace(chosen, inputs=Inputs.of(model))
+    chosen = with_known_sampling(first.name, replace(chosen, inputs=Inputs.of(model)), model)
     whole = [_record(file, table, chosen) for file, table in runs.items()]
     records = [record for one in whole for record in one.records]
     findings = tuple(finding for one in whole for finding in one.findings)
@@ -381,7 +415,8 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
         raise _without_time(file.name, [table])
     chosen = default_mapping(table.heads, model, file.name, given)
     check_signals(file.name, chosen.columns, model)
-    one = _record(file, table, replace(chosen, inputs=Inputs.of(model)))
+    chosen = with_known_sampling(file.name, replace(chosen, inputs=Inputs.of(model)), model)
+    one = _record(file, table, chosen)
     return replace(one, records=(replace(one.records[0], role="held_out"),))
 
 
@@ -519,7 +554,11 @@ def _part(record: Record, rows: slice, role: Role, label: str) -> Record:
 
 def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> RecordSet:
     run = read_run(file.stem, table, mapping)
-    record = Record(file.stem, run.trace, source=run.source, resolution=run.resolution, masked=run.masked)
+    sampling = {c.signal: c.sampling for c in mapping.columns if c.sampling not in (None, SAMPLED)}
+    record = Record(
+        file.stem, run.trace, source=run.source, resolution=run.resolution, masked=run.masked,
+        sampling={} if mapping.resample else sampling,
+    )  # fmt: skip
     return RecordSet((record,), mapping.columns, run.findings, run.remarks)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....model import FlatModel, Variable
-from ....model.declared_limits import with_declared_reading
+from ....model.roles import with_declared_reading
 from .known_drive import KnownDrive, voltage_is_limited
 from .law_writer import DESIRED, LawWriter
 from .law_writer import LoopNames as LoopNames

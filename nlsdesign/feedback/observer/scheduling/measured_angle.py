@@ -13,7 +13,7 @@ from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Plausibility, Variable
-from ....model.declared_limits import declared_reading
+from ....model.roles import declared_reading
 from ....simulation import Trace, simulate
 from .angle_form import AngleScheduledPlant
 

@@ -1,0 +1,238 @@
+"""How a signal runs between its samples: what is declared, and who reads it.
+
+The machines are simulated here in NumPy, with a digital controller that holds its current.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from nlsdesign.bench.discrepancy import diagnose
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, Sampling
+from nlsdesign.components import Assembly
+from nlsdesign.components.assembly.changed_copies import smoothed
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.errors import MeasurementError
+from nlsdesign.model import flatten
+
+_FINE = 20
+"""Steps of the simulation in a period of the controller."""
+
+_JOINT = """
+[deck]
+name = "joint"
+description = "a geared joint with a weight"
+
+[motor]
+component = "GearedMotor"
+inertia = {value = 0.30, unit = "kg*m^2", source = "declared", spread = 0.1}
+gear_ratio = {value = 50, unit = "1", source = "declared"}
+torque_constant = {value = 0.1, unit = "N*m/A", source = "declared"}
+
+[bearing]
+component = "Dashpot"
+between = ["motor"]
+damping = {value = 0.9, unit = "N*m*s/rad", source = "declared", spread = 0.5}
+
+[friction]
+component = "CoulombFriction"
+between = ["motor"]
+sliding_effort = {value = 2.0, unit = "N*m", source = "declared", spread = 0.3}
+
+[arm]
+component = "GravityLoad"
+between = ["motor"]
+horizontal_torque = {value = 6, unit = "N*m", source = "declared", spread = 0.1}
+hanging_angle = {value = 0, unit = "rad", source = "declared"}
+
+[encoder]
+component = "Encoder"
+of = "motor.angle"
+quantum = {value = 2e-5, unit = "rad", source = "declared"}
+
+[ammeter]
+component = "CurrentSensor"
+of = "motor.current"
+bias = {value = 0, unit = "A", source = "declared"}
+noise = {value = 0.02, unit = "A", source = "declared"}
+"""
+_AXIS = """
+[deck]
+name = "axis"
+description = "two masses and a spring"
+
+[motor]
+component = "GearedMotor"
+inertia = {value = 0.009, unit = "kg*m^2", source = "declared", spread = 0.1}
+gear_ratio = {value = 1, unit = "1", source = "declared"}
+torque_constant = {value = 0.4, unit = "N*m/A", source = "declared"}
+
+[bearing]
+component = "Dashpot"
+between = ["motor"]
+damping = {value = 0.03, unit = "N*m*s/rad", source = "declared", spread = 0.5}
+
+[load]
+component = "Inertia"
+inertia = {value = 0.014, unit = "kg*m^2", source = "declared", spread = 0.1}
+
+[belt]
+component = "Spring"
+between = ["motor", "load"]
+stiffness = {value = 45, unit = "N*m/rad", source = "declared", spread = 0.1}
+
+[loss]
+component = "Dashpot"
+between = ["motor", "load"]
+damping = {value = 0.04, unit = "N*m*s/rad", source = "declared", spread = 0.7}
+
+[encoder]
+component = "Encoder"
+of = "motor.angle"
+quantum = {value = 2e-5, unit = "rad", source = "declared"}
+
+[load_encoder]
+component = "Encoder"
+of = "load.angle"
+quantum = {value = 2e-5, unit = "rad", source = "declared"}
+
+[ammeter]
+component = "CurrentSensor"
+of = "motor.current"
+bias = {value = 0, unit = "A", source = "declared"}
+noise = {value = 0.005, unit = "A", source = "declared"}
+"""
+
+
+def joint(seed: int) -> Array:
+    """Return time, angle and held current of a joint, 500 Hz."""
+
+    def step(state: Array, current: float, h: float) -> Array:
+        angle, before = state[:2]
+        speed = before + h * (5.0 * current - 0.8 * before - 6.2 * math.sin(angle)) / 0.31
+        stuck = h * 2.1 / 0.31
+        speed = max(speed - stuck, 0.0) if speed > 0.0 else min(speed + stuck, 0.0)
+        return np.array([angle + 0.5 * h * (before + speed), speed, 0.0, 0.0])
+
+    table = held(seed, step, rate=500.0, gains=(0.31 * 900.0 / 5.0, 0.31 * 48.0 / 5.0), size=0.9)
+    return np.column_stack([table[:, 0], 2e-5 * np.round(table[:, 1] / 2e-5), table[:, 3]])
+
+
+def axis(seed: int) -> Array:
+    """Return time, both angles and held current of two masses, 250 Hz; the damping of the belt is 0.03."""
+    motor, load, stiffness, loss = 0.0085, 0.0145, 46.0, 0.03
+    rates = np.zeros((5, 5))
+    rates[0, 1] = rates[2, 3] = 1.0
+    belt = np.array([stiffness, loss, -stiffness, -loss, 0.0])
+    rates[1] = -belt / motor + np.array([0.0, -0.025, 0.0, 0.0, 0.4]) / motor
+    rates[3] = belt / load
+    exact = expm(rates * (1.0 / 250.0 / _FINE))
+
+    def step(state: Array, current: float, h: float) -> Array:
+        moved: Array = exact[:4] @ np.append(state, current)
+        return moved
+
+    table = held(seed, step, rate=250.0, gains=(0.023 * 400.0 / 0.4, 0.023 * 32.0 / 0.4), size=1.5)
+    table[:, 1:3] = 2e-5 * np.round(table[:, 1:3] / 2e-5)
+    return table
+
+
+def held(
+    seed: int,
+    step: Callable[[Array, float, float], Array],
+    *,
+    rate: float,
+    gains: tuple[float, float],
+    size: float,
+) -> Array:
+    """Run a controller that holds its current; return time, both angles and the current at its instants."""
+    draw = np.random.default_rng(seed)
+    frequencies, phases = draw.uniform(0.3, 3.0, 4), draw.uniform(0.0, math.tau, 4)
+    period, state, before, rows = 1.0 / rate, np.zeros(4), 0.0, []
+    for k in range(round(6.0 * rate)):
+        ramp = min(1.0, k * period)
+        waves = np.sin(math.tau * frequencies * k * period + phases) / frequencies
+        goal = ramp * size * 0.25 * float(np.sum(waves))
+        error = goal - state[0]
+        current = gains[0] * error + gains[1] * (error - before) / period
+        before = error
+        rows.append((k * period, state[0], state[2], current))
+        for _ in range(_FINE):
+            state = step(state, current, period / _FINE)
+    table = np.array(rows)
+    table[:, 3] += (0.02 if size < 1.0 else 0.005) * draw.standard_normal(len(table))
+    return table
+
+
+def bench(
+    folder: Path, deck: str, tables: list[Array], between: str | None = None
+) -> tuple[Assembly, RecordSet]:
+    """Write a deck and its records, the last one held out, and read them as a user would."""
+    (folder / "deck.toml").write_text(deck, encoding="utf-8")
+    signals = ["encoder", "load_encoder", "ammeter"] if tables[0].shape[1] == 4 else ["encoder", "ammeter"]
+    lines = [f'held_out = ["run{len(tables) - 1}"]', '[time]\ncolumn = "t_s"']
+    for name in signals:
+        lines += [
+            f"[columns.{name}]",
+            f'signal = "{name}.reading"',
+            f'unit = "{"A" if name == "ammeter" else "rad"}"',
+        ]
+    lines += [f'between_samples = "{between}"'] if between else []
+    (folder / "records.toml").write_text("\n".join(lines), encoding="utf-8")
+    for k, table in enumerate(tables):
+        np.savetxt(
+            folder / f"run{k}.csv", table, "%.9g", ",", header=",".join(["t_s", *signals]), comments=""
+        )
+    declared = smoothed(declare(load_deck(str(folder / "deck.toml"))))
+    return declared, load_records(folder, flatten(declared))
+
+
+def test_nothing_is_missing_from_a_joint_whose_controller_holds_its_current(tmp_path: Path) -> None:
+    found = diagnose(*bench(tmp_path, _JOINT, [joint(seed) for seed in range(4)], "held"))
+    assert found.verdict == "none"
+
+
+@pytest.mark.slow
+def test_nothing_is_missing_from_an_axis_and_the_damping_of_its_belt_is_right(tmp_path: Path) -> None:
+    found = diagnose(*bench(tmp_path, _AXIS, [axis(seed) for seed in range(5)], "held"))
+    assert found.verdict == "none"
+    numbers = {p.name: (f.values[p.name], f.standard_error(p.name)) for f in found.fits for p in f.parameters}
+    value, error = numbers["loss.damping"]
+    assert value == pytest.approx(0.03, abs=max(3.0 * error, 6e-4))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_wave_is_read_at_the_samples_as_a_filter_sees_it(form: Sampling) -> None:
+    """A hold of one period passes a wave half a sample later, times sin(x)/x; a mean is undone."""
+    turn, at = 0.3, np.arange(200)
+    gain = {"sampled": 1.0, "averaged": (0.5 * turn) / math.sin(0.5 * turn)}
+    expected = gain.get(form.name, math.sin(0.5 * turn) / (0.5 * turn)) * np.sin(turn * (at - form.late))
+    np.testing.assert_allclose(form.at_samples(np.sin(turn * at))[5:-5], expected[5:-5], atol=3e-4)
+
+
+def test_a_held_signal_is_read_held_between_its_samples() -> None:
+    time, values = np.arange(5.0), np.array([0.0, 1.0, 3.0, 3.0, 2.0])
+    np.testing.assert_array_equal(HELD.at_times(time, values, np.array([0.9, 1.0, 2.5])), [0.0, 1.0, 3.0])
+    np.testing.assert_array_equal(HELD.over_steps(values)[1], values[:-1])
+    assert AVERAGED.over_steps(values)[0].shape == (4,)
+
+
+def test_a_motion_that_is_held_is_refused(tmp_path: Path) -> None:
+    bench(tmp_path, _JOINT, [joint(0)[:200], joint(1)[:200]])
+    text = (tmp_path / "records.toml").read_text(encoding="utf-8")
+    spoilt = text.replace('unit = "rad"', 'unit = "rad"\nbetween_samples = "held"')
+    (tmp_path / "records.toml").write_text(spoilt, encoding="utf-8")
+    with pytest.raises(MeasurementError, match="a motion moves on between its samples"):
+        load_records(tmp_path, flatten(smoothed(declare(load_deck(str(tmp_path / "deck.toml"))))))
+    (tmp_path / "records.toml").write_text(spoilt.replace('= "held"', '= "holds"'), encoding="utf-8")
+    with pytest.raises(MeasurementError, match="no way to run between samples"):
+        load_records(tmp_path, flatten(smoothed(declare(load_deck(str(tmp_path / "deck.toml"))))))
