@@ -97,7 +97,10 @@ def write_drawings(
         if suffix not in known:
             raise unknown_name("format", suffix, known)
     if machined is None:
-        texts = _contour_texts(contour, note, cable_radius)
+        texts = {
+            suffix: {f".{suffix}": partial(make, contour, note=note, cable_radius=cable_radius)}
+            for suffix, make in (("csv", csv_text), ("svg", svg_text), ("dxf", dxf_text))
+        }
     elif cable_radius:
         raise ValueRangeError(
             f"cable_radius {cable_radius * MM:g} mm", "is declared by the machined cam already",
@@ -111,15 +114,6 @@ def write_drawings(
     for file, text in made:
         write_text(folder / file, text)
     return [folder / file for file, _ in made]
-
-
-def _contour_texts(
-    contour: Contour, note: str, cable_radius: float
-) -> dict[str, dict[str, Callable[[], str]]]:
-    return {
-        suffix: {f".{suffix}": partial(make, contour, note=note, cable_radius=cable_radius)}
-        for suffix, make in (("csv", csv_text), ("svg", svg_text), ("dxf", dxf_text))
-    }
 
 
 def _part_texts(

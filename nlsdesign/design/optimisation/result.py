@@ -332,11 +332,6 @@ class CamDesign:
         return "\n".join([*lines, "  limits", *(f"    {state}" for state in self.limits)])
 
 
-def _in_its_unit(state: LimitState) -> LimitState:
-    factor = parse_unit(state.unit).factor
-    return replace(state, value=state.value / factor, bound=state.bound / factor)
-
-
 def design_frames(design: CamDesign) -> dict[str, Any]:
     """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`."""
     rows = [
@@ -345,7 +340,10 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
         for k, each in enumerate(np.atleast_1d(np.asarray(q.shown)).tolist(), start=1)
     ]
     keys = ("name", "value", "unit", "source", "spread")
-    limits = [_in_its_unit(state) for state in design.limits]
+    limits = []
+    for state in design.limits:
+        factor = parse_unit(state.unit).factor
+        limits.append(replace(state, value=state.value / factor, bound=state.bound / factor))
     check, curves = design.check, design.curves
     torque = {"torque": check.torques, "target": check.targets, "error": check.errors}
     over = {
