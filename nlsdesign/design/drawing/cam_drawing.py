@@ -96,6 +96,7 @@ def write_drawings(
     for suffix in formats:
         if suffix not in known:
             raise unknown_name("format", suffix, known)
+    texts: dict[str, dict[str, Callable[[], str]]]
     if machined is None:
         texts = {
             suffix: {f".{suffix}": partial(make, contour, note=note, cable_radius=cable_radius)}
