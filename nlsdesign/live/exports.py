@@ -16,7 +16,7 @@ from ..design import Contour, write_drawings
 from ..design.jobs.written_design import declared_edge
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..model import flatten
-from ..model.roles import measured_motion, series_spring
+from ..model.roles import measured_motion, series_cam, series_spring
 from ..model.transform import with_outputs
 from .at_angle import AngleView
 from .question import LiveQuestion
@@ -133,7 +133,7 @@ _MEDIA = {"svg": "image/svg+xml", "dxf": "image/vnd.dxf"}
 
 
 def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
-    _, kind, radius = declared_edge(design.machine)
+    kind, radius = declared_edge(design.machine, series_cam(flatten(design.machine)))
     machined = None if radius is None else kind(cable_radius=radius)
     centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
     note = "; ".join(filter(None, (design.note, centre)))

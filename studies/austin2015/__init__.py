@@ -39,7 +39,7 @@ def main(out: Path, fast: bool = False) -> Results:
     designed = work_up(cam.design.actuator, out / "designed.toml", out / "designed", steps=steps, fast=fast)
     both = {"published": published, "designed": designed}
     with steps.step("diagnosis of the bench records"):
-        verdict = diagnose_bench(actuator, out, steps)
+        verdict = diagnose_bench(actuator, out, steps, fast=fast)
     with steps.step("the diagnosed actuator under code from three decks"):
         codes = {
             name: Code(each.model, each.observers.minimal.model, each.spread.chosen.model)

@@ -5,15 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.bench.discrepancy import Verdict, effects
 from nlsdesign.foundation.progress import Progress
 
 from .._published import bench_records, with_bench_sensors
 
+RIVALS = (
+    effects.coulomb_friction,
+    effects.drive_delay,
+    effects.rate_independent_hysteresis,
+    effects.second_relaxation,
+    effects.stress_softening,
+)
+"""What the loss of the rubber is most easily mistaken for, and it itself: enough for the fast way."""
 
-def diagnose_bench(actuator: nls.Assembly, out: Path, progress: Progress) -> Verdict:
+
+def diagnose_bench(actuator: nls.Assembly, out: Path, progress: Progress, *, fast: bool) -> Verdict:
     """Name what the records show and the declared actuator lacks; write verdict and better deck."""
-    bench = with_bench_sensors(actuator)
-    verdict = nls.diagnose(bench, bench_records(bench), progress=progress.note)
+    bench, catalogue = with_bench_sensors(actuator), RIVALS if fast else None
+    verdict = nls.diagnose(bench, bench_records(bench), catalogue=catalogue, progress=progress.note)
     nls.write_verdict(verdict, out / "diagnosis")
     return verdict

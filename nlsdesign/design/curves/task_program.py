@@ -270,9 +270,14 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     starts = [energetic, _without_inertia(program, energetic)]
     if len(energetic) > 1:
         starts += [np.full(len(energetic), each) for each in _linear_of_least_peak_power(program)]
-    starts = [each for each in starts if _kept(program.limits(), each)]
-    ends = starts + [_descended(program, each) for each in starts]
-    return TaskOptimum(min(ends, key=lambda each: program.motor(each).peak_power), None)
+    limits = program.limits()
+    starts = [
+        start
+        for start in starts
+        if all(np.max(np.abs(e.offset + e.matrix @ start)) <= e.largest * (1.0 + 1e-6) for e in limits)
+    ]
+    tried = starts + [_descended(program, start) for start in starts]
+    return TaskOptimum(min(tried, key=lambda each: program.motor(each).peak_power), None)
 
 
 def _linear_of_least_peak_power(program: TaskProgram) -> list[float]:
@@ -284,10 +289,6 @@ def _linear_of_least_peak_power(program: TaskProgram) -> list[float]:
 
 _STEPS = 60
 """Largest number of linear programs from one start."""
-
-
-def _kept(limits: tuple[LimitRows, ...], unknowns: Array) -> bool:
-    return all(np.max(np.abs(e.offset + e.matrix @ unknowns)) <= e.largest * (1.0 + 1e-6) for e in limits)
 
 
 def _descended(program: TaskProgram, start: Array) -> Array:

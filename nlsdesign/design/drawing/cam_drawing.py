@@ -46,7 +46,7 @@ def write_drawings(
     folder: Path,
     contour: Contour,
     *,
-    machined: MachinedCam | None = None,
+    machined: MachinedCam | CamPart | None = None,
     name: str = "cam",
     note: str = "",
     cable_radius: float = 0.0,
@@ -64,7 +64,7 @@ def write_drawings(
     contour
         What the cable's centre line touches.
     machined
-        Sizes of the part.
+        Sizes of the part, or the part itself where it was made for this contour.
     name
         Name of the files without suffix.
     note
@@ -96,29 +96,25 @@ def write_drawings(
     for suffix in formats:
         if suffix not in known:
             raise unknown_name("format", suffix, known)
+    texts: dict[str, dict[str, Callable[[], str]]]
     if machined is None:
-        texts = _contour_texts(contour, note, cable_radius)
+        texts = {
+            suffix: {f".{suffix}": partial(make, contour, note=note, cable_radius=cable_radius)}
+            for suffix, make in (("csv", csv_text), ("svg", svg_text), ("dxf", dxf_text))
+        }
     elif cable_radius:
         raise ValueRangeError(
             f"cable_radius {cable_radius * MM:g} mm", "is declared by the machined cam already",
             next_step="leave cable_radius out",
         )  # fmt: skip
     else:
-        texts = _part_texts(machined.part(contour), contour, name, note)
+        part = machined if isinstance(machined, CamPart) else machined.part(contour)
+        texts = _part_texts(part, contour, name, note)
     # All are made before the first is written.
     made = [(f"{name}{ending}", text()) for suffix in formats for ending, text in texts[suffix].items()]
     for file, text in made:
         write_text(folder / file, text)
     return [folder / file for file, _ in made]
-
-
-def _contour_texts(
-    contour: Contour, note: str, cable_radius: float
-) -> dict[str, dict[str, Callable[[], str]]]:
-    return {
-        suffix: {f".{suffix}": partial(make, contour, note=note, cable_radius=cable_radius)}
-        for suffix, make in (("csv", csv_text), ("svg", svg_text), ("dxf", dxf_text))
-    }
 
 
 def _part_texts(

@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
 from ...components.assembly.deck_writer import write_deck
 from ...components.assembly.named_parts import Assembly
 from ...foundation.errors import DeckError, NlsError
 from ...foundation.quantity import Quantity, parse_unit, with_unit
 from ...foundation.text_files import discard, make_folder, write_text
-from ...model import flatten
-from ...model.roles import series_cam
+from ...model.structure import CamNames
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
@@ -43,12 +40,12 @@ def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam
     NlsError
         If a size is refused.
     """
-    name, kind, radius = declared_edge(design.actuator, design.drive)
+    kind, radius = declared_edge(design.actuator, design.cam)
     sizes: dict[str, object] = {} if job is None else dict(job.drawing)
     if "cable_radius" not in sizes:
         if radius is None:
             raise DeckError(
-                name, "declares no cable, so the machined edge is not known",
+                design.cam.name, "declares no cable, so the machined edge is not known",
                 next_step='declare cable_diameter, or write [drawing] cable_radius = "0.5 mm"',
             )  # fmt: skip
         sizes["cable_radius"] = radius
@@ -58,17 +55,14 @@ def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam
     return result
 
 
-def declared_edge(
-    actuator: Assembly, spring: str | None = None
-) -> tuple[str, type[MachinedCam], Quantity | None]:
-    """Return the path of the cam, the kind of part it is, and half of its cable, where that is declared."""
-    names = series_cam(flatten(actuator), spring)
-    two_sided = declared_cam(actuator[names.name]).through_centre
+def declared_edge(actuator: Assembly, cam: CamNames) -> tuple[type[MachinedCam], Quantity | None]:
+    """Return the kind of part that a cam is, and half of its cable, where that is declared."""
+    two_sided = declared_cam(actuator[cam.name]).through_centre
     radius = None
-    if names.cable is not None:
-        diameter = actuator.quantities()[names.cable.diameter]
-        radius = diameter.with_value(diameter.number / 2.0, f"half of {names.cable.diameter}")
-    return names.name, MachinedTwoSidedCam if two_sided else MachinedOneSidedCam, radius
+    if cam.cable is not None:
+        diameter = actuator.quantities()[cam.cable.diameter]
+        radius = diameter.with_value(diameter.number / 2.0, f"half of {cam.cable.diameter}")
+    return MachinedTwoSidedCam if two_sided else MachinedOneSidedCam, radius
 
 
 DESIGN_FILES = (
@@ -162,7 +156,7 @@ def write_design(
         files += write_drawings(folder, design.contour, note=f"design {design.fingerprint}")
     else:
         remarks += part_remarks(design, machined, part)
-        files += write_part(design, machined, folder, pictures=pictures)
+        files += _written_part(design, part, folder, pictures)
     return WrittenDesign(tuple(files), tuple(remarks))
 
 
@@ -192,9 +186,15 @@ def write_part(
     NlsError
         If the part cannot be made of the contour.
     """
-    note = f"design {design.fingerprint}"
-    files = write_drawings(folder, design.contour, machined=machined, note=note)
-    return [*files, *(pictures.of_part(design, machined.part(design.contour), folder) if pictures else ())]
+    return _written_part(design, machined.part(design.contour), folder, pictures)
+
+
+def _written_part(
+    design: CamDesign, part: CamPart, folder: Path, pictures: PicturesOfDesign | None
+) -> list[Path]:
+    """Write the drawings of a part, and the page for the workshop where something draws it."""
+    files = write_drawings(folder, design.contour, machined=part, note=f"design {design.fingerprint}")
+    return [*files, *(pictures.of_part(design, part, folder) if pictures else ())]
 
 
 def design_summary(design: CamDesign) -> dict[str, Any]:
@@ -243,9 +243,8 @@ def trim_remarks(design: CamDesign) -> Iterator[str]:
 
 def part_remarks(design: CamDesign, machined: MachinedCam, part: CamPart) -> Iterator[str]:
     """Yield how far a made part reaches, and that nothing holds it where neither hub nor bolts are named."""
-    reach = max(float(np.hypot(*outline.polygon().T).max()) for outline in part.outlines)
     yield (
-        f"the made part reaches {1e3 * reach:.4g} mm from its axis, the contour "
+        f"the made part reaches {1e3 * part.reach:.4g} mm from its axis, the contour "
         f"{1e3 * float(design.contour.radii.max()):.4g} mm: run-out and corners come on top"
     )
     if machined.hub_bore is None and machined.bolts is None:

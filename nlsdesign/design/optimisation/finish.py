@@ -195,12 +195,12 @@ def finished(solved: SolvedSearch) -> CamDesign:
             StartOutcome(o.solved, o.status, o.iterations, o.cost, solved.rms(o)) for o in solved.outcomes
         ),
         taken=solved.taken,
+        cam=cam,
         size_ranges=size_ranges(search, best.point, solved.predicted_rms)
         if settings.look_for_size_ranges
         else (),
         miss=_miss(solved, limits),
         remarks=(*sentences, *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
-        drive=problem.law.cam.drive,
     )
 
 

@@ -1,4 +1,11 @@
-"""The front of two or three goals: how it is searched, and what it is as data."""
+"""The front of two or three goals: how it is searched, and what it is as data.
+
+Each goal is first met alone. Between the best and the worst value that it has in these designs each goal
+but the first then gets a ladder of bounds, and for every combination of bounds the first goal is met as well
+as it can be (ε-constraint). A point starts from its nearest neighbour; one that failed, or that another point
+betters within its own bounds, is solved again from there.
+Source: Haimes et al. 1971 (ε-constraint).
+"""
 
 from __future__ import annotations
 
@@ -228,7 +235,18 @@ def pareto(
     ValueRangeError
         If there are fewer than two or more than three goals, two of a kind, or too few or many points.
     """
-    _check(goals, points)
+    if not 2 <= len(goals) <= 3:
+        raise ValueRangeError(
+            f"goals: {len(goals)}", "a front has two or three",
+            next_step="name what is to be traded, for instance goals=(EnergyLost(5.0), LeastSize())",
+        )  # fmt: skip
+    if len({type(goal) for goal in goals}) < len(goals):
+        kinds = ", ".join(type(goal).__name__ for goal in goals)
+        raise ValueRangeError(
+            f"goals: {kinds}", "two of a kind", next_step="trade goals that are of different kinds"
+        )
+    if not _LEAST_POINTS <= points <= _MOST_POINTS:
+        raise ValueRangeError(f"points = {points}", f"must lie in [{_LEAST_POINTS}, {_MOST_POINTS}]")
     if not any(isinstance(limit, MaximumTorqueError) for limit in keep):
         keep = (*keep, MaximumTorqueError(settings.largest_error * target.largest))
     wanted = Wanted(
@@ -243,21 +261,6 @@ def pareto(
     lowest, highest = values.min(axis=0), values.max(axis=0)
     reached += front.between(reached, lowest, highest, points)
     return _front(actuator, front, reached)
-
-
-def _check(goals: Sequence[Goal], points: int) -> None:
-    if not 2 <= len(goals) <= 3:
-        raise ValueRangeError(
-            f"goals: {len(goals)}", "a front has two or three",
-            next_step="name what is to be traded, for instance goals=(EnergyLost(5.0), LeastSize())",
-        )  # fmt: skip
-    if len({type(goal) for goal in goals}) < len(goals):
-        kinds = ", ".join(type(goal).__name__ for goal in goals)
-        raise ValueRangeError(
-            f"goals: {kinds}", "two of a kind", next_step="trade goals that are of different kinds"
-        )
-    if not _LEAST_POINTS <= points <= _MOST_POINTS:
-        raise ValueRangeError(f"points = {points}", f"must lie in [{_LEAST_POINTS}, {_MOST_POINTS}]")
 
 
 class _Tried(NamedTuple):

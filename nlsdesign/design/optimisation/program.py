@@ -180,7 +180,17 @@ class Program:
             lbg=np.repeat([r.lower for r in self.rows], sizes),
             ubg=np.repeat([r.upper for r in self.rows], sizes),
         )
-        return self._outcome(answer, sizes)
+        stats = self._solver.stats()
+        groups = np.split(np.abs(np.array(answer["lam_g"]).ravel()), np.cumsum(sizes)[:-1])
+        finite = bool(np.all(np.isfinite(np.array(answer["x"]))) and np.isfinite(float(answer["f"])))
+        return Solution(
+            finite and stats["return_status"] in _SOLVED,
+            str(stats["return_status"]),
+            np.array(answer["x"]).ravel(),
+            float(answer["f"]),
+            int(stats["iter_count"]),
+            tuple(float(np.max(group, initial=0.0)) for group in groups),
+        )
 
     def prepare(self) -> None:
         """Make the derivatives once, before the work is shared out to other processes."""
@@ -207,16 +217,3 @@ class Program:
         if self.parameters is not None:
             problem["p"] = self.parameters
         return ca.nlpsol("design", "ipopt", problem, {"ipopt.max_iter": self.iterations, **_OPTIONS})
-
-    def _outcome(self, answer: dict[str, ca.DM], sizes: list[int]) -> Solution:
-        stats = self._solver.stats()
-        groups = np.split(np.abs(np.array(answer["lam_g"]).ravel()), np.cumsum(sizes)[:-1])
-        finite = bool(np.all(np.isfinite(np.array(answer["x"]))) and np.isfinite(float(answer["f"])))
-        return Solution(
-            finite and stats["return_status"] in _SOLVED,
-            str(stats["return_status"]),
-            np.array(answer["x"]).ravel(),
-            float(answer["f"]),
-            int(stats["iter_count"]),
-            tuple(float(np.max(group, initial=0.0)) for group in groups),
-        )

@@ -13,6 +13,7 @@ from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
 from ...foundation.quantity import Quantity, parse_unit, with_unit
 from ...foundation.written_numbers import prefixed, without_power
+from ...model.structure import CamNames
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
@@ -242,6 +243,8 @@ class CamDesign:
         Where the search from each start came to; ``taken`` is the number of the one that was taken.
     taken
         Number of the start.
+    cam
+        Names around the cam: of its part, cable and rubber.
     size_ranges
         Ranges of sizes that cost nothing.
     miss
@@ -250,8 +253,6 @@ class CamDesign:
         What a designer should know besides.
     alternatives
         All combinations of the stock that was offered.
-    drive
-        Path of the part that holds the cam.
     """
 
     target: Target
@@ -267,11 +268,16 @@ class CamDesign:
     rubber_volume: float
     starts: tuple[StartOutcome, ...]
     taken: int
+    cam: CamNames
     size_ranges: tuple[SizeRange, ...] = ()
     miss: Miss | None = None
     remarks: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
-    drive: str | None = None
+
+    @property
+    def drive(self) -> str:
+        """Path of the part that holds the cam."""
+        return self.cam.drive
 
     @property
     def met(self) -> bool:
@@ -326,11 +332,6 @@ class CamDesign:
         return "\n".join([*lines, "  limits", *(f"    {state}" for state in self.limits)])
 
 
-def _in_its_unit(state: LimitState) -> LimitState:
-    factor = parse_unit(state.unit).factor
-    return replace(state, value=state.value / factor, bound=state.bound / factor)
-
-
 def design_frames(design: CamDesign) -> dict[str, Any]:
     """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`."""
     rows = [
@@ -339,7 +340,10 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
         for k, each in enumerate(np.atleast_1d(np.asarray(q.shown)).tolist(), start=1)
     ]
     keys = ("name", "value", "unit", "source", "spread")
-    limits = [_in_its_unit(state) for state in design.limits]
+    limits = []
+    for state in design.limits:
+        factor = parse_unit(state.unit).factor
+        limits.append(replace(state, value=state.value / factor, bound=state.bound / factor))
     check, curves = design.check, design.curves
     torque = {"torque": check.torques, "target": check.targets, "error": check.errors}
     over = {

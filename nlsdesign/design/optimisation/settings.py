@@ -15,7 +15,7 @@ _LARGEST_ERROR = 0.5
 _MOST_STARTS = 10_000
 
 
-def _quiet() -> None:
+def no_progress() -> None:
     """Report no progress."""
 
 
@@ -64,7 +64,7 @@ class DesignSettings:
     look_for_size_ranges: bool = True
     look_for_remedies: bool = True
     draws: int = 200
-    progress: Callable[[], None] = _quiet
+    progress: Callable[[], None] = no_progress
     contour: Contour | None = None
 
     def __post_init__(self) -> None:

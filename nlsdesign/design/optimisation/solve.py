@@ -23,7 +23,7 @@ from .limits import Limit
 from .problem import contour_names
 from .program import Solution
 from .result import Alternative, CamDesign
-from .settings import DesignSettings
+from .settings import DesignSettings, no_progress
 from .stock import StockChoice, combinations, require_once
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
@@ -162,7 +162,7 @@ class Wanted:
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
         """Return the best design over all combinations of a stock, with what became of the others."""
         hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
-        hasty = replace(hasty, progress=_no_word)
+        hasty = replace(hasty, progress=no_progress)
 
         def one(number: int) -> tuple[Alternative, NlsError | None]:
             label, assembly = options[number]
@@ -188,10 +188,6 @@ class Wanted:
             raise errors[0].at(place)
         best = min(costs, key=lambda i: (not table[i].met, costs[i]))
         return replace(self.designed(options[best][1], settings), alternatives=tuple(table))
-
-
-def _no_word() -> None:
-    """Say nothing: progress is told for each combination."""
 
 
 def _best(outcomes: Sequence[Solution]) -> int:

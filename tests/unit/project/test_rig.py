@@ -53,13 +53,14 @@ def test_rig_imports_only_numpy_scipy_and_the_standard_library(root: Path) -> No
     files = sorted((root / "tests" / "rig").glob("*.py"))
     assert len(files) >= 8
     for file in files:
+        others = {"mujoco"} if file.name == "mujoco_machines.py" else set()
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             if isinstance(node, ast.ImportFrom):
                 assert node.level <= 1, f"{file.name}:{node.lineno} reaches outside the rig"
                 names = [node.module or ""] if node.level == 0 else []
             for name in names:
-                assert name.split(".")[0] in allowed, f"{file.name}:{node.lineno} imports {name}"
+                assert name.split(".")[0] in allowed | others, f"{file.name}:{node.lineno} imports {name}"
 
 
 # --- actuators --------------------------------------------------------------------------------------------
