@@ -12,11 +12,15 @@ record drives.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ....foundation.arrays import Array
+
+_REACH = 3
+"""Samples to either side from which a signal is read between two of them."""
 
 
 @dataclass(frozen=True)
@@ -120,3 +124,21 @@ AVERAGED = Sampling(
     -0.5,
 )
 FORMS = (SAMPLED, HELD, HELD_BEFORE, AVERAGED)
+
+
+def shifted(samples: float) -> Sampling:
+    """Return a signal that acts a part of a sample behind its stamps, read by a polynomial of sixth degree.
+
+    ``samples``: at most one, of either sign.
+    """
+    offsets = np.arange(-_REACH, _REACH + 1)
+    weights = _lagrange(offsets.tolist(), -samples)
+    taps = tuple(zip(offsets.tolist(), weights, strict=True))
+    return Sampling("shifted", f"acts {samples:.2g} samples behind its stamps", taps, samples)
+
+
+def _lagrange(offsets: Sequence[int], at: float) -> list[float]:
+    """Return the weights of values at whole places in the value of their polynomial at a place."""
+    return [
+        float(np.prod([(at - other) / (own - other) for other in offsets if other != own])) for own in offsets
+    ]
