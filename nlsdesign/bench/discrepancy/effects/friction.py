@@ -133,9 +133,8 @@ def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
 
 
 def _stribeck_speed(path: str, around: _Signals) -> Unknown:
-    return Unknown(
-        f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, None, f"{path}.creep_speed"
-    )
+    name, width = f"{path}.stribeck_speed", f"{path}.creep_speed"
+    return Unknown(name, (0.015, 0.08), 1e-3, 1.5, around.speed, null=None, above=width)
 
 
 def _even_friction(assembly: Assembly, place: str) -> str | None:

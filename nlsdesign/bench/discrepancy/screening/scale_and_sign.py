@@ -156,8 +156,8 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
             )
             quickest[body.name] = min(time or np.inf, quickest.get(body.name, np.inf))
         _enlarge(sizes, {name: _large(values)[0] for name, values in {**known, **shown}.items()})
-        for name, values in shown.items():
-            ends.setdefault(name, []).extend(np.quantile(values, (1.0 - _USUAL, _USUAL)))
+        for body in moving:
+            ends.setdefault(body.motion, []).extend(np.quantile(shown[body.motion], (1.0 - _USUAL, _USUAL)))
         for place in {_large(values)[1] for values in shown.values()}:
             state, inputs = (
                 [float(shown[v.name][place]) if v.name in shown else v.start for v in variables]
