@@ -401,7 +401,9 @@ def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
 
 def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, left: Excesses) -> NamedEffect:
     # Later edits may have put the same number under a longer name: the last hypothesis knows.
-    candidate = last.added[place]
+    candidate, here = last.added[place], left[step.block]
+    # What is left in the block, in multiples of its noise floor.
+    times_noise = math.sqrt(max(1.0, here.mean_square)) if here.open else 1.0
     return NamedEffect(
         candidate.effect,
         candidate.location,
@@ -411,16 +413,11 @@ def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, left: 
         candidate.signature,
         candidate.source,
         probability=CALIBRATION.probability(
-            step.distance, complete=is_complete(left), times_noise=_times_noise(left[step.block])
+            step.distance, complete=is_complete(left), times_noise=times_noise
         )
         / (1 + len(step.equals)),
         evidence=_evidence(step, standing_of(candidate.unknowns, last.fits.values())),
     )
-
-
-def _times_noise(left: Excess) -> float:
-    """Return what is left in a block in multiples of its noise floor, at least one."""
-    return math.sqrt(max(1.0, left.mean_square)) if left.open else 1.0
 
 
 def _evidence(step: Step, standing: Standing) -> EffectEvidence:

@@ -52,14 +52,8 @@ _SHARE_OF_SLOWEST = 0.2
 def with_resolved_signs(before: Assembly, after: Assembly, slowest: Mapping[str, float]) -> Assembly:
     """Return an edited assembly whose new friction changes its sign as sharply as the records resolve.
 
-    A width that the records could see would be paid for by something else. What is declared stays.
-
-    Parameters
-    ----------
-    before, after
-        Assembly without and with an effect.
-    slowest
-        Least speed that the records resolve, by name of the body.
+    A width that the records could see would be paid for by something else. What is declared ``before`` stays.
+    ``slowest``: least speed that the records resolve, by name of the body.
     """
     declared, widths = {id(each) for each in before.quantities().values()}, dict[str, Quantity]()
     for name, width in after.quantities().items():

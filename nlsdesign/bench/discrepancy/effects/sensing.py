@@ -79,11 +79,6 @@ def _against_others(*faults: type[Sensor]) -> Places:
     return places
 
 
-def _motion_of(assembly: Assembly, encoder: str) -> Domain:
-    body = assembly.measured(f"{encoder}.reading")[0].partition(".")[0]
-    return domain_of(assembly, body)
-
-
 def _domain(cell: Sensor) -> Domain:
     return TRANSLATION if isinstance(cell, ForceSensor) else ROTATION
 
@@ -93,7 +88,7 @@ def _bias(assembly: Assembly, name: str) -> Iterator[Edit]:
 
 
 def _zero(assembly: Assembly, name: str) -> Iterator[Edit]:
-    kind = _motion_of(assembly, name)
+    kind = domain_of(assembly, assembly.measured(f"{name}.reading")[0].partition(".")[0])
     off = EncoderOffset(of=assembly.sensors()[name].of, offset=number(0.0, kind.motion_unit), domain=kind)
     edited, fault = _with_fault(assembly, name, "offset", off)
     yield Edit(edited, (Unknown(f"{fault}.offset", (0.0,), -0.5, 0.5, f"{name}.reading"),))
