@@ -116,7 +116,7 @@ def diagnose(
     base = case.comparison.base(actuator)
     effects = known_effects() if catalogue is None else catalogue
     outcome, decision = _decided(case, base, effects, progress)
-    again = _read_as_told_beside(case, outcome)
+    again = case.read_as_told_beside(outcome)
     if again is not None:
         progress("reading inputs between their samples as they run beside what is named")
         case = again
@@ -124,6 +124,10 @@ def diagnose(
         outcome, decision = _decided(case, base, effects, progress)
     progress("reading the held-out records")
     return _verdict(case, base, outcome, decision, records)
+
+
+_SAME_SAMPLING = 0.1
+"""Samples by which an input may be read otherwise without a second look at everything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,31 +143,26 @@ class _Case:
         """Return the excess of each block on all samples."""
         return excesses(hypothesis, self.bench, self.criteria)
 
+    def read_as_told_beside(self, outcome: Outcome) -> _Case | None:
+        """Return the case with inputs read between their samples as records tell it beside what is named.
 
-_SAME_SAMPLING = 0.1
-"""Samples by which an input may be read otherwise without a second look at everything."""
-
-
-def _read_as_told_beside(case: _Case, outcome: Outcome) -> _Case | None:
-    """Return the case with inputs read between their samples as records tell it beside what is named.
-
-    Backlash that nobody declared, for instance, hides at first that a current is held. Nothing is returned
-    where the inputs are read so already.
-    """
-    if not outcome.steps:
-        return None
-    bench = case.bench
-    records = bench.inferred(blocks_of(flatten(outcome.last.fitted), bench.records.signals))
-    moved = (
-        abs(now.sampling.late - then.sampling.late)
-        for then, now in zip(bench.records.columns, records.columns, strict=True)
-        if then.sampling and now.sampling
-    )
-    if max(moved, default=0.0) <= _SAME_SAMPLING:
-        return None
-    bench = Bench(records, blocks_of(flatten(case.actuator), records.signals))
-    sizes = typical_sizes(case.actuator, bench.records)
-    return _Case(case.actuator, bench, Comparison(bench, sizes), case.criteria)
+        Backlash that nobody declared, for instance, hides at first that a current is held. Nothing is
+        returned where the inputs are read so already.
+        """
+        if not outcome.steps:
+            return None
+        bench = self.bench
+        records = bench.inferred(blocks_of(flatten(outcome.last.fitted), bench.records.signals))
+        moved = (
+            abs(now.sampling.late - then.sampling.late)
+            for then, now in zip(bench.records.columns, records.columns, strict=True)
+            if then.sampling and now.sampling
+        )
+        if max(moved, default=0.0) <= _SAME_SAMPLING:
+            return None
+        bench = Bench(records, blocks_of(flatten(self.actuator), records.signals))
+        sizes = typical_sizes(self.actuator, bench.records)
+        return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
 
 
 def _decided(
@@ -355,15 +354,12 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
 def _strained(before: Excess, after: Excess, better: Hypothesis) -> str:
     scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
     far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
-    which = f": {', '.join(f'{n} {abs(scores[n]):.1f} {_side(scores[n])}' for n in far)}" if far else ""
+    sides = (f"{n} {abs(scores[n]):.1f} {'above' if scores[n] > 0.0 else 'below'}" for n in far)
+    which = f": {', '.join(sides)}" if far else ""
     return (
         f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
         f"{after.fit:.1f} after{which}"
     )
-
-
-def _side(score: float) -> str:
-    return "above" if score > 0.0 else "below"
 
 
 def _not_predicted(key: Key) -> str:

@@ -36,6 +36,7 @@ from .places import (
     laws,
     restoring_ties,
     sliding_bodies,
+    ties_between_bodies,
     turning_bodies,
     turns_per_turn,
     wrapping,
@@ -93,15 +94,8 @@ def _undamped_springs(assembly: Assembly) -> list[str]:
         for name in (path.partition(".")[0] for path, part in laws(assembly) if isinstance(part, Dashpot))
         if isinstance(assembly[name], Tie)
     }
-    pairs = {name: assembly[name].between for name in restoring_ties(assembly)}  # type: ignore[attr-defined]
-    return [
-        name
-        for name, ends in pairs.items()
-        if len(ends) == 2
-        and all(isinstance(assembly[end], Free) for end in ends)
-        and ends not in damped
-        and ends[::-1] not in damped
-    ]
+    pairs = ties_between_bodies(assembly)
+    return [name for name, ends in pairs.items() if ends not in damped and ends[::-1] not in damped]
 
 
 def _damping(assembly: Assembly, name: str) -> Iterator[Edit]:

@@ -25,7 +25,7 @@ from ....components import (
 from ....components.core.domain import Domain
 from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity, significant
-from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, numbers_of, wrapped
+from .effect import SOURCE, Edit, Effect, Form, Places, Unknown, free_name, number, numbers_of, wrapped
 from .places import (
     beside,
     domain_of,
@@ -34,6 +34,7 @@ from .places import (
     laws,
     loaded_ties,
     moving_bodies,
+    ties_between_bodies,
     turning_bodies,
 )
 from .sizes import efforts_on, span_of
@@ -141,18 +142,15 @@ def _even_friction(assembly: Assembly, place: str) -> str | None:
     return None
 
 
-def _evenly_round(assembly: Assembly) -> list[str]:
-    """Return the moving bodies whose friction does not come round with the angle."""
-    return [body for body in moving_bodies(assembly) if not _has(WavyFriction, assembly, body)]
+def _without(kind: type[Element], bodies: Places) -> Places:
+    """Return the bodies on which no friction of a kind acts."""
 
+    def places(assembly: Assembly) -> list[str]:
+        owners = ((assembly[path.partition(".")[0]], part) for path, part in laws(assembly))
+        having = [p.between for p, law in owners if isinstance(law, kind) and isinstance(p, Tie)]
+        return [body for body in bodies(assembly) if not any(body in ends for ends in having)]
 
-def _without_spot(assembly: Assembly) -> list[str]:
-    return [body for body in turning_bodies(assembly) if not _has(SpotFriction, assembly, body)]
-
-
-def _has(kind: type[Element], assembly: Assembly, body: str) -> bool:
-    owners = ((assembly[path.partition(".")[0]], part) for path, part in laws(assembly))
-    return any(isinstance(p, kind) and isinstance(tie, Tie) and body in tie.between for tie, p in owners)
+    return places
 
 
 def _rubbing(assembly: Assembly) -> list[str]:
@@ -170,13 +168,9 @@ def _declared_friction(assembly: Assembly, place: str) -> str | None:
     return path if path and assembly.quantities()[f"{path}.sliding_effort"].source != SOURCE else None
 
 
-def _rubbing_as_declared(assembly: Assembly) -> list[str]:
-    """Return the bodies and ties with even dry friction that the deck declares."""
-    return [place for place in _rubbing(assembly) if _declared_friction(assembly, place)]
-
-
-def _turning_as_declared(assembly: Assembly) -> list[str]:
-    return [body for body in turning_bodies(assembly) if _declared_friction(assembly, body)]
+def _as_declared(places: Places) -> Places:
+    """Return the places with even dry friction that the deck declares."""
+    return lambda assembly: [each for each in places(assembly) if _declared_friction(assembly, each)]
 
 
 def _falling(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -233,12 +227,6 @@ def _geared(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
 
 
-def _between_moving_bodies(assembly: Assembly) -> list[str]:
-    """Return the ties that pull back between two bodies that move freely."""
-    ends = {name: assembly[name].between for name in loaded_ties(assembly)}  # type: ignore[attr-defined]
-    return [n for n, bodies in ends.items() if len(bodies) == 2 and set(bodies) <= {*moving_bodies(assembly)}]
-
-
 def _undamped(assembly: Assembly) -> list[str]:
     """Return the moving bodies on which no viscous friction against the resting frame is declared."""
     ties = ((path.partition(".")[0], part) for path, part in laws(assembly) if isinstance(part, Dashpot))
@@ -248,25 +236,21 @@ def _undamped(assembly: Assembly) -> list[str]:
     return [body for body in moving_bodies(assembly) if body not in damped]
 
 
-def _viscous(assembly: Assembly, place: str) -> Iterator[Edit]:
-    def law(domain: Domain) -> Element:
-        return Dashpot(damping=number(1e-3, domain.unit("{effort}*s/{motion}")), domain=domain)
+def _growing(power: int) -> Callable[[Assembly, str], Iterator[Edit]]:
+    """Return the edit that adds friction in proportion to a power of the speed, the first or the second."""
+    kind, name = ((Dashpot, "damping"), (QuadraticDrag, "drag"))[power - 1]
 
-    edited, path = _with_law(assembly, place, "viscous_friction", law)
-    around = _signals_at(assembly, place)
-    unknown = Unknown(f"{path}.damping", (0.05,), 1e-5, 10.0, f"{around.effort} / {around.speed}")
-    yield Edit(edited, (unknown,))
+    def edit(assembly: Assembly, place: str) -> Iterator[Edit]:
+        def law(domain: Domain) -> Element:
+            unit = domain.unit("{effort}*s/{motion}" if power == 1 else "{effort}*s^2/{motion}^2")
+            return kind(**{name: number(1e-3, unit)}, domain=domain)
 
+        edited, path = _with_law(assembly, place, "viscous_friction" if power == 1 else "drag", law)
+        around = _signals_at(assembly, place)
+        of = " / ".join([around.effort, *[around.speed] * power])
+        yield Edit(edited, (Unknown(f"{path}.{name}", (0.05,), 1e-4 * 0.1**power, 10.0, of),))
 
-def _drag(assembly: Assembly, place: str) -> Iterator[Edit]:
-    def law(domain: Domain) -> Element:
-        unit = domain.unit("{effort}*s^2/{motion}^2")
-        return QuadraticDrag(drag=number(1e-3, unit), domain=domain)
-
-    edited, path = _with_law(assembly, place, "drag", law)
-    around = _signals_at(assembly, place)
-    of = f"{around.effort} / {around.speed} / {around.speed}"
-    yield Edit(edited, (Unknown(f"{path}.drag", (0.05,), 1e-6, 10.0, of),))
+    return edit
 
 
 def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -334,7 +318,7 @@ stribeck_friction = Effect(
             "dry friction",
         ),
         Form(
-            _rubbing_as_declared,
+            _as_declared(_rubbing),
             _falling,
             "more friction just off standstill than is declared for all speeds",
             "Stribeck 1902; Armstrong-Hélouvry 1991",
@@ -354,7 +338,7 @@ load_dependent_friction = Effect(
             "load friction",
         ),
         Form(
-            _between_moving_bodies,
+            ties_between_bodies,
             _geared,
             "a torque against the motion of the drive alone, in proportion to what it carries",
             "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
@@ -369,7 +353,7 @@ viscous_friction = Effect(
     (
         Form(
             _undamped,
-            _viscous,
+            _growing(1),
             "an effort against the motion in proportion to the speed",
             "Newton 1687, book II",
         ),
@@ -380,7 +364,7 @@ quadratic_drag = Effect(
     "Drag that grows with the square of the speed, on a body that turns or slides.",
     40,
     _on_bodies_and_strained_pieces(
-        _drag,
+        _growing(2),
         "an effort against the motion that grows with the square of the speed",
         "Newton 1687, book II; Batchelor 1967",
         "drag",
@@ -405,21 +389,21 @@ position_dependent_friction = Effect(
     165,
     (
         Form(
-            _evenly_round,
+            _without(WavyFriction, moving_bodies),
             _spot,
             "an effort against the motion in one place only",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
             "friction of a place",
         ),
         Form(
-            _without_spot,
+            _without(SpotFriction, turning_bodies),
             _wavy,
             "a torque against the motion that is larger in one half of each turn",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
             "dry friction",
         ),
         Form(
-            _turning_as_declared,
+            _as_declared(turning_bodies),
             _waving,
             "more friction in one half of each turn than is declared, and less in the other",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",

@@ -109,6 +109,13 @@ class _Form:
             parts.append(basis * np.tanh(motion.rate / creep)[:, None])
         return np.hstack(parts)
 
+    def can_stand_for_any(self, held: Sequence[_Part], bounds: tuple[float, float, float]) -> bool:
+        """Tell whether such a table can stand for what one of the numbers in the slopes does."""
+        slopes = np.vstack([part.slope for part in held])
+        table = np.vstack([part.columns(self, bounds)[:, : self.size] for part in held])
+        left = slopes - table @ np.linalg.lstsq(table, slopes, rcond=_INDEPENDENT)[0]
+        return bool(np.any(np.sum(left**2, axis=0) < _SPANNED * np.sum(slopes**2, axis=0)))
+
     def least(self) -> Array:
         """Return the lower bounds: a spring may pull or push, friction only takes."""
         count = self.spans + 3
@@ -181,7 +188,7 @@ def unnamed_part(
         for some in (numbers, [p for p in every if p.name in named])
     )
     bounds = (low, high, creep)
-    forms = [form for form in _FORMS if not _spans(form, held, bounds)]
+    forms = [form for form in _FORMS if not form.can_stand_for_any(held, bounds)]
     chosen = _chosen(forms, parts, _Shifts.of(numbers, fit), bounds)
     if chosen is None:
         return None
@@ -311,14 +318,6 @@ def _folds(parts: Sequence[_Part]) -> list[list[_Fold]]:
         return [[_Fold(k, rows)] for k, rows in enumerate(everything)]
     pieces = [np.array_split(rows, _FOLDS) for rows in everything]
     return [[_Fold(k, piece[f]) for k, piece in enumerate(pieces)] for f in range(_FOLDS)]
-
-
-def _spans(form: _Form, held: Sequence[_Part], bounds: tuple[float, float, float]) -> bool:
-    """Tell whether a form of table can stand for what one of the numbers in the slopes does."""
-    slopes = np.vstack([part.slope for part in held])
-    table = np.vstack([part.columns(form, bounds)[:, : form.size] for part in held])
-    left = slopes - table @ np.linalg.lstsq(table, slopes, rcond=_INDEPENDENT)[0]
-    return bool(np.any(np.sum(left**2, axis=0) < _SPANNED * np.sum(slopes**2, axis=0)))
 
 
 def _chosen(

@@ -246,7 +246,7 @@ class Comparison:
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
         self.bench, self.sizes = bench, sizes
-        self._slowest: dict[str, float] = {}
+        self._slowest: dict[str, float] = {}  # least speed that the records resolve, by the name of the body
         self._fit = HypothesisFit(bench, sizes)
         self._polished: WeakKeyDictionary[Hypothesis, Hypothesis] = WeakKeyDictionary()
         self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
@@ -271,22 +271,17 @@ class Comparison:
         for unknown in candidate.unknowns:
             if unknown.name.partition("[")[0] not in known:
                 raise unknown_name(f"effect '{candidate.effect}': number", unknown.name, known)
-        slowest = self._slowest_of_bodies(hypothesis.assembly)
-        signed = with_resolved_signs(hypothesis.assembly, candidate.assembly, slowest)
+        if not self._slowest:
+            speeds = self.bench.slowest()
+            motions = measured_signals(flatten(hypothesis.assembly), self.bench.records.signals)
+            self._slowest = {m.body.name: speeds[m.signal] for m in motions if m.body and m.signal in speeds}
+        signed = with_resolved_signs(hypothesis.assembly, candidate.assembly, self._slowest)
         before = _edited(hypothesis, replace(candidate, assembly=signed))
         names = {u.name for u in candidate.unknowns}
         groups = [g for g in self._groups(before) if any(names & set(each.free) for each in g)]
         if wanted and not any(each.block.name in wanted for g in groups for each in g):
             return None
         return self._refitted(before, groups, candidate.unknowns)
-
-    def _slowest_of_bodies(self, assembly: Assembly) -> dict[str, float]:
-        """Return the least speed that the records resolve, by the name of the body."""
-        if not self._slowest:
-            speeds = self.bench.slowest()
-            measured = measured_signals(flatten(assembly), self.bench.records.signals)
-            self._slowest = {m.body.name: speeds[m.signal] for m in measured if m.body and m.signal in speeds}
-        return self._slowest
 
     def polished(self, hypothesis: Hypothesis, *, released: Collection[str] = ()) -> Hypothesis:
         """Refit a hypothesis to all samples, from where it stands.

@@ -73,27 +73,22 @@ class Revision:
 
         A fault of a sensor that bends a reading leaves too where a smooth law of what is read does as much.
         """
-        place = len(steps) - 1
+        place, excesses_of = len(steps) - 1, self.trials.excesses_of
         while len(steps) > 1 and place >= 0:
-            fewer = self._without(steps, place)
-            if fewer and (why := self._against(steps, place, fewer[-1].chosen)):
-                added = steps[place].chosen.newest
-                beside = fewer[-1].chosen.names
-                self.trials.skipped.append(Skipped(added.effect, added.location, beside, "; ".join(why)))
-                steps, place = fewer, len(fewer)
+            if fewer := self._without(steps, place):
+                without, every = fewer[-1].chosen, steps[-1].chosen
+                added = every.added[place]
+                # Its numbers are asked on all samples.
+                change = Change(self.trials.criteria, excesses_of(without), excesses_of(every))
+                why = list(change.objections(Standing()))
+                if added.bends_reading and self._is_smooth_law(steps, place, without):
+                    why.append("a smooth law of what is read explains as much")
+                if why:
+                    reason = "; ".join(why)
+                    self.trials.skipped.append(Skipped(added.effect, added.location, without.names, reason))
+                    steps, place = fewer, len(fewer)
             place -= 1
         return steps
-
-    def _against(self, steps: Sequence[Step], place: int, fewer: Hypothesis) -> list[str]:
-        """Return in words what speaks against an effect beside all others."""
-        every, criteria = steps[-1].chosen, self.trials.criteria
-        change = Change(criteria, self.trials.excesses_of(fewer), self.trials.excesses_of(every))
-        added = every.added[place]
-        # Its numbers are asked on all samples.
-        why = list(change.objections(Standing()))
-        if added.bends_reading and self._is_smooth_law(steps, place, fewer):
-            why.append("a smooth law of what is read explains as much")
-        return why
 
     def _is_smooth_law(self, steps: Sequence[Step], place: int, fewer: Hypothesis) -> bool:
         """Tell whether a table over the motion does what a sensor's fault does, beside a named law."""
@@ -299,12 +294,21 @@ class _Search:
         """
         if not steps:
             return []
-        first, last = (self.trials.excesses_of(each) for each in (start, steps[-1].chosen))
-        left = Change(self.trials.criteria, first, last).unexplained()
-        kept = [s for s in steps if s.block not in left or self._stands_out(s)]
+        excesses_of, criteria = self.trials.excesses_of, self.trials.criteria
+        first, last = (excesses_of(each) for each in (start, steps[-1].chosen))
+        left = Change(criteria, first, last).unexplained()
+
+        def stands_out(step: Step) -> bool:
+            """Tell whether an effect explains plainly more than any other, and than those in its class."""
+            own = excesses_of(step.chosen)[step.block].excess
+            alike = (excesses_of(each)[step.block].excess / max(own, 1.0) for each in step.equals)
+            nearest = min(alike, default=math.inf)
+            return criteria.is_outstanding(min(step.distance, math.log(max(nearest, 1e-300))))
+
+        kept = [s for s in steps if s.block not in left or stands_out(s)]
         if len(kept) == len(steps):
             return steps
-        shares, least = explained(first, last), self.trials.criteria.closed_share
+        shares, least = explained(first, last), criteria.closed_share
         why = {
             (step.chosen.newest.effect, step.chosen.newest.location): (
                 f"all that was found leaves more of '{step.block}' than a name may: it explains "
@@ -315,13 +319,6 @@ class _Search:
         }
         self.tried = tuple(_with_objection(each, why) for each in self.tried)
         return Revision(self.trials, start).rebuilt(kept)
-
-    def _stands_out(self, step: Step) -> bool:
-        """Tell whether an effect explains plainly more than any other, also of those in a class with it."""
-        own, criteria = self.trials.excesses_of(step.chosen)[step.block].excess, self.trials.criteria
-        alike = (self.trials.excesses_of(each)[step.block].excess / max(own, 1.0) for each in step.equals)
-        nearest = min(alike, default=math.inf)
-        return criteria.is_outstanding(min(step.distance, math.log(max(nearest, 1e-300))))
 
     def _forward(self, start: Hypothesis) -> list[Step]:
         """Return the effects that may be named, one after the other."""

@@ -55,10 +55,12 @@ def with_told_sampling(records: RecordSet, seen: Sequence[SeenBlock]) -> RecordS
     """
     for column in records.columns:
         if column.sampling is None:
-            inferred, remark = _read_as(_asked(records, seen, column.signal))
+            likelihood = _asked(records, seen, column.signal)
+            inferred, remark = likelihood.taken() if likelihood else (SAMPLED, "")
             records = with_sampling(records, {column.signal: inferred})
         elif column.declared and column.sampling is not SAMPLED:
-            remark = _contradicted(column.sampling, _asked(records, seen, column.signal))
+            likelihood = _asked(records, seen, column.signal)
+            remark = likelihood.against(column.sampling) if likelihood else ""
         else:
             continue
         if remark:
@@ -76,41 +78,6 @@ def with_sampling(records: RecordSet, sampling: Mapping[str, Sampling]) -> Recor
 def _as(record: Record, sampling: Mapping[str, Sampling]) -> Record:
     known = {**record.sampling, **sampling}
     return replace(record, sampling={s: form for s, form in known.items() if form is not SAMPLED})
-
-
-def _read_as(likelihood: _Likelihood | None) -> tuple[Sampling, str]:
-    """Return how a signal runs between its samples, and the remark on it; none where it is sampled."""
-    if likelihood is None or likelihood.loss(SAMPLED) < _PLAINLY:
-        return SAMPLED, ""
-    late = f"{likelihood.shift:.2f} ± {likelihood.error:.2g} samples behind its stamps"
-    if abs(likelihood.shift) > _MOST:
-        return SAMPLED, (
-            f"acts {late}; half a sample of each channel may be their clocks and holds, what is beyond is a "
-            "delay of the machine; to tell them apart, write between_samples in records.toml"
-        )
-    form = likelihood.likeliest
-    words, others = f"is taken as {form.name}: it {form.words}", likelihood.losses_of_others(form)
-    if likelihood.loss(form) >= _NO_FORM:
-        form = shifted(likelihood.shift)
-        words = f"is read {abs(form.late):.2g} of a sample {'earlier' if form.late > 0.0 else 'later'}"
-    return form, (
-        f"{words}; nothing says how it runs between its samples, and the records show that it acts {late} "
-        f"({others}); to decide it, write between_samples in records.toml"
-    )
-
-
-def _contradicted(declared: Sampling, likelihood: _Likelihood | None) -> str:
-    """Return the remark that the records speak against what is declared; none where they do not."""
-    if likelihood is None or abs(likelihood.shift) > _MOST or likelihood.likeliest.late == declared.late:
-        return ""
-    form = likelihood.likeliest
-    if likelihood.at(declared.late) < _NO_FORM:
-        return ""
-    return (
-        f"is declared {declared.name}, but the records show that it acts {likelihood.shift:.2f} ± "
-        f"{likelihood.error:.2g} samples behind its stamps ({likelihood.losses_of_others(form)}); it is read "
-        f"as declared: check between_samples in records.toml, {form.name} would fit"
-    )
 
 
 class _Rows(NamedTuple):
@@ -137,9 +104,38 @@ class _Likelihood(NamedTuple):
         """Return the logarithm of the likelihood that a form has less than the best shift."""
         return self.of_shift - self.of_forms[_FORMS.index(form)]
 
-    def at(self, late: float) -> float:
-        """Return the same for a signal that acts so many samples behind its stamps."""
-        return 0.5 * ((late - self.shift) / self.error) ** 2
+    def taken(self) -> tuple[Sampling, str]:
+        """Return how a signal runs between its samples, and the remark on it; none where it is sampled."""
+        if self.loss(SAMPLED) < _PLAINLY:
+            return SAMPLED, ""
+        late = f"{self.shift:.2f} ± {self.error:.2g} samples behind its stamps"
+        if abs(self.shift) > _MOST:
+            return SAMPLED, (
+                f"acts {late}; half a sample of each channel may be their clocks and holds, what is "
+                "beyond is a delay of the machine; to tell them apart, write between_samples in records.toml"
+            )
+        form = self.likeliest
+        words, others = f"is taken as {form.name}: it {form.words}", self.losses_of_others(form)
+        if self.loss(form) >= _NO_FORM:
+            form = shifted(self.shift)
+            words = f"is read {abs(form.late):.2g} of a sample {'earlier' if form.late > 0.0 else 'later'}"
+        return form, (
+            f"{words}; nothing says how it runs between its samples, and the records show that it acts "
+            f"{late} ({others}); to decide it, write between_samples in records.toml"
+        )
+
+    def against(self, declared: Sampling) -> str:
+        """Return the remark that the records speak against what is declared; none where they do not."""
+        form = self.likeliest
+        if abs(self.shift) > _MOST or form.late == declared.late:
+            return ""
+        if 0.5 * ((declared.late - self.shift) / self.error) ** 2 < _NO_FORM:
+            return ""
+        return (
+            f"is declared {declared.name}, but the records show that it acts {self.shift:.2f} ± "
+            f"{self.error:.2g} samples behind its stamps ({self.losses_of_others(form)}); it is read "
+            f"as declared: check between_samples in records.toml, {form.name} would fit"
+        )
 
     def losses_of_others(self, form: Sampling) -> str:
         """Return in words how much less likely the other forms are than one of them."""

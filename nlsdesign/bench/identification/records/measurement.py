@@ -376,8 +376,15 @@ def load_records(
     records = [record for one in whole for record in one.records]
     findings = tuple(finding for one in whole for finding in one.findings)
     remarks = [remark for one in whole for remark in one.remarks]
-    remarks += [_left_out(file) for file in tables if file not in runs]
-    remarks += [_not_read(file) for file in unread_tables(folder)]
+    remarks += [
+        Finding(file.name, "has no column of time, so it is not taken for a record")
+        for file in tables
+        if file not in runs
+    ]
+    remarks += [
+        Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
+        for file in unread_tables(folder)
+    ]
     chosen, coarser = _with_counts_as_seen(chosen, records)
     remarks += coarser
     held = tuple(hold_out) or chosen.held_out
@@ -451,14 +458,6 @@ def _without_time(where: str, tables: Iterable[RecordTable]) -> MeasurementError
                 next_step="name it 't_s' or 't_ms', or give its unit in records.toml: [time]",
             )
     return MeasurementError(where, "has no column of time", next_step="name it 't_s' or 'time [s]'")
-
-
-def _left_out(file: Path) -> Finding:
-    return Finding(file.name, "has no column of time, so it is not taken for a record")
-
-
-def _not_read(file: Path) -> Finding:
-    return Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
 
 
 def _with_counts_as_seen(chosen: ColumnMap, records: Sequence[Record]) -> tuple[ColumnMap, list[Finding]]:

@@ -12,7 +12,6 @@ record drives.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -131,14 +130,10 @@ def shifted(samples: float) -> Sampling:
 
     ``samples``: at most one, of either sign.
     """
-    offsets = np.arange(-_REACH, _REACH + 1)
-    weights = _lagrange(offsets.tolist(), -samples)
-    taps = tuple(zip(offsets.tolist(), weights, strict=True))
+    places = range(-_REACH, _REACH + 1)
+    # The weights of Lagrange: of the values at whole places in that of their polynomial in between.
+    taps = tuple(
+        (own, float(np.prod([(-samples - other) / (own - other) for other in places if other != own])))
+        for own in places
+    )
     return Sampling("shifted", f"acts {samples:.2g} samples behind its stamps", taps, samples)
-
-
-def _lagrange(offsets: Sequence[int], at: float) -> list[float]:
-    """Return the weights of values at whole places in the value of their polynomial at a place."""
-    return [
-        float(np.prod([(at - other) / (own - other) for other in offsets if other != own])) for own in offsets
-    ]
