@@ -7,6 +7,8 @@ It never adds an effect to a machine: what does not fit is refused, or widens wh
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, Instruments, LoadCellTest
 from .calibrated_deck import calibrated, read_joint_numbers, shown_numbers, write_calibration
 from .estimate import CalibrationRecords, estimate, load_calibration
+from .kinds import KINDS as KINDS
+from .kinds import record_findings, write_plan
 from .plan import CalibrationPlan, what_calibration_buys
 
 __all__ = [
@@ -21,7 +23,9 @@ __all__ = [
     "estimate",
     "load_calibration",
     "read_joint_numbers",
+    "record_findings",
     "shown_numbers",
     "what_calibration_buys",
     "write_calibration",
+    "write_plan",
 ]

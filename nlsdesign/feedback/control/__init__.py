@@ -1,6 +1,7 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
 from .closed_loop import ClosedLoop, encoder_loop, joined
+from .evaluation.cascade_loop import cascade_loops
 from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .evaluation.margins import (
@@ -28,6 +29,7 @@ from .evaluation.responses import (
     tracking,
     zero_torque,
 )
+from .evaluation.whole_evaluation import BIAS as BIAS
 from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, evaluate_loop
 from .laws.known_drive import check_torque, largest_torque, only_side
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
@@ -72,6 +74,7 @@ __all__ = [
     "ZeroTorque",
     "bandwidth_against_impedance",
     "best_choices",
+    "cascade_loops",
     "check_torque",
     "coupled_stability",
     "encoder_loop",

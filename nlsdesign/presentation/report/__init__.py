@@ -1,6 +1,13 @@
 """Reports: sections composed into one self-contained file of HTML."""
 
-from .command_pages import write_analysis_report, write_fit_report, write_observer_report
+from .command_pages import SIZES as SIZES
+from .command_pages import (
+    write_analysis_report,
+    write_diagnosis_report,
+    write_fit_report,
+    write_observer_report,
+    write_simulation_report,
+)
 from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
 from .diagnosis_sections import regeneration_sections, verdict_sections
 from .equations_section import EquationsSection
@@ -52,7 +59,9 @@ __all__ = [
     "write_analysis_report",
     "write_comparison",
     "write_design_report",
+    "write_diagnosis_report",
     "write_fit_report",
     "write_observer_report",
     "write_report",
+    "write_simulation_report",
 ]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign import regeneration
+from nlsdesign import export
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.bench.identification.parameters import declared_parameter
@@ -19,7 +19,13 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.presentation import report
-from nlsdesign.regeneration import ObserverChoice, Regeneration, regenerate, write_regeneration
+from nlsdesign.regeneration import (
+    ObserverChoice,
+    Regeneration,
+    regenerate,
+    regenerated_observer,
+    write_regeneration,
+)
 from nlsdesign.simulation import Trace
 
 TIME = np.arange(1500) * 0.002
@@ -64,7 +70,7 @@ CHOICE = ObserverChoice(sample_time=2e-3)
 @pytest.fixture(scope="module")
 def result() -> Regeneration:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(regeneration, "DRAWS", 3)
+        patch.setattr(regenerated_observer, "DRAWS", 3)
         better = flatten(machine(TRUE))
         parameter = declared_parameter(better.variable("spring.stiffness"))
         fit = Fit((parameter,), {"spring.stiffness": TRUE}, np.array([[1e-6]]), 0.0, {}, True)
@@ -104,10 +110,12 @@ def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Pat
 def test_observer_and_plant_are_written(
     result: Regeneration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(regeneration, "export_fmu", lambda model, path: path)
-    files, reasons = write_regeneration(result, tmp_path)
+    monkeypatch.setattr(export, "export_fmu", lambda model, path: path)
+    written, files = write_regeneration(result, tmp_path)
     assert {p.name for p in files} >= {"observer.c", "observer.h", "observer.fmu", "plant.fmu"}
-    assert reasons == ()
+    assert written.reasons == ()
+    saved = json.loads((tmp_path / "regeneration.json").read_text(encoding="utf-8"))
+    assert saved["files"] == [str(path) for path in files]
     assert (tmp_path / "c" / "observer.c").is_file()
 
 
