@@ -42,9 +42,7 @@ def flat(deck: str, model: str = "") -> None:
         except nls.errors.NlsError as error:
             slopes = {"none": str(error)}
         told["points"].append({"state": state, "inputs": inputs, "values": values, "slopes": slopes})
-    # A spread is an object; what it is made of stands in its text.
-    text = json.dumps(told, indent=1, ensure_ascii=False, default=repr)
-    Path("flat.json").write_text(text, encoding="utf8")
+    Path("flat.json").write_text(json.dumps(told, indent=1, ensure_ascii=False, default=str), encoding="utf8")
 
 
 def views(deck: str) -> None:
