@@ -15,8 +15,8 @@ from weakref import WeakKeyDictionary
 from ....components.assembly.named_parts import Assembly
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, unknown_name
-from ....foundation.processes import parallel_map
 from ....foundation.quantity import Quantity
+from ....foundation.work_sharing import parallel_map
 from ....model import Variable, flatten
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_noise import BlockNoise
