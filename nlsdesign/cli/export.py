@@ -11,6 +11,7 @@ import click
 
 from .options import (
     DECK_HELP,
+    controller_of,
     deck_option,
     flash_options,
     json_option,
@@ -121,24 +122,6 @@ def sampled_part(
         plant, sample_time, part_of=lambda observer: joined(observer, controller), **others
     )
     return "torque_loop", joined(sized.designed.model, controller), sized.findings()
-
-
-def controller_of(
-    plant: FlatModel,
-    sample_time: float,
-    *,
-    law: str,
-    bandwidth: float | None,
-    velocity_bandwidth: float | None,
-) -> FlatModel:
-    """Return the torque controller that the options of a command ask for."""
-    from ..feedback.control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
-
-    if law == "pid" and bandwidth is not None:
-        raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
-    outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
-    inner = VelocityLoop(bandwidth=velocity_bandwidth)
-    return torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
 
 
 @export.command(

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import NlsError
-from .export import controller_of, export
+from .export import export
 from .options import (
+    controller_of,
     deck_option,
     json_option,
     kind_option,

@@ -6,28 +6,25 @@ nothing that a room below can decide alone.
 """
 
 from .exported_machine import MACHINE as MACHINE
-from .exported_machine import ExportedMachine, export_machine
-from .flash import SizedObserver, require_flash, sized_observer
+from .exported_machine import export_machine
+from .flash import require_flash as require_flash
+from .flash import sized_observer
 from .range_remarks import beyond_contour as beyond_contour
-from .range_remarks import range_remarks, swept_angle, usual_last
-from .readiness import Readiness, readiness
+from .range_remarks import range_remarks
+from .range_remarks import swept_angle as swept_angle
+from .range_remarks import usual_last as usual_last
+from .readiness import Readiness as Readiness
+from .readiness import errors_while_running as errors_while_running
+from .readiness import readiness
 from .regenerated_observer import ObserverChoice, Regeneration, regenerate, write_regeneration
-from .running_errors import errors_while_running
 
 __all__ = [
-    "ExportedMachine",
     "ObserverChoice",
-    "Readiness",
     "Regeneration",
-    "SizedObserver",
-    "errors_while_running",
     "export_machine",
     "range_remarks",
     "readiness",
     "regenerate",
-    "require_flash",
     "sized_observer",
-    "swept_angle",
-    "usual_last",
     "write_regeneration",
 ]

@@ -75,7 +75,6 @@ def sized_observer(
     flash: int | None = None,
     table_error: float | None = None,
     part_of: Callable[[FlatModel], FlatModel] = lambda observer: observer,
-    processor: Processor | None = None,
     **chosen: Any,
 ) -> SizedObserver:
     """Design an observer whose code and tables keep a size.
@@ -94,8 +93,6 @@ def sized_observer(
         Torque error in N·m that the table may cause; by default 0.02 % of the largest torque.
     part_of
         Makes what is exported of the observer; by default that is the observer alone.
-    processor
-        For which the code is compiled; a Cortex-M4F by default.
     **chosen
         As for :func:`~nlsdesign.feedback.observer.designed_observer`: kind, spring, measured.
 
@@ -106,7 +103,7 @@ def sized_observer(
     ExportError
         If a size is asked for and no compiler is installed.
     """
-    number, board = 4 if real == "float" else 8, processor or _usual_processor()
+    number, board = 4 if real == "float" else 8, _usual_processor()
 
     def designed(most: int | None) -> DesignedObserver:
         grid: GridByTorqueError = replace(
@@ -151,30 +148,9 @@ def sized_observer(
     )  # fmt: skip
 
 
-def require_flash(
-    controller: FlatModel, real: str, most: int | None = None, *, processor: Processor | None = None
-) -> str:
-    """Return in a sentence how much flash a controller without tables takes.
-
-    Parameters
-    ----------
-    controller
-        Sampled flat model.
-    real
-        Type of the numbers in C, ``"float"`` or ``"double"``.
-    most
-        Bytes that it may take; ``None`` for any size.
-    processor
-        For which the code is compiled; a Cortex-M4F by default.
-
-    Raises
-    ------
-    ValueRangeError
-        If it takes more.
-    ExportError
-        If a size is asked for and no compiler is installed.
-    """
-    board = processor or _usual_processor()
+def require_flash(controller: FlatModel, real: str, most: int | None = None) -> str:
+    """Return in a sentence how much flash a controller without tables takes; refuse one that takes more."""
+    board = _usual_processor()
     size = measured_flash(controller, real, board, needed=most is not None)
     if size is None:
         return "the flash of the code was not measured: no compiler"

@@ -55,13 +55,7 @@ def range_remarks(
 
 
 def usual_last(model: FlatModel) -> float:
-    """Return the angle in rad to which an analysis goes by default: the end of the contour, 50° at most.
-
-    Parameters
-    ----------
-    model
-        Its cams say where a contour ends.
-    """
+    """Return the angle in rad to which an analysis goes by default: the end of the contour, 50° at most."""
     return min(math.radians(50.0), whole_contour(model).upper)
 
 
@@ -84,20 +78,7 @@ def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
 
 
 def swept_angle(model: FlatModel, measured: str | None) -> str:
-    """Return the name of the angle that an analysis goes over.
-
-    Parameters
-    ----------
-    model
-        Flat model.
-    measured
-        Name of the state; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnitError
-        If the state is no angle.
-    """
+    """Return the name of the angle that an analysis goes over; refuse a state that is no angle."""
     name = measured_motion(model, measured)
     unit = model.variable(name).unit
     if unit != "rad":

@@ -1,4 +1,7 @@
-"""Which commands a deck is ready for, found out with what the commands themselves call first."""
+"""What a deck is good for: which commands it is ready for, and how well its torque could be known.
+
+Readiness is found out with what the commands themselves call first.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,18 @@ from ..design import ExponentialTorque
 from ..design.optimisation.solve import GOALS, USUAL, Wanted
 from ..feedback.analysis.rest_points import rest_points
 from ..feedback.control import ScheduledTorque, torque_controller
-from ..feedback.observer import CascadeGain, FixedGrid, design_observer_with_details
+from ..feedback.observer import (
+    CascadeGain,
+    FixedGrid,
+    design_observer_with_details,
+    least_torque_error,
+    observer_bench,
+)
 from ..feedback.observer.scheduling.scheduled import whole_contour
-from ..foundation.errors import NlsError
+from ..foundation.errors import ArrangementError, NlsError, ValueRangeError
 from ..model import FlatModel, flatten
 from ..model.roles import series_cam, series_spring
+from ..simulation import Prior
 from .range_remarks import swept_angle
 
 _SAMPLE_TIME = 1e-3
@@ -99,6 +109,18 @@ def readiness(declared: Assembly) -> list[Readiness]:
     }
     reasons = {check: _refusal(check) for check in dict.fromkeys(asked.values())}
     return [Readiness(name, reasons[check]) for name, check in asked.items()]
+
+
+def errors_while_running(actuator: Assembly) -> dict[str, Callable[[Prior], float]]:
+    """Return the least error of the torque that any observer could have, for the plan of a calibration.
+
+    Empty without a spring or an encoder: such a plan speaks of the resting spring alone.
+    """
+    try:
+        least = least_torque_error(observer_bench(flatten(actuator)))
+    except (ArrangementError, ValueRangeError):
+        return {}
+    return {"torque while running, best estimate": least}
 
 
 def _begin_design(declared: Assembly, model: FlatModel) -> None:

@@ -4,12 +4,12 @@
 It never adds an effect to a machine: what does not fit is refused, or widens what is known.
 """
 
+from .bench_test import KINDS as KINDS
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, Instruments, LoadCellTest
 from .calibrated_deck import calibrated, read_joint_numbers, shown_numbers, write_calibration
 from .estimate import CalibrationRecords, estimate, load_calibration
-from .kinds import KINDS as KINDS
-from .kinds import record_findings, write_plan
-from .plan import CalibrationPlan, what_calibration_buys
+from .estimate import record_findings as record_findings
+from .plan import CalibrationPlan, what_calibration_buys, write_plan
 
 __all__ = [
     "CalibrationPlan",
@@ -23,7 +23,6 @@ __all__ = [
     "estimate",
     "load_calibration",
     "read_joint_numbers",
-    "record_findings",
     "shown_numbers",
     "what_calibration_buys",
     "write_calibration",

@@ -1,7 +1,6 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
 from .closed_loop import ClosedLoop, encoder_loop, joined
-from .evaluation.cascade_loop import cascade_loops
 from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .evaluation.margins import (
@@ -30,7 +29,7 @@ from .evaluation.responses import (
     zero_torque,
 )
 from .evaluation.whole_evaluation import BIAS as BIAS
-from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, evaluate_loop
+from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, cascade_loops, evaluate_loop
 from .laws.known_drive import check_torque, largest_torque, only_side
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
 from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw

@@ -29,6 +29,7 @@ from .loop_evaluation import (
     impedance_over_frequency,
     margins_over_angle,
     torque_responses,
+    write_loop_figures,
 )
 from .loop_evaluation import passivity_words as passivity_words
 from .over_angle import errors_over_spread, observability_over_angle, ranked_intervals, stability_over_angle
@@ -36,7 +37,6 @@ from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_erro
 from .style import compact
 from .svg import inline_svg, write_figures
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
-from .written_figures import write_loop_figures
 
 __all__ = [
     "CamMotion",

@@ -9,7 +9,7 @@ from .command_pages import (
     write_simulation_report,
 )
 from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
-from .diagnosis_sections import regeneration_sections, verdict_sections
+from .diagnosis_sections import verdict_sections
 from .equations_section import EquationsSection
 from .page import write_report
 from .sections import (
@@ -53,7 +53,6 @@ __all__ = [
     "differing_numbers",
     "key_figures",
     "numbers_table",
-    "regeneration_sections",
     "tolerance_sections",
     "verdict_sections",
     "write_analysis_report",

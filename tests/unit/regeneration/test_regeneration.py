@@ -19,6 +19,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.presentation import report
+from nlsdesign.presentation.report.diagnosis_sections import regeneration_sections
 from nlsdesign.regeneration import (
     ObserverChoice,
     Regeneration,
@@ -103,7 +104,7 @@ def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Pat
     assert (len(result.observer.states) > 20) == (least[1] == "adaptive")
     written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert written["nominal"]["before"] == result.nominal[0]
-    page = report.write_report(tmp_path / "r.html", *report.regeneration_sections(result, {}), title="t")
+    page = report.write_report(tmp_path / "r.html", *regeneration_sections(result, {}), title="t")
     assert nominal.partition(": ")[2].removesuffix(".") in page.read_text(encoding="utf-8")
 
 
@@ -127,7 +128,7 @@ def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:
     assert "spring" in lacking.reasons[0]
     assert lacking.words() == ()
     assert math.isnan(lacking.nominal[0])
-    assert report.regeneration_sections(lacking, {})
+    assert regeneration_sections(lacking, {})
 
 
 def test_without_a_measured_torque_there_is_an_observer_but_no_error() -> None:
