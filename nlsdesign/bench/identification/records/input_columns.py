@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from ....foundation.arrays import Array
+from ....foundation.csv_tables import heads_with_units, read_csv
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import parse_unit, same_dimension, typeset_unit
 from ....foundation.written_numbers import name_and_unit
 from ....model import FlatModel
-from .csv_files import heads_with_units, read_csv, times_among
+from .column_heads import times_among
 
 
 def read_input_columns(file: Path, model: FlatModel) -> tuple[Array, dict[str, Array]]:
@@ -19,10 +20,7 @@ def read_input_columns(file: Path, model: FlatModel) -> tuple[Array, dict[str, A
 
     Heads are ``time [s]`` and ``name [unit]``, as a simulation writes them; other columns are passed over.
     """
-    try:
-        table = read_csv(file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeasurementError(str(file), f"cannot be read: {error}", next_step="name a CSV file") from None
+    table = read_csv(file)
     heads = dict(zip(heads_with_units(file.name, table.heads, table.units), table.heads, strict=True))
     times = times_among(list(heads))
     if not times:
