@@ -95,7 +95,7 @@ class RecordsDescription:
     files, columns
         What was found.
     records
-        The records as :func:`~.measurement.load_records` reads them with this mapping; ``None`` where it cannot.
+        As :func:`~.measurement.load_records` reads them with this mapping; ``None`` where it cannot.
     problem
         Why it cannot; empty where it can.
     """
