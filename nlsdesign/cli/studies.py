@@ -20,10 +20,10 @@ from ..foundation.errors import NlsError, brief, unknown_name
 from ..foundation.locations import bundled, folder
 from ..foundation.quantity import with_unit
 from ..foundation.text_files import is_there, listed_files, make_folder, text_of
-from .named_paths import NamedPath
-from .output import examples, json_option, show_json, show_table
+from .options import json_option, workers_option
+from .output import examples, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files
-from .workers import workers_option
+from .typed_values import NamedPath
 
 _SIGNATURE = "def main(out, fast=False): ..."
 

@@ -24,6 +24,8 @@ from .table_files import RecordTable, read_table, table_files
 _LONGEST_STEP = 0.5
 """Samples further apart than this, in the numbers of a clock without unit, are taken for milliseconds."""
 
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True)
 class DescribedColumn:
@@ -113,6 +115,14 @@ class RecordsDescription:
         """Heads of further clocks."""
         return tuple(dict.fromkeys(c.clock for c in self.columns if c.clock))
 
+    @property
+    def undecided(self) -> tuple[DescribedColumn, ...]:
+        """Columns of which neither head nor deck tell the one signal that they hold."""
+        claims = [column.signals for column in self.columns]
+        return tuple(
+            c for c in self.columns if not c.unit or len(c.signals) != 1 or claims.count(c.signals) > 1
+        )
+
     def mapping(self) -> str:
         """Return a ``records.toml`` to begin with; what is not certain is a comment."""
         lines = [
@@ -132,8 +142,7 @@ class RecordsDescription:
         return "\n".join(lines) + "\n"
 
     def _table(self, column: DescribedColumn) -> list[str]:
-        claims = sum(c.signals == column.signals for c in self.columns)
-        certain = len(column.signals) == 1 and column.unit and claims == 1
+        certain = column not in self.undecided
         mark = "" if certain else "# "
         choices = " or ".join(column.signals) or "no sensor of the deck reads in its unit"
         lines = (
@@ -234,7 +243,9 @@ def _columns(table: RecordTable, time: str, model: FlatModel) -> list[DescribedC
         smallest, largest = (float(f(values)) if len(values) else np.nan for f in (np.min, np.max))
         signals = signals_for(name, unit, model) if unit else ()
         clock = "" if before[-1] == time else before[-1]
-        noise, drives = noise_of(values), any(signal in inputs for signal in signals)
+        drives = any(signal in inputs for signal in signals)
+        # Rounding of sums is no noise.
+        noise = noise_of(values) if noise_of(values) > _ROUNDING * (largest - smallest) else 0.0
         result.append(
             DescribedColumn(head, unit, signals, clock, noise, quantum_of(values), smallest, largest, drives)
         )
