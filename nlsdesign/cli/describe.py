@@ -41,60 +41,60 @@ def describe(folder: Path, deck_name: str, out: Path, as_json: bool) -> None:
     from ..foundation.deck import load_deck
     from ..model import flatten
 
-    found = describe_records(folder, flatten(declare(load_deck(deck_name))))
-    write_text(out, found.mapping())
+    description = describe_records(folder, flatten(declare(load_deck(deck_name))))
+    write_text(out, description.mapping())
     if as_json:
-        show_json({**_content(found), "written": str(out)})
+        show_json({**_content(description), "written": str(out)})
     else:
-        _show(found)
+        _show(description)
         click.echo(f"written: {out}; put it beside the records as records.toml, or name it by --mapping")
         words = ("fit", "--deck", deck_name, "--records", folder, "--mapping", out)
         click.echo(f"next: {next_command(*words)}")
-    if found.problem or found.undecided:
+    if description.problem or description.undecided:
         raise click.exceptions.Exit(1)
 
 
-def _content(found: RecordsDescription) -> dict[str, object]:
-    notes = (*found.records.findings, *found.records.remarks) if found.records else ()
-    roles = {r.name: r.role for r in found.records.records} if found.records else {}
+def _content(description: RecordsDescription) -> dict[str, object]:
+    notes = (*description.records.findings, *description.records.remarks) if description.records else ()
+    roles = {r.name: r.role for r in description.records.records} if description.records else {}
     return {
-        "time": found.time,
-        "time_unit": found.time_unit,
-        "files": [asdict(file) for file in found.files],
-        "columns": [asdict(column) for column in found.columns],
+        "time": description.time,
+        "time_unit": description.time_unit,
+        "files": [asdict(file) for file in description.files],
+        "columns": [asdict(column) for column in description.columns],
         "records": roles,
         "remarks": [f"{note.place}: {note.text}" for note in notes],
-        "undecided": [column.head for column in found.undecided],
-        "problem": found.problem,
+        "undecided": [column.head for column in description.undecided],
+        "problem": description.problem,
     }
 
 
-def _show(found: RecordsDescription) -> None:
+def _show(description: RecordsDescription) -> None:
     columns = ("file", "rows", "seconds", "samples/s", "gaps", "remark")
     rows = [
         (f.name, str(f.rows), *(_number(v) for v in (f.seconds, f.rate)), str(f.gaps), f.problem)
-        for f in found.files
+        for f in description.files
     ]
     show_table("Files", columns, rows)
     heads = ("column", "unit", "signal", "clock", "from", "to", "noise", "count")
     cells = [
         (
-            *(c.head, c.unit or "none", " or ".join(c.signals) or "none", c.clock or found.time),
+            *(c.head, c.unit or "none", " or ".join(c.signals) or "none", c.clock or description.time),
             *(_number(v) for v in (c.smallest, c.largest, c.noise, c.quantum)),
         )
-        for c in found.columns
+        for c in description.columns
     ]
     show_table("Columns, in the units of the files", heads, cells)
-    if found.records is not None:
-        named = [(r.name, str(len(r.trace)), r.role.replace("_", " ")) for r in found.records.records]
+    if description.records is not None:
+        named = [(r.name, str(len(r.trace)), r.role.replace("_", " ")) for r in description.records.records]
         show_table("Records", ("record", "rows", "used for"), named)
-        for note in (*found.records.findings, *found.records.remarks):
+        for note in (*description.records.findings, *description.records.remarks):
             click.echo(f"{note.place}: {note.text}")
-    for column in found.undecided:
+    for column in description.undecided:
         choices = " or ".join(column.signals) or "no sensor of the deck reads in its unit"
         click.echo(f"undecided: '{column.head}': {choices if column.unit else 'its head names no unit'}")
-    if found.problem:
-        click.echo(f"cannot be read as it stands: {found.problem}")
+    if description.problem:
+        click.echo(f"cannot be read as it stands: {description.problem}")
 
 
 def _number(value: float) -> str:

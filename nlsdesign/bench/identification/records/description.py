@@ -192,11 +192,11 @@ def describe_records(folder: Path, model: FlatModel) -> RecordsDescription:
     time, unit, guessed = _clock(whole)
     files = [_described(name, table, time, unit) for name, table in tables.items()]
     files += [DescribedFile(name, 0, np.nan, np.nan, 0, text) for name, text in problems.items()]
-    found = RecordsDescription(
+    description = RecordsDescription(
         time, unit, guessed, tuple(sorted(files, key=lambda f: f.name)), tuple(_columns(whole, time, model))
     )
-    records, problem = _tried(Path(folder), model, found)
-    return RecordsDescription(time, unit, guessed, found.files, found.columns, records, problem)
+    records, problem = _tried(Path(folder), model, description)
+    return RecordsDescription(time, unit, guessed, description.files, description.columns, records, problem)
 
 
 def _clock(table: RecordTable) -> tuple[str, str, bool]:
@@ -259,11 +259,11 @@ def _is_clock(head: str, table: RecordTable) -> bool:
     return bool(unit and same_dimension(unit, "s") and len(values) > 1 and np.all(np.diff(values) > 0.0))
 
 
-def _tried(folder: Path, model: FlatModel, found: RecordsDescription) -> tuple[RecordSet | None, str]:
+def _tried(folder: Path, model: FlatModel, description: RecordsDescription) -> tuple[RecordSet | None, str]:
     """Return the records as they are read with the mapping that was found, or why they cannot be."""
     with tempfile.TemporaryDirectory() as scratch:
         mapping = Path(scratch) / "records.toml"
-        mapping.write_text(found.mapping(), encoding="utf-8")
+        mapping.write_text(description.mapping(), encoding="utf-8")
         try:
             return load_records(folder, model, mapping=mapping), ""
         except NlsError as error:
