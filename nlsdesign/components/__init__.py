@@ -79,6 +79,7 @@ from .mechanics.drive_faults import (
 from .mechanics.friction import (
     AsymmetricFriction,
     CoulombFriction,
+    GearFriction,
     LoadFriction,
     QuadraticDrag,
     StribeckFriction,
@@ -92,7 +93,14 @@ from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
 from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
-from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
+from .sensing.sensor_faults import (
+    ClockDrift,
+    Drift,
+    Eccentricity,
+    EncoderOffset,
+    LoadNonlinearity,
+    TransportDelay,
+)
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, ReadingLimits, Sensor, TorqueSensor
 from .transmission.cam import Cable, Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
@@ -141,6 +149,7 @@ __all__ = [
     "ElectricMotor",
     "Element",
     "Encoder",
+    "EncoderOffset",
     "EndStop",
     "ExtendedTube",
     "FittedRange",
@@ -149,6 +158,7 @@ __all__ = [
     "Following",
     "ForceSensor",
     "Gear",
+    "GearFriction",
     "GearedMotor",
     "GradualSaturation",
     "GravityLoad",

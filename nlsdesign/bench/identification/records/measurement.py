@@ -266,6 +266,15 @@ class RecordSet:
         """Records that may decide on noise and filters: those held out only where there are no others."""
         return self.of("fit", "selection") or self.records
 
+    @property
+    def shift(self) -> float:
+        """Time in s by which two channels may be shifted against each other without any fault.
+
+        Half a sample of each of which is not said how it runs between its samples.
+        """
+        loose = min(2, sum(not column.declared for column in self.columns))
+        return 0.5 * loose * max(record.step for record in self.records)
+
     def of(self, *roles: Role) -> tuple[Record, ...]:
         """Return the records of some roles.
 
@@ -377,8 +386,15 @@ def load_records(
     findings = tuple(finding for one in whole for finding in one.findings)
     remarks = [remark for each in pieces.values() for remark in each.remarks]
     remarks += [remark for one in whole for remark in one.remarks]
-    remarks += [_left_out(file) for file in tables if file not in runs]
-    remarks += [_not_read(file) for file in unread_tables(folder)]
+    remarks += [
+        Finding(file.name, "has no column of time, so it is not taken for a record")
+        for file in tables
+        if file not in runs
+    ]
+    remarks += [
+        Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
+        for file in unread_tables(folder)
+    ]
     chosen, coarser = _with_counts_as_seen(chosen, records)
     remarks += coarser
     held = tuple(hold_out) or chosen.held_out
@@ -452,14 +468,6 @@ def _without_time(where: str, tables: Iterable[RecordTable]) -> MeasurementError
                 next_step="name it 't_s' or 't_ms', or give its unit in records.toml: [time]",
             )
     return MeasurementError(where, "has no column of time", next_step="name it 't_s' or 'time [s]'")
-
-
-def _left_out(file: Path) -> Finding:
-    return Finding(file.name, "has no column of time, so it is not taken for a record")
-
-
-def _not_read(file: Path) -> Finding:
-    return Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
 
 
 def _with_counts_as_seen(chosen: ColumnMap, records: Sequence[Record]) -> tuple[ColumnMap, list[Finding]]:
