@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..foundation.deck import deck_names, load_deck, template_names
+from ..foundation.deck import (
+    commands_named_in,
+    deck_names,
+    load_deck,
+    read_deck,
+    template_names,
+    template_text,
+)
 from ..foundation.errors import NlsError
 from ..foundation.locations import bundled
 from ..foundation.quantity import sources, with_unit
@@ -40,20 +47,20 @@ deck.add_command(new)
 @json_option
 def list_decks(as_json: bool) -> None:
     """List the decks that come with the project, and the templates of `deck new`."""
-    from ..components import load_template
-
     decks = {name: load_deck(name) for name in deck_names()}
-    templates = {name: load_template(name) for name in template_names()}
+    texts = {name: template_text(name) for name in template_names()}
+    templates = {name: read_deck(text, Path(f"{name}.toml")) for name, text in texts.items()}
     if as_json:
         show_json({
             "decks": {n: {"description": d.description, "file": d.path} for n, d in decks.items()},
             "templates": {
-                n: {"description": t.deck.description, "ready_for": t.ready_for} for n, t in templates.items()
+                n: {"description": t.description, "ready_for": commands_named_in(texts[n])}
+                for n, t in templates.items()
             },
         })  # fmt: skip
         return
     show_table("Decks", ("name", "description"), [(n, d.description) for n, d in decks.items()])
-    rows = [(n, t.deck.description) for n, t in templates.items()]
+    rows = [(n, t.description) for n, t in templates.items()]
     show_table("Templates, for nlsdesign deck new --template", ("name", "description"), rows)
 
 

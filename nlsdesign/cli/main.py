@@ -22,6 +22,7 @@ from .compare import compare
 from .completion import COMPLETE, complete_names, completion
 from .cosimulate import cosimulation
 from .decks import deck
+from .describe import records
 from .design import design
 from .export import export
 from .export_fmu import export_fmus as export_fmus
@@ -63,7 +64,7 @@ def program(context: click.Context, packages: tuple[str, ...]) -> None:
 observer.add_command(calibrate)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(sweep, report, cosimulation, simulate, fit, diagnose, compare, study, serve, completion, docs),
+    *(sweep, report, cosimulation, simulate, records, fit, diagnose, compare, study, serve, completion, docs),
 ):
     program.add_command(command)
 complete_names(program)
