@@ -111,7 +111,8 @@ def diagnose(
         If the declared model cannot be refitted.
     """
     progress("refitting the declared model")
-    records = replace(records, remarks=(*records.remarks, *modes_too_quick(actuator, records)))
+    too_quick = modes_too_quick(actuator, max(record.step for record in records.records))
+    records = replace(records, remarks=(*records.remarks, *too_quick))
     chosen_by = records.without_held_out()
     bench = Bench(chosen_by, blocks_of(flatten(actuator), records.signals))
     case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)

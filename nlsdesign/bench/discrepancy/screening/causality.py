@@ -30,8 +30,11 @@ _SPANS = 50
 """Ratio of paces of records from which a constant delay can be told from another cause."""
 
 
-def modes_too_quick(assembly: Assembly, records: RecordSet) -> tuple[Finding, ...]:
-    """Return a remark if the quickest oscillation of a declared machine has too few samples a period."""
+def modes_too_quick(assembly: Assembly, step: float) -> tuple[Finding, ...]:
+    """Return a remark if the quickest oscillation of a machine has too few samples a period.
+
+    ``step``: time in s from one sample to the next.
+    """
     model = flatten(assembly)
     try:
         rates = np.linalg.eigvals(linearise(model, model.start(model.states).tolist())[0])
@@ -39,7 +42,7 @@ def modes_too_quick(assembly: Assembly, records: RecordSet) -> tuple[Finding, ..
         return ()  # at rest the machine stands at a corner
     swinging = np.abs(rates)[np.abs(rates.imag) > np.abs(rates.real)]
     quickest = float(np.max(swinging, initial=0.0)) / (2.0 * np.pi)
-    rate = 1.0 / max(record.step for record in records.records)
+    rate = 1.0 / step
     if rate >= _LEAST_SAMPLES * quickest:
         return ()
     text = (

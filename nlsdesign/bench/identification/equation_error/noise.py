@@ -345,13 +345,9 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     """
     seen = records.deciding
     level, rounded, quanta = {}, {}, {}
-    counted = _counted(records)
     for column in records.columns:
         resolutions = [r.resolution_of(column.signal) for r in seen]
         white = float(np.median([g.noise for g in resolutions]))
-        if counted and column.signal not in (*targets, *counted):
-            own = [noise_of(_without_chatter(r.trace, column.signal, counted)) for r in seen]
-            white = min(white, float(np.median(own)))
         # The count of a resampled signal is that of its samples before, as it weighs on the new clock.
         kept = any(column.signal in r.resolution for r in seen)
         declared = 0.0 if kept else column.quantum
@@ -361,6 +357,9 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
         rounded[column.signal] = white < 2.0 * rounding
         quanta[column.signal] = quantum
     motions = {name: quanta[name] for name, coarse in rounded.items() if coarse and name not in targets}
+    for signal in [name for name in level if motions and name not in (*targets, *motions)]:
+        own = float(np.median([noise_of(_without_chatter(r.trace, signal, [*motions])) for r in seen]))
+        level[signal] = min(level[signal], max(own, quanta[signal] / math.sqrt(12.0)))
     parts: dict[str, tuple[NoisePart, ...]] = {}
     lengths: dict[str, tuple[float, ...]] = {}
     evidence: dict[str, Evidence] = dict.fromkeys(level, "white only")
@@ -379,18 +378,6 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
             level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
             lengths[signal] = tuple(s.step * len(s.samples) for s in at_rest + repeated)
     return Noise(level, rounded, parts, evidence, lengths).read_as(records)
-
-
-def _counted(records: RecordSet) -> list[str]:
-    """Return the signals that are no smoother than their counts, as those of encoders."""
-    found = []
-    for column in records.columns:
-        resolutions = [r.resolution_of(column.signal) for r in records.deciding]
-        quantum = column.quantum or float(np.median([g.quantum for g in resolutions]))
-        whole = all(column.signal not in r.resolution for r in records.deciding)
-        if whole and float(np.median([g.noise for g in resolutions])) < 2.0 * quantum / math.sqrt(12.0):
-            found.append(column.signal)
-    return found
 
 
 def _without_chatter(trace: Trace, signal: str, counted: Sequence[str]) -> Array:
