@@ -18,7 +18,7 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign import design as design_room
 from nlsdesign.design import CamDesign, DesignSettings, Limit
-from nlsdesign.design.optimisation.conflict import Freed, Give
+from nlsdesign.design.optimisation.loosening import Freed, Give
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import NlsError
 

@@ -22,12 +22,12 @@ from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contou
 from ..statics.equilibrium import cam_function, torque_function, with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
-from .conflict import Remedies, find_remedies
 from .defaults import safe_limits
-from .design_search import Search, carried_over
+from .design_search import Search, carried_over, spans_of
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Solution
+from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
 from .size_ranges import size_ranges
 
@@ -77,13 +77,7 @@ class SolvedSearch:
     @cached_property
     def predicted_rms(self) -> float:
         """Torque error in N·m that the optimiser saw."""
-        return self.rms(self.best)
-
-    def rms(self, outcome: Solution) -> float:
-        """Return the torque error in N·m at a solution."""
-        problem = self.search.problem
-        square = problem.evaluate(problem.design.mean_square_error, outcome.point)[0]
-        return float(np.sqrt(max(square, 0.0)))
+        return self.search.problem.rms(self.best.point)
 
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
@@ -168,6 +162,8 @@ def finished(solved: SolvedSearch) -> CamDesign:
     contour, fit = solved.contour_fit
     settings, design = search.question.settings, problem.design
     limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
+    held = [limit_state(problem, bound, best.point) for bound in search.structural]
+    limits += tuple(state for state in held if state.active)
     tolerance, remarks = _tolerance(solved)
     cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
     sentences = []
@@ -192,7 +188,8 @@ def finished(solved: SolvedSearch) -> CamDesign:
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
         starts=tuple(
-            StartOutcome(o.solved, o.status, o.iterations, o.cost, solved.rms(o)) for o in solved.outcomes
+            StartOutcome(o.solved, o.status, o.iterations, o.cost, problem.rms(o.point))
+            for o in solved.outcomes
         ),
         taken=solved.taken,
         cam=cam,
@@ -232,7 +229,7 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
     allowed = settings.largest_error * target.largest
     if check.rms <= allowed:
         return None
-    binding = [i for i, state in enumerate(limits) if state.active]
+    binding = [i for i, state in enumerate(limits[: len(solved.search.bounds)]) if state.active]
     remedies: Remedies | None = None
     advice: tuple[str, ...] = ()
     if solved.predicted_rms <= allowed:
@@ -241,7 +238,7 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
         remedies = find_remedies(
             solved.search, solved.free, solved.best.point, allowed=allowed, error=check.rms, binding=binding
         )
-        advice = tuple(remedies.sentences(target.largest))
+        advice = tuple(remedies.sentences(target.largest, allowed))
         if check.rms - solved.predicted_rms > _SHARE_OF_CAM * allowed:
             advice += (_made_otherwise(solved),)
     worst = int(np.argmax(np.abs(check.errors)))
@@ -381,7 +378,11 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
-    return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active)
+    angles = problem.evaluate(problem.design.angles, point)
+    where = ""
+    if active and len(values) == len(angles):
+        where = spans_of(angles, np.abs(values - bound.value) <= _ACTIVE * bound.scale)
+    return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active, where)
 
 
 _ANGLES = 801

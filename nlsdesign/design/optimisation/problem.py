@@ -100,6 +100,10 @@ class DesignProblem:
         ).ravel()
         return result
 
+    def rms(self, point: Array) -> float:
+        """Return the rms torque error in N·m at a point."""
+        return float(np.sqrt(max(self.evaluate(self.design.mean_square_error, point)[0], 0.0)))
+
     def at(self, start: Start) -> Array:
         """Return the point where a search begins."""
         values = start_values(start, scalars=self.scalars, contour=self.contour, sizes=self.sizes)

@@ -85,11 +85,15 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Constraints lower ≤ expression ≤ upper on a column, scaled to about 1."""
+    """Constraints lower ≤ expression ≤ upper on a column, scaled to about 1.
+
+    ``words``: what is held, where a designer is told of it.
+    """
 
     expression: Expression
     lower: float
     upper: float
+    words: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,8 @@ from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from ..tolerance.tolerance_result import ToleranceResult
-from .conflict import Remedies
+from .design_search import spans_of
+from .remedies import Remedies
 from .size_ranges import SizeRange
 
 
@@ -40,6 +41,8 @@ class LimitState:
         Unit in which it is shown.
     active
         Whether the design sits on the bound.
+    where
+        In which ranges of the angle it does, in words; empty for a limit on a single number.
     """
 
     limit: str
@@ -49,11 +52,12 @@ class LimitState:
     upper: bool
     unit: str
     active: bool
+    where: str = ""
 
     def __str__(self) -> str:
         factor = parse_unit(self.unit).factor
         sign = "<=" if self.upper else ">="
-        mark = "  ACTIVE" if self.active else ""
+        mark = f"  ACTIVE {self.where}".rstrip() if self.active else ""
         value, bound = (with_unit(f"{number / factor:.4g}", self.unit) for number in (self.value, self.bound))
         return f"{self.limit}: {self.of} {value} {sign} {bound}{mark}"
 
@@ -368,7 +372,7 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
 
 def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     """Return what a design prints: pairs of text."""
-    target, check, curves, rho = design.target, design.check, design.curves, design.contour.radii_of_curvature
+    target, check, curves = design.target, design.check, design.curves
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"
     fit = f", contour held to {1e6 * design.fit_error:.2g} µm" if design.fit_error > 0.0 else ""
@@ -392,7 +396,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
         ("energy from angle zero", f"{curves.energy:.4g} J, without that of the pretension"),
         *([("rubber", f"{1e6 * design.rubber_volume:.4g} cm³")] if design.rubber_volume > 0.0 else []),
-        ("radius of curvature", f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"),
+        ("radius of curvature", _curvature(design)),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
         ("lever arm", f"up to {1e3 * design.contour.lever_arms.max():.4g} mm"),
         (
@@ -407,6 +411,21 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     rows += [("remark", remark) for remark in design.remarks]
     inside = design.within_tolerance
     return rows if inside is None else [*rows, ("within tolerance", f"{100 * inside:.3g} % of the angles")]
+
+
+_EDGE = 1e-3
+"""Radius of curvature, relative to the largest lever arm, up to which a contour is an edge."""
+
+
+def _curvature(design: CamDesign) -> str:
+    """Return the range of the radius of curvature; where it is zero the contour is an edge, as of a bar."""
+    curves = design.curves
+    edge = curves.radii_of_curvature <= _EDGE * curves.lever_arms.max()
+    if not edge.any():
+        rho = design.contour.radii_of_curvature
+        return f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"
+    where = f"an edge {spans_of(curves.angles, edge)}, where ConvexContour binds"
+    return where if edge.all() else f"{where}; up to {1e3 * curves.radii_of_curvature.max():.3g} mm elsewhere"
 
 
 def _starts(design: CamDesign) -> str:

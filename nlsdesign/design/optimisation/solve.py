@@ -137,6 +137,7 @@ class Wanted:
         names = series_cam(model, self.spring)
         defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
         question = Question(
+            machine=actuator,
             model=model,
             cam=with_contour(actuator[names.name], settings.contour),
             drive=names.drive,

@@ -32,8 +32,8 @@ from nlsdesign.design import (
     design_cam,
     safe_limits,
 )
-from nlsdesign.design.optimisation.conflict import Give
 from nlsdesign.design.optimisation.limits import Bound
+from nlsdesign.design.optimisation.loosening import Give
 from nlsdesign.design.optimisation.result import Miss
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import InfeasibleError, UnitError, UnknownNameError, ValueRangeError
