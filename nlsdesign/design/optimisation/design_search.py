@@ -20,7 +20,7 @@ from ..statics.equilibrium import elastic_law, has_corners, with_smooth_cables
 from .goals import Goal
 from .limits import Bound, Limit, MinimumRadiusOfCurvature
 from .problem import DesignProblem, contour_names, design_problem, movable_numbers
-from .program import Program, Rows, Solution
+from .program import Program, Rows
 from .settings import DesignSettings
 from .shape import starts
 
@@ -154,12 +154,17 @@ class Search:
             (*problem.structure, *(row_of(bound) for bound in self.bounds)),
         )
 
-    def outcomes(self) -> list[Solution]:
-        """Return the solution from each start of the settings."""
-        settings = self.question.settings
-        sizes = [v.name for v in self.problem.scalars if v.name != self.problem.law.cam.pretension]
-        points = [self.problem.at(start) for start in starts(settings.starts, settings.seed, sizes)]
-        return self.program.solve_all(points, settings.progress)
+    @cached_property
+    def of_any_rounding(self) -> Program:
+        """The program with the width of rounded knots as a parameter."""
+        question, names = self.question, [v.name for v in self.problem.scalars]
+        shape = contour_names(self.problem.law.cam)[:1] if self.problem.contour is not None else ()
+        width = ca.SX.sym("rounding")
+        problem = design_problem(
+            question.model, question.cam, target=question.target, free=[*shape, *names],
+            spring=question.drive, rounding=self.rounding, width=width,
+        )  # fmt: skip
+        return replace(Search(question, problem, self.rounding).program, parameters=width)
 
     def require_influence(self) -> None:
         """Refuse numbers that change neither a goal nor a limit."""

@@ -29,6 +29,7 @@ from .problem import DesignProblem
 from .program import Solution
 from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
+from .several_starts import same_design
 from .size_ranges import size_ranges
 
 _ACTIVE = 1e-3
@@ -187,10 +188,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         tolerance=tolerance,
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
-        starts=tuple(
-            StartOutcome(o.solved, o.status, o.iterations, o.cost, problem.rms(o.point))
-            for o in solved.outcomes
-        ),
+        starts=tuple(_start(problem, each, solved.outcomes[solved.taken]) for each in solved.outcomes),
         taken=solved.taken,
         cam=cam,
         size_ranges=size_ranges(search, best.point, solved.predicted_rms)
@@ -199,6 +197,13 @@ def finished(solved: SolvedSearch) -> CamDesign:
         miss=_miss(solved, limits),
         remarks=(*sentences, *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
     )
+
+
+def _start(problem: DesignProblem, outcome: Solution, taken: Solution) -> StartOutcome:
+    return StartOutcome(
+        outcome.solved, outcome.status, outcome.iterations, outcome.cost, problem.rms(outcome.point),
+        same_design(problem, taken, outcome),
+    )  # fmt: skip
 
 
 def _tolerance(solved: SolvedSearch) -> tuple[ToleranceResult | None, tuple[str, ...]]:

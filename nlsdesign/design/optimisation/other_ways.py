@@ -36,11 +36,14 @@ class OtherSpring:
     ----------
     words
         What it is.
+    machine
+        The actuator with it, not designed yet.
     error
         Rms torque error in N·m that is then left.
     """
 
     words: str
+    machine: Assembly
     error: float
 
     def __str__(self) -> str:
@@ -62,7 +65,7 @@ def other_springs(search: Search, free: Sequence[str]) -> tuple[OtherSpring, ...
             continue
         if outcomes:
             best = min(outcomes, key=lambda outcome: outcome.cost)
-            found.append(OtherSpring(words, other.problem.rms(best.point)))
+            found.append(OtherSpring(words, machine, other.problem.rms(best.point)))
     return tuple(found)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -130,15 +130,17 @@ def design_problem(
     free: Sequence[str],
     spring: str | None = None,
     rounding: float = 0.0,
+    width: Expression | None = None,
     symbols: SymbolicTarget | None = None,
 ) -> DesignProblem:
     """Write the design problem of a cam spring.
 
     ``free``: full names of what may change; the contour is ``<cam>.contour`` or ``<cam>.lever_arm``.
-    ``spring``: path of the cam spring; decided from the structure if it is left out.
+    ``spring``: path of the cam spring; decided from the structure if it is left out. ``width``: a symbol in
+    place of the rounding, where only the torque over the contour matters.
     """
     made = declared_cam(cam)
-    law = elastic_law(model, spring)
+    sharp = law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
     arm, stretch = _sizes(law, target if symbols is None else symbols.sized_for)
     end = ca.SX(target.last_angle) if symbols is None else symbols.last_angle
@@ -157,11 +159,18 @@ def design_problem(
         contour, shape = parallel(end, arm)
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
     sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
+    called = law if width is None else sharp.without_knots(2.0 * stretch, width)
+    everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
+
+    def stretched(extension: Expression) -> Stretched:
+        more = [] if width is None else [width]
+        return Stretched(*called.function.call([extension, everything, *more]))
+
     return _lifted(
         DesignProblem(
             law=law,
             variables=(*scalars.values(), *(contour.all() if contour else ()), *shape.states),
-            design=_design(model, law, target, shape, parameters),
+            design=_design(model, law, target, shape, parameters, stretched),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
@@ -253,14 +262,14 @@ def _lifted(problem: DesignProblem) -> DesignProblem:
 
 
 def _design(
-    model: FlatModel, law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]
+    model: FlatModel,
+    law: ElasticLaw,
+    target: Target,
+    shape: Shape,
+    parameters: dict[str, Expression],
+    element: Callable[[Expression], Stretched],
 ) -> DesignPoint:
     cam = law.cam
-    everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
-
-    def element(extension: Expression) -> Stretched:
-        return Stretched(*law.function.call([extension, everything]))
-
     stretched = parameters[cam.pretension] + shape.extensions
     columns = [element(stretched[i]) for i in range(stretched.shape[0])]
     strains = ca.horzcat(*[column.strains for column in columns])

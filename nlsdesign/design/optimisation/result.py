@@ -140,6 +140,8 @@ class StartOutcome:
         It took.
     cost, rms
         Sum of the goals, and torque error in N·m.
+    same
+        Whether it is the design that was taken, by cost and shape.
     """
 
     solved: bool
@@ -147,6 +149,7 @@ class StartOutcome:
     iterations: int
     cost: float
     rms: float
+    same: bool = False
 
 
 @dataclass(frozen=True)
@@ -413,6 +416,8 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     return rows if inside is None else [*rows, ("within tolerance", f"{100 * inside:.3g} % of the angles")]
 
 
+_SURE = 2
+"""Starts from which a design was found where nothing more is said."""
 _EDGE = 1e-3
 """Radius of curvature, relative to the largest lever arm, up to which a contour is an edge."""
 
@@ -429,16 +434,17 @@ def _curvature(design: CamDesign) -> str:
 
 
 def _starts(design: CamDesign) -> str:
-    solved = [s for s in design.starts if s.solved]
-    text = f"{len(solved)} of {len(design.starts)} came to a solution"
-    best = design.starts[design.taken]
-    others = sorted((s for i, s in enumerate(design.starts) if s.solved and i != design.taken), key=_cost)
+    """Return from how many starts the design was found, and what the next best of another shape is."""
+    solved = [start for start in design.starts if start.solved]
+    found = sum(start.same for start in solved)
+    text = f"found from {found} of {len(design.starts)}"
+    if found < _SURE:
+        text = f"found once only in {len(design.starts)}: another may be better, ask for more starts"
+    others = sorted((start for start in solved if not start.same), key=lambda start: start.cost)
     if not others:
-        return text + "; no second one to compare with"
-    ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
-    if ratio < 1.001:
-        return text + "; the next best is as good, within 0.1 % of the cost"
-    return text + f"; the next best has {ratio:.4g} times the cost, {prefixed(others[0].rms)} rms"
+        return text
+    ratio = others[0].cost / design.starts[design.taken].cost
+    return text + f"; the next best design has {ratio:.4g} times the cost, {prefixed(others[0].rms)} rms"
 
 
 def _spread_rows(design: CamDesign) -> list[tuple[str, str]]:
@@ -460,10 +466,6 @@ def _alternative(design: CamDesign, each: Alternative) -> str:
         return f"{each.choice}: no design, {each.reason}"
     share = 100.0 * each.rms / design.target.largest
     return f"{each.choice}: {share:.2g} % rms, cost {each.cost:.4g}" + ("" if each.met else ", a miss")
-
-
-def _cost(outcome: StartOutcome) -> float:
-    return outcome.cost
 
 
 def _read(torque: float) -> str:
