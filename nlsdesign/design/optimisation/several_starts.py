@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.processes import parallel_map
+from ...foundation.work_sharing import parallel_map
 from .design_search import Search
 from .problem import DesignProblem
 from .program import Program, Solution
