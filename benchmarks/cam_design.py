@@ -40,7 +40,7 @@ from nlsdesign.design.optimisation.design_search import Search
 from nlsdesign.design.optimisation.limits import Limit
 from nlsdesign.design.optimisation.problem import DesignProblem
 from nlsdesign.design.optimisation.program import Rows
-from nlsdesign.design.optimisation.several_starts import SAME_COST, several_starts, times_found
+from nlsdesign.design.optimisation.several_starts import SAME_COST, SeveralStarts, times_found
 from nlsdesign.design.optimisation.shape import Start, start_values, starts
 from nlsdesign.design.optimisation.solve import GOALS, USUAL, Wanted
 from nlsdesign.export.compilation.cross_compiler import BASELINE
@@ -494,7 +494,7 @@ def beside_random(problem: Problem, count: int) -> None:
     """
     begin = time.process_time()
     search = problem.search()
-    outcomes = several_starts(search).outcomes()
+    outcomes = SeveralStarts(search).outcomes()
     seconds, found = time.process_time() - begin, times_found(search.problem, outcomes)
     own = min(outcome.cost for outcome in outcomes if outcome.solved)
     draw, begin = np.random.default_rng(12345), time.process_time()

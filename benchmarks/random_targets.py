@@ -108,7 +108,7 @@ def wild_target(seed: int) -> design_room.TabulatedTorque:
         torque = np.sin(np.pi * share * draw.uniform(0.5, 0.8))
     else:
         torque = np.sin(np.pi * share) * (1.0 + draw.uniform(-0.5, 0.5) * share)
-    torque = largest * torque / np.max(torque)
+    torque = np.maximum(largest * (torque - torque[0]) / np.max(torque), 0.0)
     return design_room.TabulatedTorque(angles=tuple(share * last), torques=tuple(torque))
 
 

@@ -9,9 +9,8 @@ from ...foundation.errors import ConvergenceError, InfeasibleError
 from .design_search import Search
 from .limits import Bound
 from .loosening import FEASIBLE, Loosened
-from .other_ways import hollow_contour, other_springs
+from .other_ways import percent, tried_otherwise
 from .program import PROVED_INFEASIBLE, Solution
-from .remedies import percent
 
 _INVOLVED = 1e-3
 """Price, in give of the whole per give of this limit, from which a limit counts as part of the conflict."""
@@ -70,20 +69,7 @@ def _advice(
     if undecided:
         listed = " or ".join(undecided)
         sentences.append(f"whether a give of {listed} alone is enough the solver could not decide")
-    return sentences if sensible or tried.enough else [*sentences, *_otherwise(loose, search, free)]
-
-
-def _otherwise(loose: Loosened, search: Search, free: Sequence[str]) -> list[str]:
-    """Return what else was tried, where neither sizes nor one limit are enough."""
-    largest = search.question.target.largest
-    ways = [
-        f"{one} keeps all limits and leaves {percent(one.error, largest)}"
-        for one in other_springs(search, free)
-    ]
-    hollow = None if ways else hollow_contour(loose)
-    ways += [] if hollow is None else [str(hollow)]
-    sizes = f"all sizes free ({', '.join(loose.candidates)})" if loose.candidates else "no size left to free"
-    return ways or [f"nothing that was tried keeps them: {sizes}, another kind of cam, a hollow contour"]
+    return sentences if sensible or tried.enough else [*sentences, *tried_otherwise(loose, search, free)]
 
 
 def names_of(bounds: Iterable[Bound]) -> list[str]:

@@ -80,6 +80,13 @@ class SolvedSearch:
         """Torque error in N·m that the optimiser saw."""
         return self.search.problem.rms(self.best.point)
 
+    def start_outcome(self, outcome: Solution) -> StartOutcome:
+        """Return where a start came to, beside the one that was taken."""
+        problem = self.search.problem
+        same = same_design(problem, self.outcomes[self.taken], outcome)
+        error = problem.rms(outcome.point)
+        return StartOutcome(outcome.solved, outcome.status, outcome.iterations, outcome.cost, error, same)
+
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
         """Contour, and the declared cam made for it; none where the contour was given."""
@@ -188,7 +195,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         tolerance=tolerance,
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
-        starts=tuple(_start(problem, each, solved.outcomes[solved.taken]) for each in solved.outcomes),
+        starts=tuple(solved.start_outcome(outcome) for outcome in solved.outcomes),
         taken=solved.taken,
         cam=cam,
         size_ranges=size_ranges(search, best.point, solved.predicted_rms)
@@ -197,13 +204,6 @@ def finished(solved: SolvedSearch) -> CamDesign:
         miss=_miss(solved, limits),
         remarks=(*sentences, *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
     )
-
-
-def _start(problem: DesignProblem, outcome: Solution, taken: Solution) -> StartOutcome:
-    return StartOutcome(
-        outcome.solved, outcome.status, outcome.iterations, outcome.cost, problem.rms(outcome.point),
-        same_design(problem, taken, outcome),
-    )  # fmt: skip
 
 
 def _tolerance(solved: SolvedSearch) -> tuple[ToleranceResult | None, tuple[str, ...]]:

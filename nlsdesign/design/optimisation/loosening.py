@@ -21,7 +21,6 @@ from ...foundation.work_sharing import parallel_map
 from .defaults import BREAKS
 from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
-from .problem import contour_names
 from .program import DesignVariable, Program, Solution, scaled
 from .shape import starts
 
@@ -141,7 +140,7 @@ class Loosened:
         sizes = [cam.pretension]
         for piece in cam.specimens:
             sizes += [*piece.section, piece.rest_length]
-        if cam.anchor_distance is not None and any(name in free for name in contour_names(cam)):
+        if cam.anchor_distance is not None and search.problem.contour is not None:
             sizes.append(cam.anchor_distance)
         self.free = tuple(free)
         self.candidates = tuple(dict.fromkeys(name for name in sizes if name not in free))
@@ -211,9 +210,9 @@ class Loosened:
         if not self.kept(everything):
             return SizesTried((), better, everything)
         ranked = sorted(self.candidates, key=lambda name: solved[name].cost if name in solved else math.inf)
-        return SizesTried((self._smallest(ranked, everything, start),), better, everything)
+        return SizesTried((self.smallest(ranked, everything, start),), better, everything)
 
-    def _smallest(self, ranked: Sequence[str], everything: Solution, start: Array | None) -> Freed:
+    def smallest(self, ranked: Sequence[str], everything: Solution, start: Array | None) -> Freed:
         """Return the first of the best two, best three, ... names that are enough, without idle ones."""
         names, outcome = list(ranked), everything
         for count in range(2, len(ranked)):

@@ -9,11 +9,8 @@ import casadi as ca
 import numpy as np
 
 from ...components.assembly.named_parts import Assembly
-from ...components.transmission.cam import Cam
-from ...components.transmission.cam_shapes import OneSidedCam
 from ...foundation.errors import NlsError
-from ...foundation.quantity import Quantity
-from ..statics.declared_cam import declared_cam
+from ..statics.declared_cam import declared_cam, one_sided
 from .design_search import Search, row_of, spans_of
 from .limits import MaximumCableTension, MinimumRadiusOfCurvature
 from .loosening import Freed, Loosened
@@ -50,9 +47,14 @@ class OtherSpring:
         return f"take {self.words}"
 
 
+def percent(error: float, largest: float) -> str:
+    """Return an rms error relative to the largest torque, as text."""
+    return f"{100.0 * error / largest:.2g} % of the largest torque"
+
+
 def other_springs(search: Search, free: Sequence[str]) -> tuple[OtherSpring, ...]:
     """Return the other springs for which a cam was found within the limits."""
-    found = []
+    springs = []
     for words, machine in _others(search):
         try:
             question = search.question.of(machine)
@@ -65,17 +67,16 @@ def other_springs(search: Search, free: Sequence[str]) -> tuple[OtherSpring, ...
             continue
         if outcomes:
             best = min(outcomes, key=lambda outcome: outcome.cost)
-            found.append(OtherSpring(words, machine, other.problem.rms(best.point)))
-    return tuple(found)
+            springs.append(OtherSpring(words, machine, other.problem.rms(best.point)))
+    return tuple(springs)
 
 
 def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
     """Yield the other springs in words, with their machines."""
     machine, cam = search.question.machine, search.problem.law.cam
     part = machine[cam.name]
-    if search.problem.contour is not None and isinstance(part, Cam) and declared_cam(part).through_centre:
-        end, arms = Quantity(search.question.target.last_angle, "rad"), Quantity((0.01,) * 8, "m")
-        other = OneSidedCam(lever_arm=arms, last_angle=end, elements=part.elements, cable=part.cable)
+    if search.problem.contour is not None and declared_cam(part).through_centre:
+        other = one_sided(part, search.question.target.last_angle)
         words = "a one-sided cam (OneSidedCam), which pulls to one side only"
         yield words, machine.with_part(cam.name, other)
     # Elements share the torque as areas do, but only they share the force of the cable.
@@ -140,3 +141,16 @@ def hollow_contour(loose: Loosened) -> Hollow | None:
             also = loose.freed(freed, outcome) if freed else None
             return Hollow(spans_of(angles, where), float(rho.min()), also)
     return None
+
+
+def tried_otherwise(loose: Loosened, search: Search, free: Sequence[str]) -> list[str]:
+    """Return in words what else keeps limits that contradict each other."""
+    largest = search.question.target.largest
+    ways = [
+        f"{one}: it keeps all limits and leaves {percent(one.error, largest)}"
+        for one in other_springs(search, free)
+    ]
+    hollow = None if ways else hollow_contour(loose)
+    ways += [] if hollow is None else [str(hollow)]
+    sizes = f"all sizes free ({', '.join(loose.candidates)})" if loose.candidates else "no size left to free"
+    return ways or [f"nothing that was tried keeps them: {sizes}, another kind of cam, a hollow contour"]

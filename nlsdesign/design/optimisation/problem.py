@@ -40,6 +40,13 @@ class SymbolicTarget(NamedTuple):
     last_angle: Expression
 
 
+class SymbolicRounding(NamedTuple):
+    """A width of rounded knots that is a symbol for the torque over the contour; goals see the number."""
+
+    share: float
+    width: Expression
+
+
 @dataclass(frozen=True, eq=False)
 class DesignProblem:
     """Variables and what follows from them.
@@ -129,23 +136,22 @@ def design_problem(
     target: Target,
     free: Sequence[str],
     spring: str | None = None,
-    rounding: float = 0.0,
-    width: Expression | None = None,
+    rounding: float | SymbolicRounding = 0.0,
     symbols: SymbolicTarget | None = None,
 ) -> DesignProblem:
     """Write the design problem of a cam spring.
 
     ``free``: full names of what may change; the contour is ``<cam>.contour`` or ``<cam>.lever_arm``.
-    ``spring``: path of the cam spring; decided from the structure if it is left out. ``width``: a symbol in
-    place of the rounding, where only the torque over the contour matters.
+    ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     made = declared_cam(cam)
     sharp = law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
     arm, stretch = _sizes(law, target if symbols is None else symbols.sized_for)
     end = ca.SX(target.last_angle) if symbols is None else symbols.last_angle
-    if rounding > 0.0:
-        law = law.without_knots(2.0 * stretch, rounding)
+    share, width = rounding if isinstance(rounding, SymbolicRounding) else (rounding, None)
+    if share > 0.0:
+        law = law.without_knots(2.0 * stretch, share)
     scalars = {number.name: scalar(number, 0.3 * stretch) for number in numbers}
     parameters = {
         v.name: scalars[v.name].value if v.name in scalars else ca.SX(v.start) for v in model.parameters

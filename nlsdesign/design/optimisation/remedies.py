@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...foundation.arrays import Array
 from .design_search import Search
 from .loosening import Freed, Give, Loosened
-from .other_ways import Hollow, OtherSpring, hollow_contour, other_springs
+from .other_ways import Hollow, OtherSpring, hollow_contour, other_springs, percent
 
 _LESS = 0.98
 """Share of the error that a name leaves from which freeing it counts as of no use."""
@@ -59,11 +59,6 @@ class Remedies:
             "no size is left to free" if self.everything is None else "no size and no single limit is enough"
         )
         return ["; ".join([none, *tried]), *([] if self.hollow is None else [str(self.hollow)])]
-
-
-def percent(error: float, largest: float) -> str:
-    """Return an rms error relative to the largest torque, as text."""
-    return f"{100.0 * error / largest:.2g} % of the largest torque"
 
 
 def find_remedies(

@@ -436,9 +436,9 @@ def _curvature(design: CamDesign) -> str:
 def _starts(design: CamDesign) -> str:
     """Return from how many starts the design was found, and what the next best of another shape is."""
     solved = [start for start in design.starts if start.solved]
-    found = sum(start.same for start in solved)
-    text = f"found from {found} of {len(design.starts)}"
-    if found < _SURE:
+    times = sum(start.same for start in solved)
+    text = f"found from {times} of {len(design.starts)}"
+    if times < _SURE:
         text = f"found once only in {len(design.starts)}: another may be better, ask for more starts"
     others = sorted((start for start in solved if not start.same), key=lambda start: start.cost)
     if not others:

@@ -57,12 +57,14 @@ class SeveralStarts:
     ----------
     search
         That is to be solved.
-    rounded
-        Its program with the width of rounded knots as a parameter; ``None`` for a law without knots.
     """
 
     search: Search
-    rounded: Program | None
+
+    @cached_property
+    def rounded(self) -> Program | None:
+        """Its program with the width of rounded knots as a parameter; ``None`` for a law without knots."""
+        return self.search.of_any_rounding if self.search.rounding > 0.0 else None
 
     def outcomes(self) -> list[Solution]:
         """Return where each start came to; the search ends with the starts that found the best again."""
@@ -76,13 +78,18 @@ class SeveralStarts:
         outcomes: list[Solution] = []
         while len(outcomes) < len(self._starts):
             batch = range(len(first), min(len(first) + _BATCH, len(self._starts)))
-            for solution in self._mapped(self._first, batch):
+            for solution in self._mapped(self.first, batch):
                 first.append(solution)
                 settings.progress()
             # What is one design with knots rounded much is led on once.
-            same = [self._first_like(first, number) for number in range(len(first))]
+            same = [
+                next(
+                    n for n in range(k + 1) if n == k or same_design(self.search.problem, first[n], first[k])
+                )
+                for k in range(len(first))
+            ]
             new = [number for number in dict.fromkeys(same) if number not in ends]
-            led = self._mapped(lambda number: self._end(number, first[number]), new)
+            led = self._mapped(lambda number: self.end(number, first[number]), new)
             ends |= dict(zip(new, led, strict=True))
             outcomes = [ends[number] for number in same]
             if times_found(self.search.problem, outcomes) >= _ENOUGH or not any(o.solved for o in outcomes):
@@ -98,12 +105,7 @@ class SeveralStarts:
     def _mapped(self, work: Callable[[int], Solution], numbers: Sequence[int]) -> Iterator[Solution]:
         return parallel_map(lambda place: work(numbers[place]), len(numbers))
 
-    def _first_like(self, first: Sequence[Solution], number: int) -> int:
-        """Return the number of the first start that came to the same."""
-        alike = (n for n in range(number) if same_design(self.search.problem, first[n], first[number]))
-        return next(alike, number)
-
-    def _first(self, number: int) -> Solution:
+    def first(self, number: int) -> Solution:
         """Solve with the widest rounding; from each second start the contour first, sizes held."""
         problem, program = self.search.problem, self.search.program
         width: Array | None = None
@@ -117,7 +119,7 @@ class SeveralStarts:
             point = outcome.point if outcome.solved else point
         return program.solve(point, parameters=width)
 
-    def _end(self, number: int, first: Solution) -> Solution:
+    def end(self, number: int, first: Solution) -> Solution:
         """Lead a first solution to the search's own rounding; the better of two ways."""
         search = self.search
         if self.rounded is None:
@@ -133,8 +135,3 @@ class SeveralStarts:
             search.program.solve(last.point, beside=last.multipliers),
         ]
         return min(ways, key=lambda outcome: (not outcome.solved, outcome.cost))
-
-
-def several_starts(search: Search) -> SeveralStarts:
-    """Return a search from the starts of its settings."""
-    return SeveralStarts(search, search.of_any_rounding if search.rounding > 0.0 else None)

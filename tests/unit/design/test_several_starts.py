@@ -10,7 +10,7 @@ import pytest
 from benchmarks.cam_design import Problem, problems, random_point
 from nlsdesign.design import DesignSettings, design_cam
 from nlsdesign.design.optimisation.program import Solution
-from nlsdesign.design.optimisation.several_starts import same_design, several_starts, times_found
+from nlsdesign.design.optimisation.several_starts import SeveralStarts, same_design, times_found
 from nlsdesign.design.optimisation.shape import starts
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, TARGET, actuator
 
@@ -20,7 +20,7 @@ ALL = {problem.name: problem for problem in problems()}
 def best_of(problem: Problem) -> tuple[float, int, int]:
     """Return the best cost, how often it was found, and the number of starts."""
     search = problem.search()
-    outcomes = several_starts(search).outcomes()
+    outcomes = SeveralStarts(search).outcomes()
     cost = min(outcome.cost for outcome in outcomes if outcome.solved)
     return cost, times_found(search.problem, outcomes), len(outcomes)
 
