@@ -37,13 +37,14 @@ def feasible_point(search: Search, free: Sequence[str]) -> Array:
     raise InfeasibleError(
         "limits " + ", ".join(names_of(loose.bounds[i] for i in involved)),
         "contradict each other" if len(involved) > 1 else "cannot be kept with what is free",
-        next_step="; ".join(_advice(loose, best, involved, search, free)),
+        next_step="; ".join(what_would_help(loose, best, involved, search, free)),
     )
 
 
-def _advice(
+def what_would_help(
     loose: Loosened, best: Solution, involved: Sequence[int], search: Search, free: Sequence[str]
 ) -> list[str]:
+    """Return in words how much limits would have to give, which sizes to free, and what else was tried."""
     start = best.point[: loose.count]
     alone = loose.several([((), [i]) for i in involved], start)
     gives = [loose.give(i, outcome) for i, outcome in zip(involved, alone, strict=True) if outcome.solved]

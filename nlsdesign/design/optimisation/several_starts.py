@@ -68,7 +68,7 @@ class SeveralStarts:
 
     def outcomes(self) -> list[Solution]:
         """Return where each start came to; the search ends with the starts that found the best again."""
-        settings = self.search.question.settings
+        settings, problem = self.search.question.settings, self.search.problem
         for each in (self.search.program, self.rounded):
             if each is not None:
                 each.prepare()
@@ -83,16 +83,14 @@ class SeveralStarts:
                 settings.progress()
             # What is one design with knots rounded much is led on once.
             same = [
-                next(
-                    n for n in range(k + 1) if n == k or same_design(self.search.problem, first[n], first[k])
-                )
+                next((n for n in range(k) if same_design(problem, first[n], first[k])), k)
                 for k in range(len(first))
             ]
             new = [number for number in dict.fromkeys(same) if number not in ends]
             led = self._mapped(lambda number: self.end(number, first[number]), new)
             ends |= dict(zip(new, led, strict=True))
             outcomes = [ends[number] for number in same]
-            if times_found(self.search.problem, outcomes) >= _ENOUGH or not any(o.solved for o in outcomes):
+            if times_found(problem, outcomes) >= _ENOUGH or not any(o.solved for o in outcomes):
                 break
         return outcomes
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign import regeneration
+from nlsdesign import export
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.bench.identification.parameters import declared_parameter
@@ -19,7 +19,14 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.presentation import report
-from nlsdesign.regeneration import ObserverChoice, Regeneration, regenerate, write_regeneration
+from nlsdesign.presentation.report.diagnosis_sections import regeneration_sections
+from nlsdesign.regeneration import (
+    ObserverChoice,
+    Regeneration,
+    regenerate,
+    regenerated_observer,
+    write_regeneration,
+)
 from nlsdesign.simulation import Trace
 
 TIME = np.arange(1500) * 0.002
@@ -64,7 +71,7 @@ CHOICE = ObserverChoice(sample_time=2e-3)
 @pytest.fixture(scope="module")
 def result() -> Regeneration:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(regeneration, "DRAWS", 3)
+        patch.setattr(regenerated_observer, "DRAWS", 3)
         better = flatten(machine(TRUE))
         parameter = declared_parameter(better.variable("spring.stiffness"))
         fit = Fit((parameter,), {"spring.stiffness": TRUE}, np.array([[1e-6]]), 0.0, {}, True)
@@ -97,17 +104,19 @@ def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Pat
     assert (len(result.observer.states) > 20) == (least[1] == "adaptive")
     written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert written["nominal"]["before"] == result.nominal[0]
-    page = report.write_report(tmp_path / "r.html", *report.regeneration_sections(result, {}), title="t")
+    page = report.write_report(tmp_path / "r.html", *regeneration_sections(result, {}), title="t")
     assert nominal.partition(": ")[2].removesuffix(".") in page.read_text(encoding="utf-8")
 
 
 def test_observer_and_plant_are_written(
     result: Regeneration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(regeneration, "export_fmu", lambda model, path: path)
-    files, reasons = write_regeneration(result, tmp_path)
+    monkeypatch.setattr(export, "export_fmu", lambda model, path: path)
+    written, files = write_regeneration(result, tmp_path)
     assert {p.name for p in files} >= {"observer.c", "observer.h", "observer.fmu", "plant.fmu"}
-    assert reasons == ()
+    assert written.reasons == ()
+    saved = json.loads((tmp_path / "regeneration.json").read_text(encoding="utf-8"))
+    assert saved["files"] == [str(path) for path in files]
     assert (tmp_path / "c" / "observer.c").is_file()
 
 
@@ -119,7 +128,7 @@ def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:
     assert "spring" in lacking.reasons[0]
     assert lacking.words() == ()
     assert math.isnan(lacking.nominal[0])
-    assert report.regeneration_sections(lacking, {})
+    assert regeneration_sections(lacking, {})
 
 
 def test_without_a_measured_torque_there_is_an_observer_but_no_error() -> None:

@@ -5,29 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-import click
-
+from ..feedback.control import ScheduledTorque, joined, torque_controller
+from ..feedback.observer import designed_observer
 from ..foundation.errors import NlsError
-from .controller import controller_of
-
-if TYPE_CHECKING:
-    from ..model import FlatModel
+from ..model import FlatModel
 
 MACHINE = ("plant", "observer", "controller", "torque_loop")
 """What is written of a machine."""
 
-export_option = click.option(
-    "--export",
-    "exports",
-    is_flag=True,
-    help="Write observer, controller and both as one step from the better deck as C, and all as FMUs.",
-)
-
 
 class ExportedMachine(NamedTuple):
-    """What was written, by path with words, and what could not be written, with reasons."""
+    """What was written of a machine.
+
+    Parameters
+    ----------
+    files
+        Paths with a few words on each.
+    reasons
+        What could not be written, and why.
+    """
 
     files: dict[Path, str]
     reasons: tuple[str, ...]
@@ -36,7 +34,7 @@ class ExportedMachine(NamedTuple):
         """Return both for JSON."""
         return {"exported": [str(path) for path in self.files], "not_exported": list(self.reasons)}
 
-    def words(self) -> list[str]:
+    def findings(self) -> list[str]:
         """Return both in sentences."""
         written = [f"exported: {', '.join(map(str, self.files))}"] if self.files else []
         return [*written, *self.reasons]
@@ -55,12 +53,20 @@ def export_machine(
 
     What fails leaves the others.
 
-    ``plant``: flat model of a deck; all files name it. ``out``: folder; C stands in ``c``. ``observer``: of
-    the plant; by default the one that errs least over the spread of the deck.
+    Parameters
+    ----------
+    plant
+        Flat model of a deck; all files name it.
+    out
+        Folder; C stands in ``c``.
+    sample_time
+        Of what is computed in steps, in s.
+    observer
+        Of the plant; by default the one that errs least over the spread of the deck.
+    spring, measured
+        Series spring and measured state, where the structure leaves them open.
     """
-    from ..export import export_c, export_fmu
-    from ..feedback.control import joined
-    from ..feedback.observer import designed_observer
+    from ..export import export_c, export_fmu  # here, as its libraries take time to load
 
     @cache
     def observing() -> FlatModel:
@@ -70,7 +76,7 @@ def export_machine(
 
     @cache
     def controlling() -> FlatModel:
-        return controller_of(plant, sample_time, law="scheduled", bandwidth=None, velocity_bandwidth=None)
+        return torque_controller(plant, law=ScheduledTorque(), sample_time=sample_time)
 
     models: dict[str, Callable[[], FlatModel]] = {
         "plant": lambda: plant,

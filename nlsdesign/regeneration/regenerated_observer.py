@@ -8,20 +8,20 @@ fits after.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from .bench.discrepancy.block_prediction import shown_values
-from .bench.identification import Record, RecordSet
-from .bench.identification.least_squares import Fit
-from .export import export_c, export_fmu
-from .feedback.observer import (
+from ..bench.discrepancy.block_prediction import shown_values
+from ..bench.identification import Record, RecordSet
+from ..bench.identification.least_squares import Fit
+from ..feedback.observer import (
     AdaptiveDesign,
     FixedGrid,
     Grid,
@@ -30,16 +30,17 @@ from .feedback.observer import (
     design_observer_with_details,
     observe,
 )
-from .feedback.observer.scheduling.scheduled import whole_contour
-from .foundation.arrays import Array
-from .foundation.errors import MeasurementError, NlsError
-from .foundation.quantity import three_digits, with_unit
-from .foundation.work_sharing import parallel_map
-from .model import FlatModel
-from .model.readings import reading_of
-from .model.roles import measured_motion, series_spring
-from .model.structure import SpringNames
-from .simulation import Trace, declared_prior
+from ..feedback.observer.scheduling.scheduled import whole_contour
+from ..foundation.arrays import Array
+from ..foundation.errors import MeasurementError, NlsError
+from ..foundation.quantity import three_digits, with_unit
+from ..foundation.text_files import write_text
+from ..foundation.work_sharing import parallel_map
+from ..model import FlatModel
+from ..model.readings import reading_of
+from ..model.roles import measured_motion, series_spring
+from ..model.structure import SpringNames
+from ..simulation import Trace, declared_prior
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
@@ -205,9 +206,23 @@ def regenerate(
 ) -> Regeneration:
     """Design the observer again, and compare it with the one from the declared model.
 
-    ``records``: bench records; those that no fit has seen are compared, or all where there are none.
-    ``choice``: what is estimated; by default the torque of the series spring, every millisecond. Result: with
-    reasons in words where no observer can be designed or nothing can be compared.
+    Parameters
+    ----------
+    declared, better
+        The model as declared, and the one that a diagnosis has left.
+    records
+        From the bench; those that no fit has seen are compared, or all where there are none.
+    fits
+        Of the better model; their covariance gives the draws of its numbers.
+    choice
+        What is estimated; by default the torque of the series spring, every millisecond.
+    progress
+        Told what is being done.
+
+    Returns
+    -------
+    Regeneration
+        With reasons in words where no observer can be designed or nothing can be compared.
     """
     choice = choice or ObserverChoice()
     progress("designing the observer of the better model")
@@ -433,10 +448,26 @@ def _failures(spread: Sequence[float]) -> tuple[str, ...]:
     return (words,) if count else ()
 
 
-def write_regeneration(result: Regeneration, folder: Path) -> tuple[dict[Path, str], tuple[str, ...]]:
-    """Write the observer as C and FMU, and the plant of the better model as FMU."""
+def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration, dict[Path, str]]:
+    """Write the observer as C and FMU, the plant of the better model as FMU, and ``regeneration.json``.
+
+    Parameters
+    ----------
+    result
+        From :func:`regenerate`.
+    folder
+        C stands in ``c`` in it.
+
+    Returns
+    -------
+    tuple
+        The result, with reasons for what could not be written too; and the files of observer and plant, with
+        a few words on each.
+    """
+    from ..export import export_c, export_fmu  # here, as its libraries take time to load
+
     written: dict[Path, str] = {}
-    reasons = []
+    reasons = list(result.reasons)
     for name, model in {"observer": result.observer, "plant": result.plant}.items():
         if model is None:
             continue
@@ -447,4 +478,7 @@ def write_regeneration(result: Regeneration, folder: Path) -> tuple[dict[Path, s
             written[export_fmu(model, folder / f"{name}.fmu")] = f"{name} of the better model as FMU"
         except NlsError as error:
             reasons.append(f"the {name} is not exported: {error}")
-    return written, tuple(reasons)
+    result = replace(result, reasons=tuple(reasons))
+    content = {**result.to_dict(), "files": [str(path) for path in written]}
+    write_text(folder / "regeneration.json", json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    return result, written
