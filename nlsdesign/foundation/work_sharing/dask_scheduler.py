@@ -81,7 +81,7 @@ class DaskScheduler:
 
     @contextmanager
     def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
-        """Yield the workers of the scheduler, which get the work pickled; they go on after the block without it.
+        """Yield the workers of the scheduler, which get the work pickled, and live on without it.
 
         Raises
         ------
