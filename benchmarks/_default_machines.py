@@ -86,7 +86,7 @@ class Course:
     """Sines of the torque, one frequency after the other, as a declared machine would need them."""
 
     def __init__(self, model: nls.FlatModel, folder: Path) -> None:
-        self.library, self.declared = program(folder), numbers(model.values)
+        self.library, self.declared, self.parts = program(folder), numbers(model.values), PARTS
         self.drive = self.declared[1] / self.declared[0]
         self.torque_constant = model.values["motor.torque_constant"]
         grid = np.linspace(0.0, model.values["spring.cam.last_angle"], 2001)
@@ -118,7 +118,7 @@ class Course:
         angle, torque = np.zeros(samples), np.zeros(samples)
         acting = np.zeros(samples) if current is None else current.copy()
         self.library.run(
-            pointer(machine), samples, ctypes.c_double(TIME), PARTS,
+            pointer(machine), samples, ctypes.c_double(TIME), self.parts,
             ctypes.c_double(BANDWIDTH if current is None else 0.0), ctypes.c_double(self.drive),
             pointer(self.wanted), pointer(angle), pointer(acting), pointer(torque),
         )  # fmt: skip

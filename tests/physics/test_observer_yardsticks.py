@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
-from benchmarks._default_machines import COUNTED, FREQUENCIES, SINGLE, TIME, Course, numbers
+from benchmarks._default_machines import COUNTED, FREQUENCIES, PARTS, SINGLE, TIME, Course, numbers
 from benchmarks.observer_defaults import coordinates, drawn, judged, kinds, known_of
 from nlsdesign.model import FlatModel
 
@@ -31,10 +31,10 @@ def test_the_machine_in_c_is_that_of_the_package(published: FlatModel, course: C
     current = 9.0 * np.sin(2.0 * np.pi * 3.0 * time)
     machine = numbers(published.values)
     machine[SINGLE.index("motor_encoder.quantum")] = 0.0
-    wanted, course.wanted = course.wanted, course.wanted[:400]
+    wanted, course.wanted, course.parts = course.wanted, course.wanted[:400], 100
     ours = course.run(machine, current)
-    course.wanted = wanted
-    theirs = nls.simulate(published, time, inputs={"motor.current": current}, hold=True)
+    course.wanted, course.parts = wanted, PARTS
+    theirs = nls.simulate(published, time, inputs={"motor.current": current}, hold=True, tolerance=1e-10)
     assert np.max(np.abs(theirs["motor.angle"])) > 0.3
     np.testing.assert_allclose(ours.angle, theirs["motor.angle"], atol=2e-6)
     np.testing.assert_allclose(ours.torque, theirs["spring.torque"], atol=2e-5)

@@ -1,14 +1,14 @@
 """What the balance of the driven body can tell of the torque of its spring: few terms, each with a factor.
 
-J·ω̇ is the sum of what the drive gives, of what the spring gives at rest and of what relaxes in it, of viscous and
-of dry friction. A machine whose numbers differ from the deck's has other factors on these terms,
+J·ω̇ is the sum of what the drive gives, of what the spring gives at rest and of what relaxes in it, of viscous
+and of dry friction. A machine whose numbers differ from the deck's has other factors on these terms,
 
     J·ω̇ − Σ φⱼ = Σ cⱼ·φⱼ + c₀,    ln(1 + cⱼ) = (change of the term) − (change of the inertia),
 
-with an offset of the input, c₀, as the last. The acceleration is a sum of the others, so it is on the left alone
-and its noise is in no term. With numbers p = p₀·exp(L·ξ) the factors, and those of the two parts of the torque,
-are to first order linear in the same ξ: their joint covariance says what the factors tell of the torque, and what
-no motion can tell, as a common scale of drive, spring and inertia.
+with an offset of the drive, c₀, as the last. The acceleration is a sum of the others, so it is on the left
+alone and its noise is in no term. With numbers p = p₀·exp(L·ξ) the factors, and those of the two parts of the
+torque, are to first order linear in the same ξ: their joint covariance says what the factors tell of the
+torque, and what no motion can tell, as a common scale of drive, spring and inertia.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
 from ....simulation.prior import Prior
-from ..scheduling.angle_form import AngleForm
 from ...analysis.rest import evaluate_rows
+from ..scheduling.angle_form import AngleForm
 from .duty_and_directions import (
     STEP,
     Duty,
@@ -40,7 +40,7 @@ TERMS = (
 )  # fmt: skip
 """Terms of the balance in the order of their factors."""
 OFFSET_SHARE = 0.02
-"""Standard deviation of an offset of the drive that no deck declares, as a share of the torque of the duty."""
+"""Standard deviation of an offset of the drive that no deck declares, as a share of that of the duty."""
 SLOW = 0.02
 """Speed below which the actuator may stand, as a share of the largest on the slowest sine of the duty."""
 ELSEWHERE = 1e-6
@@ -70,8 +70,8 @@ class Balance:
     correlation
         Of them, shape (terms, terms).
     slopes
-        Expected change of the logarithm of the torque at rest and of that which relaxes, per unit of ln(1 + c) of
-        each factor, shape (2, terms).
+        Expected change of the logarithm of the torque at rest and of that which relaxes, per unit of
+        ln(1 + c) of each factor, shape (2, terms).
     unseen
         Covariance of both that is left when all factors are known, shape (2, 2).
     alone
@@ -100,13 +100,7 @@ class Balance:
 
 
 def balance_of(form: AngleForm, prior: Prior, duty: Duty) -> Balance:
-    """Return the balance of a machine, and what is known of it.
-
-    Raises
-    ------
-    ArrangementError
-        If no input moves the body, something else than the spring does so at rest, or no number is uncertain.
-    """
+    """Return the balance of a machine, and what is known of it; refused where the spring is not alone."""
     points = operating_points(form, duty)
     _, place = push(form)
     if place is None:
@@ -115,8 +109,8 @@ def balance_of(form: AngleForm, prior: Prior, duty: Duty) -> Balance:
             next_step="keep the current of the motor among the inputs",
         )  # fmt: skip
     declared = _numbers(form, points)
-    _check_spring_alone(form, declared.inertia)
-    factors, parts, missed, before = _changes(form, prior, points, declared)
+    check_spring_alone(form, declared.inertia)
+    factors, parts, missed, before = changes_of(form, prior, points, declared)
     used = [k for k in range(OFFSET) if np.linalg.norm(factors[k]) > 1e-9]
     if not used or not np.any(parts):
         raise ArrangementError(
@@ -132,7 +126,8 @@ def balance_of(form: AngleForm, prior: Prior, duty: Duty) -> Balance:
     return Balance(
         declared.inertia, declared.push * declared.inertia, form.free_inputs.index(place),
         -declared.damping * declared.inertia, -declared.dry * declared.inertia,
-        SLOW * points.amplitude * min(points.pulsations), points.torque, (*used, OFFSET), deviations, correlation,
+        SLOW * points.amplitude * min(points.pulsations), points.torque, (*used, OFFSET), deviations,
+        correlation,
         np.hstack([slopes, np.zeros((2, 1))]), parts @ parts.T - slopes @ seen @ parts.T,
         np.linalg.norm(parts, axis=1), missed, before,
     )  # fmt: skip
@@ -159,10 +154,10 @@ def _numbers(form: AngleForm, points: OperatingPoints) -> _Numbers:
     return _Numbers(own[:count], own[count:], spring_inertia(form), push(form)[0], damping, dry)
 
 
-def _changes(
+def changes_of(
     form: AngleForm, prior: Prior, points: OperatingPoints, declared: _Numbers
 ) -> tuple[Array, Array, float, float]:
-    """Return changes of the factors and of both parts of the torque per ξ, the torque of neither, and all of it.
+    """Return changes of factors and of both parts of the torque per ξ, torque of neither, and all of it.
 
     Shapes (5, ξ) and (2, ξ).
     """
@@ -192,7 +187,7 @@ def _changes(
     return factors, parts, math.sqrt(missed), math.sqrt(before)
 
 
-def _check_spring_alone(form: AngleForm, inertia: float) -> None:
+def check_spring_alone(form: AngleForm, inertia: float) -> None:
     """Raise unless the machine at rest is moved by the torque of the spring alone."""
     x = form.rest_in_model_order(form.layout.angles)
     rate, wanted = evaluate_rows(form.rates_and_estimate, x, np.tile(form.u, (len(x), 1)), form.p)

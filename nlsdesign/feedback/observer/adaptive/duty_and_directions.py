@@ -191,10 +191,10 @@ class Trust:
         If a number is not positive.
     """
 
-    unmodelled: float = 0.005
+    unmodelled: float = 0.02
     correlation_time: float = 0.02
     drift_time: float = 60.0
-    counts: float = 1.0
+    counts: float = 4.0
     limit: float = 2.5
     surprise: float = 3.0
     smallest: float = 0.0004

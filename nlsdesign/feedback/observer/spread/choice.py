@@ -23,8 +23,8 @@ from ....simulation.sampled_batch import PLANT, run_batch
 from ...analysis.kalman import NoiseAssumptions, declared_deviation
 from ...analysis.rest_points import rest_points
 from ..adaptive.adaptive_observer import SPREAD, AdaptiveDesign, design_adaptive_observer, encoder_quantum
+from ..adaptive.corrected_cascade import PREFIX, CorrectedDesign, design_corrected_observer
 from ..adaptive.duty_and_directions import AdaptiveSettings
-from ..adaptive.corrected_cascade import CorrectedDesign, design_corrected_observer
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from ..certificates.certificate import Certificate
 from ..certificates.co_design import CertifiedGain
@@ -113,7 +113,7 @@ def choose_observer(
         corrected = design_corrected_observer(
             model, estimate=estimate, measured=measured, sample_time=sample_time, settings=settings, grid=grid
         )
-        learned = _expected(model, corrected, settings)
+        learned = expected_error(model, corrected, settings)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
         return ObserverOfChoice(cascade, f"cascade, for it cannot be corrected: {error}", ())
@@ -125,14 +125,14 @@ def choose_observer(
     return ObserverOfChoice(cascade, f"cascade: the corrected one has {both}", (alone, learned))
 
 
-def _expected(model: FlatModel, design: CorrectedDesign, settings: AdaptiveSettings) -> float:
+def expected_error(model: FlatModel, design: CorrectedDesign, settings: AdaptiveSettings) -> float:
     """Return the deviation that the observer expects along the bench with the numbers of the deck."""
     plant = design.step.plant
     bench = observer_bench(
         model, duty=settings.duty, estimate=plant.estimate.name, measured=plant.angle,
         sample_time=design.step.sample_time,
     )  # fmt: skip
-    name = f"observer.{plant.estimate.name}.{SPREAD}"
+    name = f"observer.{PREFIX}.{SPREAD}"
     batch = run_batch(bench.system({"observer": design.model}), bench.stop, inputs=bench.inputs, keep=[name])
     counted = np.zeros(len(batch.time), dtype=bool)
     for _, first, last in bench.stretches:
