@@ -10,12 +10,17 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
+
+# Pip builds before it compares versions, and an old Python would fail there by a call that it does not know.
+if sys.version_info < (3, 11):  # noqa: UP036
+    raise SystemExit(f"nlsdesign needs Python 3.11 or newer; this is {sys.version.split()[0]}.")
 
 _FENCE = re.compile(r"(^```.*?^```$)", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"(?P<picture>!?)\[(?P<words>[^\]]+)\]\((?P<target>[^)\s]+)\)")

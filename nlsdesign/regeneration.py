@@ -33,8 +33,8 @@ from .feedback.observer import (
 from .feedback.observer.scheduling.scheduled import whole_contour
 from .foundation.arrays import Array
 from .foundation.errors import MeasurementError, NlsError
-from .foundation.processes import parallel_map
 from .foundation.quantity import three_digits, with_unit
+from .foundation.work_sharing import parallel_map
 from .model import FlatModel
 from .model.readings import reading_of
 from .model.roles import measured_motion, series_spring

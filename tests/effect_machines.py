@@ -111,6 +111,31 @@ def wheels() -> Assembly:
     )
 
 
+def elastic() -> Assembly:
+    """A motor that turns an arm through a shaft, with an encoder on both."""
+    return assembly(
+        "elastic",
+        motor=GearedMotor(inertia=0.02, gear_ratio=50.0, torque_constant=0.03),
+        arm=Inertia(inertia=0.3),
+        shaft=tie(Spring(stiffness=80.0, domain=ROTATION), "motor", "arm"),
+        encoder=Encoder(of="motor.angle", quantum=1e-4),
+        outer=Encoder(of="arm.angle", quantum=1e-4),
+        ammeter=CurrentSensor(of="motor.current"),
+    )
+
+
+def train() -> Assembly:
+    """Two masses with a spring between them and a scale beside each."""
+    return assembly(
+        "train",
+        front=Mass(mass=2.0),
+        back=Mass(mass=3.0),
+        coupling=tie(Spring(stiffness=900.0), "front", "back"),
+        first=Encoder(of="front.position", quantum=1e-6, domain=TRANSLATION),
+        second=Encoder(of="back.position", quantum=1e-6, domain=TRANSLATION),
+    )
+
+
 MACHINES: dict[str, Callable[[], Assembly]] = {
     "rig": lambda: declare(load_deck("test_rig")),
     "strip": lambda: declare(load_deck("vhb4910_specimen")),
@@ -122,6 +147,8 @@ MACHINES: dict[str, Callable[[], Assembly]] = {
     "tensile": tensile,
     "torsion": torsion,
     "wheels": wheels,
+    "elastic": elastic,
+    "train": train,
 }
 
 

@@ -183,12 +183,10 @@ def read_input_file(file: Path, model: FlatModel) -> tuple[Any, dict[str, Any]]:
     """
     import numpy as np
 
-    from ..bench.identification.records.csv_files import heads_with_units, read_csv, times_among
+    from ..bench.identification.records.column_heads import times_among
+    from ..foundation.csv_tables import heads_with_units, read_csv
 
-    try:
-        table = read_csv(file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeasurementError(str(file), f"cannot be read: {error}", next_step="name a CSV file") from None
+    table = read_csv(file)
     heads = dict(zip(heads_with_units(file.name, table.heads, table.units), table.heads, strict=True))
     times = times_among(list(heads))
     if not times:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -16,9 +17,10 @@ def workers_option(command: F) -> F:
 
     @functools.wraps(command)
     def shared(*words: Any, **given: Any) -> Any:
-        from ..foundation.processes import at_most
+        from ..foundation.work_sharing import Processes, spread_over
 
-        with at_most(given.pop("workers")):
+        workers = given.pop("workers")
+        with contextlib.nullcontext() if workers is None else spread_over(Processes(workers)):
             return command(*words, **given)
 
     option = click.option(

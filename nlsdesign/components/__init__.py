@@ -61,6 +61,7 @@ from .mechanics.drive_faults import (
 from .mechanics.friction import (
     AsymmetricFriction,
     CoulombFriction,
+    GearFriction,
     LoadFriction,
     QuadraticDrag,
     StribeckFriction,
@@ -74,7 +75,14 @@ from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
 from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
-from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
+from .sensing.sensor_faults import (
+    ClockDrift,
+    Drift,
+    Eccentricity,
+    EncoderOffset,
+    LoadNonlinearity,
+    TransportDelay,
+)
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, ReadingLimits, Sensor, TorqueSensor
 from .transmission.cam import Cable, Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
@@ -123,6 +131,7 @@ __all__ = [
     "ElectricMotor",
     "Element",
     "Encoder",
+    "EncoderOffset",
     "EndStop",
     "ExtendedTube",
     "FittedRange",
@@ -131,6 +140,7 @@ __all__ = [
     "Following",
     "ForceSensor",
     "Gear",
+    "GearFriction",
     "GearedMotor",
     "GradualSaturation",
     "GravityLoad",

@@ -5,6 +5,7 @@ Errors are written with the prefix of their unit that leaves no power of ten.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Iterable
@@ -13,7 +14,17 @@ from .errors import UnitError
 from .quantity import parse_unit, typeset_unit
 
 _COMMA = re.compile(r",(?P<digits>\d[\d.,]*(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)$")
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
+_FORMS_OF_HEADS = tuple(
+    re.compile(rf"^(?P<name>.*?){behind}$")
+    for behind in (
+        r"\s*\[(?P<unit>[^\]]+)\]",
+        r"\s*\((?P<unit>[^)]+)\)",
+        r"_(?P<unit>[^_]+)",
+        r"\s+in\s+(?P<unit>\S+)",
+        r"\s*[/,]\s*(?P<unit>\S+)",
+    )
+)
+"""Forms in which heads of columns give units; what holds no unit belongs to the name."""
 
 
 def split_number(text: str) -> tuple[float, str]:
@@ -45,15 +56,42 @@ def _with_comma(text: str, whole: str, behind: re.Match[str]) -> UnitError:
     return UnitError(f"'{text}'", "has a comma; decimals are written with a point", next_step=step)
 
 
+_OF_HEADS = {
+    "Nm": "N*m", "mNm": "mN*m", "kNm": "kN*m", "Nmm": "N*mm", "Ncm": "N*cm", "Newton": "N", "Ampere": "A",
+    "amps": "A", "sec": "s", "Sek": "s", "Sekunden": "s", "seconds": "s", "msec": "ms", "Grad": "deg",
+    "degrees": "deg", "radians": "rad", "U/min": "rpm",
+}  # fmt: skip
+"""Units as heads of columns have them, where nothing else can be meant; a deck asks for the symbol."""
+
+
+def unit_as_written(text: str) -> str:
+    """Return the symbol of a unit for what a head of a column calls it.
+
+    Examples
+    --------
+    >>> unit_as_written("Nm"), unit_as_written("mm")
+    ('N*m', 'mm')
+    """
+    return _OF_HEADS.get(text.strip(), text.strip())
+
+
 def name_and_unit(head: str) -> tuple[str, str | None]:
-    """Return what the head of a column says, ``name [unit]`` or ``name_unit``: its name and its unit."""
-    match = _BRACKETED.match(head)
-    name, _, unit = (match["name"], "", match["unit"]) if match else head.rpartition("_")
-    try:
-        parse_unit(unit)
-    except UnitError:
-        return head, None  # brackets that hold no unit belong to the name
-    return name, unit
+    """Return what the head of a column says: its name and its unit.
+
+    Examples
+    --------
+    >>> name_and_unit("force [kN]"), name_and_unit("t_ms"), name_and_unit("Moment in Nm")
+    (('force', 'kN'), ('t', 'ms'), ('Moment', 'N*m'))
+    """
+    for form in _FORMS_OF_HEADS:
+        match = form.match(head)
+        if match is None:
+            continue
+        unit = unit_as_written(match["unit"])
+        with contextlib.suppress(UnitError):
+            parse_unit(unit)
+            return match["name"], unit
+    return head, None
 
 
 _PREFIXES = ((1e3, 1e-3, "k"), (1.0, 1.0, ""))

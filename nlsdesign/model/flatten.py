@@ -117,6 +117,8 @@ def _write_mechanics(assembly: Assembly, builder: EquationBuilder) -> None:
         effort = observed_effort(part.element, scopes[name], one.motion - other.motion, one.rate - other.rate)
         for sign, body in zip((-1, 1), part.between, strict=False):
             sums[body] += sign * effort
+        at_end = part.element.at_first_end(scopes[name], effort, one.rate)
+        sums[part.between[0]] -= 0 if at_end is None else at_end
     for name, turned in bodies.items():
         if name in geared:
             balance_train(geared[name], scopes, turning[name], sums)

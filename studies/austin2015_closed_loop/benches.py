@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import lru_cache
 
 import nlsdesign as nls
 from nlsdesign.components.assembly.changed_copies import with_moved_load
@@ -124,22 +124,19 @@ class Bench:
         """Return the same with one thing changed."""
         return replace(self, cause=cause)
 
-    @cached_property
+    @property
     def actuator(self) -> nls.Assembly:
         """The actuator as observer and controller know it."""
-        return self.cause.known(nls.declare(nls.load_deck(DECKS[self.spring])))
+        return _known_drive(self.spring, self.cause.known)[0]
 
     def loop(self, *, moved: bool = False) -> ClosedLoop:
         """Return the closed loop, with the load fixed or moved."""
-        bench = nls.flatten(self.actuator, outputs=list(OUTPUTS))
-        # A cam ends by itself; where there is none the observer's own range would end at 90 degrees.
-        reach = None if any(spring.cams for spring in bench.springs) else REACH
-        observer = nls.design_observer(bench, gain=CascadeGain(), grid=reach)
+        actuator, bench, observer = _known_drive(self.spring, self.cause.known)
         if self.law is None:
             controller = torque_controller(bench, gains=self.cause.gains(self.gains))
         else:
             controller = torque_controller(bench, law=self.law)
-        real = self.cause.hidden(self.actuator)
+        real = self.cause.hidden(actuator)
         plant = nls.flatten(with_moved_load(real) if moved else real, outputs=list(OUTPUTS))
         late = self.late if self.cause.late is None else self.cause.late
         return encoder_loop(
@@ -158,6 +155,18 @@ class Bench:
         return zero_torque(
             self.loop(moved=True), amplitude=nls.degrees(degrees), frequencies=frequencies, translate=natively
         )
+
+
+@lru_cache(maxsize=8)
+def _known_drive(
+    spring: str, known: Callable[[nls.Assembly], nls.Assembly]
+) -> tuple[nls.Assembly, nls.FlatModel, nls.FlatModel]:
+    """Return actuator, bench and observer, which whatever gains and hidden causes leave as they are."""
+    actuator = known(nls.declare(nls.load_deck(DECKS[spring])))
+    bench = nls.flatten(actuator, outputs=list(OUTPUTS))
+    # A cam ends by itself; where there is none the observer's own range would end at 90 degrees.
+    reach = None if any(spring.cams for spring in bench.springs) else REACH
+    return actuator, bench, nls.design_observer(bench, gain=CascadeGain(), grid=reach)
 
 
 def angle_of(torque: float) -> float:

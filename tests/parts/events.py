@@ -7,6 +7,7 @@ from nlsdesign.components import (
     Backlash,
     CoulombFriction,
     EndStop,
+    GearFriction,
     LoadFriction,
     LuGreFriction,
     Part,
@@ -22,6 +23,7 @@ _SPRING = (("spring", Spring(stiffness=3.4, domain=ROTATION)),)
 EXAMPLES: tuple[Part, ...] = (
     CoulombFriction(sliding_effort=0.02),
     StribeckFriction(sliding_effort=0.02, breakaway=0.01, stribeck_speed=0.5),
+    GearFriction(ratio=0.1, members=_SPRING),
     LoadFriction(ratio=0.1, members=_SPRING),
     LuGreFriction(
         stiffness=120.0, bristle_damping=0.1, damping=1e-3,

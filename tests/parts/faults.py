@@ -12,6 +12,7 @@ from nlsdesign.components import (
     DriveDelay,
     DriveSaturation,
     Eccentricity,
+    EncoderOffset,
     GradualSaturation,
     LoadNonlinearity,
     Part,
@@ -36,6 +37,8 @@ _PARTS: tuple[Part, ...] = (
     SpotFriction(sliding_effort=2.0, place=0.03, width=0.01, domain=TRANSLATION).smooth(),
     WavyFriction(sliding_effort=0.02, sine=0.005, cosine=0.01),
     WavyFriction(sliding_effort=0.02, sine=0.005, cosine=0.01).smooth(),
+    EncoderOffset(of="motor.angle", offset=0.02),
+    EncoderOffset(of="carriage.position", offset=1e-3, domain=TRANSLATION),
     Eccentricity(of="motor.angle", sine=0.01, cosine=-0.006),
     CamWithProfileError(
         lever_arm=(0.016, 0.014, 0.013, 0.013, 0.014, 0.015),

@@ -13,6 +13,7 @@ from nlsdesign.components import (
     DrivePart,
     Element,
     Encoder,
+    EncoderOffset,
     GearedMotor,
     Inertia,
     Mass,
@@ -36,7 +37,7 @@ EXAMPLES: list[Part] = []
 
 def around(part: Part) -> Assembly:
     """The smallest system in which the part does something."""
-    if isinstance(part, Encoder) and part.domain == TRANSLATION:
+    if isinstance(part, Encoder | EncoderOffset) and part.domain == TRANSLATION:
         spring = tie(Spring(stiffness=2500.0), "carriage")
         return assembly("bench", carriage=Mass(mass=0.4), spring=spring, part=part)
     if isinstance(part, Sensor):
@@ -75,6 +76,8 @@ def named(part: Part) -> str:
     """Class, readings and domain of an example, as its name."""
     held = [type(getattr(part, field)).__name__ for field in readings(type(part))]
     domain = (
-        [part.domain.name] if isinstance(part, Element | Body | Encoder) and len(part.domains()) > 1 else []
+        [part.domain.name]
+        if isinstance(part, Element | Body | Encoder | EncoderOffset) and len(part.domains()) > 1
+        else []
     )
     return "-".join([type(part).__name__, *held, *domain])

@@ -199,6 +199,12 @@ ROWS: tuple[Row, ...] = (
         _BACKLASH + "ripple_does_no_work_over_a_turn",
     ),
     Row(
+        c.GearFriction,
+        "sum of efforts",
+        ("acceleration of both bodies", "law by hand"),
+        _BACKLASH + "friction_of_a_gear_acts_on_the_first_body_alone",
+    ),
+    Row(
         c.LoadFriction,
         "dissipation",
         ("law", "efficiency by hand"),

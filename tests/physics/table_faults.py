@@ -75,6 +75,12 @@ ROWS: tuple[Row, ...] = (
         _HERE + "friction_of_a_place_takes_its_work",
     ),
     Row(
+        c.EncoderOffset,
+        "definition",
+        ("reading", "angle and offset"),
+        _HERE + "an_encoder_whose_zero_is_off_reads_as_much_too_much_everywhere",
+    ),
+    Row(
         c.Eccentricity,
         "geometry",
         ("reading", "line of sight to a disc off its shaft"),

@@ -20,6 +20,7 @@ from nlsdesign.components import (
     Driven,
     Element,
     Fixed,
+    GearFriction,
     Inertia,
     Inertial,
     InextensibleCable,
@@ -212,6 +213,22 @@ def test_load_friction_takes_its_share_of_the_load_and_only_takes(angle: float, 
     )
     assert found == pytest.approx(3.4 * angle + 0.05 * abs(3.4 * angle) * math.copysign(1, speed), rel=1e-9)
     assert (found - 3.4 * angle) * speed >= 0.0
+
+
+@given(st.floats(-0.5, 0.5), st.sampled_from([-2.0, 2.0]), st.sampled_from([-3.0, 0.0, 3.0]))
+def test_friction_of_a_gear_acts_on_the_first_body_alone(angle: float, speed: float, far: float) -> None:
+    """Its sign is that of the speed of the first body, whatever the second one does."""
+    law = GearFriction(members=(("s", SPRING),), ratio=0.1, contact=Regularised(creep_speed=0.02))
+    bodies = {"motor": Inertia(inertia=0.5), "joint": Inertia(inertia=2.0)}
+    model = flatten(assembly("a", **bodies, link=tie(law, "motor", "joint")))
+    names = [v.name for v in model.states]
+    place = {"motor.angle": angle, "motor.speed": speed, "joint.angle": 0.0, "joint.speed": far}
+    now = model.evaluate([place[name] for name in names], [0.0] * len(model.inputs))
+    load = 3.4 * angle
+    friction = 0.1 * abs(load) * math.copysign(1.0, speed)
+    assert now["link.torque"] == pytest.approx(load)
+    assert now["motor.acceleration"] == pytest.approx(-(load + friction) / 0.5, rel=1e-9)
+    assert now["joint.acceleration"] == pytest.approx(load / 2.0)
 
 
 def test_sliding_fillers_do_not_know_the_rate_and_only_lose() -> None:

@@ -22,6 +22,7 @@ from nlsdesign.components import (
     DriveSaturation,
     Eccentricity,
     Element,
+    EncoderOffset,
     GearedMotor,
     GradualSaturation,
     Inertia,
@@ -135,6 +136,16 @@ def test_an_eccentric_disc_reads_what_geometry_says() -> None:
         assert reading == pytest.approx(seen(float(angle)) - seen(0.0), abs=2.0 * share**2)
         back = float(disc.infer(_Plain(disc), ca.SX(reading)))
         assert back == pytest.approx(angle, abs=2.0 * share**4 + 2e-9)
+
+
+def test_an_encoder_whose_zero_is_off_reads_as_much_too_much_everywhere() -> None:
+    off = EncoderOffset(of="wheel.angle", offset=0.02)
+    model = flatten(assembly("a", wheel=Inertia(inertia=1.0), dial=off))
+    for angle in (-0.7, 0.0, 0.4):
+        reading = model.evaluate([angle, 0.0])["dial.reading"]
+        assert reading == pytest.approx(angle + 0.02)
+        assert float(off.infer(_Plain(off), ca.SX(reading))) == pytest.approx(angle)
+    assert off.recorded(np.arange(2.0), np.array([0.0, 0.3]), np.random.default_rng(0))[1] == 0.32
 
 
 def test_a_disc_on_the_motor_turns_with_the_gear() -> None:

@@ -116,8 +116,18 @@ def diagnose(
     base = case.comparison.base(actuator)
     effects = known_effects() if catalogue is None else catalogue
     outcome, decision = _decided(case, base, effects, progress)
+    again = case.read_as_told_beside(outcome)
+    if again is not None:
+        progress("reading inputs between their samples as they run beside what is named")
+        case = again
+        base = case.comparison.base(actuator)
+        outcome, decision = _decided(case, base, effects, progress)
     progress("reading the held-out records")
     return _verdict(case, base, outcome, decision, records)
+
+
+_SAME_SAMPLING = 0.1
+"""Samples by which an input may be read otherwise without a second look at everything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +143,27 @@ class _Case:
         """Return the excess of each block on all samples."""
         return excesses(hypothesis, self.bench, self.criteria)
 
+    def read_as_told_beside(self, outcome: Outcome) -> _Case | None:
+        """Return the case with inputs read between their samples as records tell it beside what is named.
+
+        Backlash that nobody declared, for instance, hides at first that a current is held. Nothing is
+        returned where the inputs are read so already.
+        """
+        if not outcome.steps:
+            return None
+        bench = self.bench
+        records = bench.inferred(blocks_of(flatten(outcome.last.fitted), bench.records.signals))
+        moved = (
+            abs(now.sampling.late - then.sampling.late)
+            for then, now in zip(bench.records.columns, records.columns, strict=True)
+            if then.sampling and now.sampling
+        )
+        if max(moved, default=0.0) <= _SAME_SAMPLING:
+            return None
+        bench = Bench(records, blocks_of(flatten(self.actuator), records.signals))
+        sizes = typical_sizes(self.actuator, bench.records)
+        return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
+
 
 def _decided(
     case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
@@ -145,7 +176,7 @@ def _decided(
     ]
     findings = findings or drive_findings(case.actuator, case.comparison, base)
     lagging = lagging_forces(case.actuator, records)
-    if findings or (lagging.findings and not lagging.testable):
+    if findings:
         findings += lagging.findings
         return Outcome(base), _Decision("data_suspect", tuple(str(f) for f in findings))
     outcome = _searched(case, base, catalogue, progress)
@@ -220,11 +251,13 @@ def _verdict(
     base = base.as_written()
     better = outcome.last if verdict == "named" or outcome.last.released else base
     steps = outcome.steps if verdict == "named" else ()
-    # No record is proposed for the values of a table that has no name.
-    known = tuple(better.as_written().fits.values())
+    # The numbers of a name are those of the fit that was judged, and so is what they leave. No record is
+    # proposed for the values of a table that has no name.
+    judged = better = better.as_written()
+    left, known = case.excesses(judged), tuple(judged.fits.values())
+    complete = is_complete(left)
     if verdict in ("named", "unknown", "undecidable"):
-        better = with_what_has_no_name(case.comparison, better, case.criteria)
-    better = better.as_written()
+        better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)
     worst = _furthest([n for n in before if n != DECLARED], before)
     unpredictable = [k for k in case.bench.floors if k in better.unpredictable]
@@ -233,7 +266,7 @@ def _verdict(
     experiment = _experiment(case, base, outcome, decision)
     return Verdict(
         verdict,
-        tuple(_named(better, step, place, complete=is_complete(after)) for place, step in enumerate(steps)),
+        tuple(_named(judged, better, step, place, left) for place, step in enumerate(steps)),
         ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
@@ -252,7 +285,7 @@ def _verdict(
             *((experiment.words(),) if experiment else ()),
         ),
         outcome.skipped,
-        complete=is_complete(after),
+        complete=complete,
         criteria=case.criteria,
         remarks=tuple(dict.fromkeys(str(r) for r in (*records.remarks, *every.bench.records.remarks))),
         unnamed=tuple(_unnamed(better, each) for each in better.added[len(steps) :]),
@@ -281,11 +314,16 @@ def _furthest(names: Sequence[str], excesses: Excesses) -> str:
 
 
 def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[Any, ...], ...]:
-    """Return what was tried first: identifier, share that it explains alone, and why it is not named."""
+    """Return what was tried first: identifier, share that it explains alone, why it is not named, numbers."""
     named = {step.effect for step in steps}
     first = sorted(outcome.tried, key=lambda each: each.candidate.effect not in named)[:_RUNNERS_UP]
     return tuple(
-        (each.candidate.effect, each.share, *(("; ".join(each.objections),) if each.objections else ()))
+        (
+            each.candidate.effect,
+            each.share,
+            "; ".join(each.objections),
+            _numbers(each.hypothesis, each.candidate, each.candidate),
+        )
         for each in sorted(first, key=lambda each: -each.share)
     )
 
@@ -316,15 +354,12 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
 def _strained(before: Excess, after: Excess, better: Hypothesis) -> str:
     scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
     far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
-    which = f": {', '.join(f'{n} {abs(scores[n]):.1f} {_side(scores[n])}' for n in far)}" if far else ""
+    sides = (f"{n} {abs(scores[n]):.1f} {'above' if scores[n] > 0.0 else 'below'}" for n in far)
+    which = f": {', '.join(sides)}" if far else ""
     return (
         f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
         f"{after.fit:.1f} after{which}"
     )
-
-
-def _side(score: float) -> str:
-    return "above" if score > 0.0 else "below"
 
 
 def _not_predicted(key: Key) -> str:
@@ -335,10 +370,13 @@ def _not_predicted(key: Key) -> str:
     )
 
 
-def _numbers(last: Hypothesis, candidate: Candidate) -> dict[str, tuple[float, str, float]]:
-    own = {u.name for u in candidate.unknowns}
+def _numbers(
+    last: Hypothesis, candidate: Candidate, written: Candidate
+) -> dict[str, tuple[float, str, float]]:
+    """Return the fitted numbers of an effect, by the names that they have in the deck that is written."""
+    own = {u.name: w.name for u, w in zip(candidate.unknowns, written.unknowns, strict=True)}
     return {
-        p.name: (last.values[p.name], p.unit, fit.standard_error(p.name))
+        own[p.name]: (last.values[p.name], p.unit, fit.standard_error(p.name))
         for fit in last.fits.values()
         for p in fit.parameters
         if p.name in own
@@ -349,7 +387,7 @@ def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
     return NamedEffect(
         candidate.effect,
         candidate.location,
-        _numbers(last, candidate),
+        _numbers(last, candidate, candidate),
         (),
         math.nan,
         candidate.signature,
@@ -357,18 +395,23 @@ def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
     )
 
 
-def _named(last: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
+def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, left: Excesses) -> NamedEffect:
     # Later edits may have put the same number under a longer name: the last hypothesis knows.
-    candidate = last.added[place]
+    candidate, here = last.added[place], left[step.block]
+    # What is left in the block, in multiples of its noise floor.
+    times_noise = math.sqrt(max(1.0, here.mean_square)) if here.open else 1.0
     return NamedEffect(
         candidate.effect,
         candidate.location,
-        _numbers(last, candidate),
+        _numbers(last, candidate, written.added[place]),
         tuple(h.newest.effect for h in step.equals),
         step.share,
         candidate.signature,
         candidate.source,
-        probability=CALIBRATION.probability(step.distance, complete=complete) / (1 + len(step.equals)),
+        probability=CALIBRATION.probability(
+            step.distance, complete=is_complete(left), times_noise=times_noise
+        )
+        / (1 + len(step.equals)),
         evidence=_evidence(step, standing_of(candidate.unknowns, last.fits.values())),
     )
 

@@ -147,14 +147,17 @@ def scaled_balance(
     """
     for reading in drives:
         given = _effort_at_standstill(terms, reading)
-        slope = ca.substitute(ca.jacobian(given, reading), reading, ca.SX(0))
+        slope = _at_start(terms, ca.substitute(ca.jacobian(given, reading), reading, ca.SX(0)))
         declared = _declared(terms, slope)
         if declared == 0.0 or not np.isfinite(declared):
             continue
         tangent = ca.jacobian(given, reading)
         if not depends(tangent, reading):
             direct = depends(terms.balance, reading) and not _states_behind(terms, reading)
-            in_motion = -ca.jacobian(terms.balance, reading) if direct else slope
+            in_motion = -ca.jacobian(terms.balance, reading) if direct else tangent
+            if _clocks(terms):
+                first = _at_start(terms, in_motion)
+                in_motion = first * _between_least_and_one(in_motion / first)
             return terms.balance * (declared / in_motion), declared
         tiny = _NEAR_ZERO**2
         line = (given * reading + tiny * slope) / (reading * reading + tiny)
@@ -162,6 +165,8 @@ def scaled_balance(
         inside = ca.substitute(tangent, reading, _INSIDE * reading)
         share = ca.fmax(inside / slope, _LEAST_SLOPE * line / slope)
         share = ca.if_else(inside == 0, line / slope, share)
+        if _clocks(terms):
+            share = _between_least_and_one(share)
         return terms.balance * (declared / (slope * share)), declared
     if any(depends(terms.balance, reading) for reading in efforts):
         return terms.balance, 1.0
@@ -169,14 +174,37 @@ def scaled_balance(
     return terms.balance * (declared / inertia), declared
 
 
+def _clocks(terms: BalanceTerms) -> list[int]:
+    """Return the states that go on with time alone, whatever is measured."""
+    moving = ca.vertcat(terms.readings, terms.state)
+    return [i for i in range(terms.state.numel()) if not depends(terms.derivative[i], moving)]
+
+
+def _at_start(terms: BalanceTerms, value: Expression) -> Expression:
+    """Return a value at the time at which a record starts: no drift has happened yet."""
+    clocks = ca.vertcat(ca.SX(0, 1), *[terms.state[i] for i in _clocks(terms)])
+    started: Expression = ca.substitute(value, clocks, ca.SX.zeros(clocks.shape))
+    return started
+
+
+def _between_least_and_one(share: Expression) -> Expression:
+    """Return a share of a slope that lets no error count less than it does, or more than ten times.
+
+    A drive that becomes stronger with time would make any error small, also one of nothing; one that vanishes
+    would no longer be judged.
+    """
+    return ca.fmax(_LEAST_SLOPE, ca.fmin(share, 1))
+
+
 def _effort_at_standstill(terms: BalanceTerms, reading: Expression) -> Expression:
     """Return the effort that a constant drive gives in the end, while nothing moves.
 
     States between the drive and its effort, of a delay or a winding, are taken where they rest.
     """
-    behind = _states_behind(terms, reading)
+    behind, clocks = _states_behind(terms, reading), _clocks(terms)
     others = [symbol for symbol in ca.vertsplit(terms.readings) if symbol.name() != reading.name()]
-    rest = ca.vertcat(*others, *[terms.state[i] for i in range(terms.state.numel()) if i not in behind])
+    states = [terms.state[i] for i in range(terms.state.numel()) if i not in behind and i not in clocks]
+    rest = ca.vertcat(*others, *states)
     still = [terms.balance, ca.vertcat(ca.SX(0, 1), *[terms.derivative[i] for i in behind])]
     balance, rate = ca.substitute(still, [rest], [ca.SX.zeros(rest.shape)])
     if behind:

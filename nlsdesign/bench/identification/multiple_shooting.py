@@ -226,13 +226,11 @@ def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:
             place += each.measured.shape[1]
     sigma = dict(zip(rows, problem.sigma, strict=True))
     return {
-        name: float(sigma[name] * rmse(np.concatenate(r)) * np.sqrt(sum(map(len, r)) / _effective_size(r)))
+        name: float(
+            sigma[name] * rmse(np.concatenate(r)) * np.sqrt(sum(map(len, r)) / sum(map(effective_size, r)))
+        )
         for name, r in rows.items()
     }
-
-
-def _effective_size(rows: Sequence[Array]) -> float:
-    return sum(effective_size(row) for row in rows)
 
 
 def without(fit: SimulatedFit, name: str) -> tuple[Parameter, ...]:

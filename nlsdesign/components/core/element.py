@@ -149,6 +149,20 @@ class Element(Part):
             Scalars in the units of the domain.
         """
 
+    def at_first_end(self, scope: Scope, effort: Expression, rate: Expression) -> Expression | None:
+        """Return what acts against the first end of the tie alone, beside the effort; nothing for most laws.
+
+        Parameters
+        ----------
+        scope
+            Of the element.
+        effort
+            Of the element.
+        rate
+            Of the first body.
+        """
+        return None
+
 
 def observed_effort(element: Element, scope: Scope, motion: Expression, rate: Expression) -> Expression:
     """Return the effort of an element and give names to its motion and effort."""

@@ -124,6 +124,35 @@ class LoadFriction(WithFriction, Combination):
 
 
 @dataclass(frozen=True, kw_only=True)
+class GearFriction(LoadFriction):
+    """Friction of a gear that grows with what it carries: T_f = µ·|T_in|·sgn(ω₁), on the first body alone.
+
+    T_in is the effort of the elements inside, which acts between both bodies as it does alone; ω₁ is the
+    speed of the first body. At rest as :class:`LoadFriction`, which takes the rate between both bodies and
+    rubs on both. Sources: Coulomb 1785 with the load as normal force; Niemann and Winter 2003.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import ROTATION, Spring
+    >>> members = (("spring", Spring(stiffness=60.0, domain=ROTATION)),)
+    >>> GearFriction(ratio=0.1, members=members).smooth(0.01).title()
+    'GearFriction(ratio = 0.1, creep_speed = 0.01 rad/s)'
+    """
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return T_in."""
+        return self.inside(scope, motion, rate)
+
+    def at_first_end(self, scope: Scope, effort: Expression, rate: Expression) -> Expression:
+        """Return the friction."""
+        load = self.rubbing.size(scope, effort, ("is loaded forward", "is loaded backward"), "load")
+        level = scope.parameter("ratio") * load
+        friction = self.rubbing.against(scope, rate, lambda speed: level, level)
+        scope.loss(friction * rate)
+        return friction
+
+
+@dataclass(frozen=True, kw_only=True)
 class QuadraticDrag(Viscous):
     """Drag of a fan or of churned oil: T = c·ω·|ω|, or F = c·v·|v|. Source: Newton 1687, book II."""
 

@@ -212,6 +212,34 @@ class Eccentricity(Sensor):
         return angle
 
 
+@dataclass(frozen=True, kw_only=True)
+class EncoderOffset(Sensor):
+    """An encoder whose zero is off: reading = θ + θ_0, or x + x_0. Source: data sheets, "zero offset".
+
+    Examples
+    --------
+    >>> EncoderOffset(of="joint.angle", offset=0.02).title()
+    'EncoderOffset(offset = 0.02 rad)'
+    """
+
+    units: ClassVar[tuple[str, ...]] = ("rad", "m")
+
+    domain: Domain = one_of(ROTATION, TRANSLATION)
+    offset: Quantity = parameter("{motion}", "what is read at zero", minimum=-1e6, maximum=1e6)
+
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return the motion with the offset."""
+        return value + scope.parameter("offset")
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return the motion with the offset."""
+        return values + self.offset.number
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return the motion behind a reading."""
+        return reading - numbers.parameter("offset")
+
+
 def _disc_error(number: Callable[[str], Expression], angle: Expression) -> Expression:
     phase = number("order") * angle
     return number("sine") * ca.sin(phase) + number("cosine") * (ca.cos(phase) - 1)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...foundation.arrays import Array
+from ...foundation.csv_tables import heads_with_units, read_csv
 from ...foundation.errors import MeasurementError, UnitError, ValueRangeError, nearest
 from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
-from ...foundation.text_files import text_of
 from ...foundation.written_numbers import name_and_unit
 from .target import TabulatedStiffness, TabulatedTorque, Target, TorqueBand
 
@@ -47,48 +45,51 @@ class ReadColumns:
 def read_columns(
     path: Path | str, columns: Mapping[str, tuple[str, ...]], *, least_rows: int = 3
 ) -> ReadColumns:
-    """Read the columns of a CSV file; empty lines and lines that begin with ``#`` are passed over.
+    """Read the columns of a CSV file, written in any way that records may be written in.
 
     ``columns``: the names that it may have, each with a unit for every dimension that it may have. A column
     with the unit ``1`` needs none in its head.
     """
     file = Path(path)
-    text = text_of(file, MeasurementError, next_step="name a CSV file in UTF-8")
-    rows = [
-        (number, next(csv.reader([line], skipinitialspace=True)))
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not rows:
+    table = read_csv(file)
+    if not table.heads:
         raise MeasurementError(
             file.name, "is empty",
             next_step="begin with heads such as " + ", ".join(f"'{n} [{u[0]}]'" for n, u in columns.items()),
         )  # fmt: skip
-    heads = _heads(file.name, rows[0], columns)
-    if len(rows) - 1 < least_rows:
+    heads = _heads(file.name, heads_with_units(file.name, table.heads, table.units), columns)
+    if len(table.lines) < least_rows:
         raise MeasurementError(
-            file.name, f"has {len(rows) - 1} rows of numbers and needs at least {least_rows}"
+            file.name, f"has {len(table.lines)} rows of numbers and needs at least {least_rows}"
         )
-    values = np.array([_numbers(file.name, line, cells, list(heads)) for line, cells in rows[1:]])
-    in_si = {
-        name: values[:, number] * parse_unit(unit).factor for number, (name, unit) in enumerate(heads.items())
-    }
-    return ReadColumns(file.name, in_si, heads, tuple(line for line, _ in rows[1:]))
-
-
-def _heads(file: str, row: tuple[int, list[str]], columns: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
-    """Return the unit of each column by its name, in the order of the file."""
-    line, given = row
-    for mark, called in ((";", "semicolons"), ("\t", "tabs")):
-        if any(mark in head for head in given):
+    in_si = {}
+    for (name, unit), numbers in zip(heads.items(), table.columns.values(), strict=True):
+        padded = np.append(numbers, np.full(len(table.lines) - len(numbers), np.nan))
+        if not np.all(np.isfinite(padded)):
+            line = table.lines[int(np.argmin(np.isfinite(padded)))]
             raise MeasurementError(
-                f"{file}, line {line}", f"separates its columns by {called}",
-                next_step="separate the cells by commas, with a point in the numbers",
+                f"{file.name}, line {line}, column '{name}'", "is no finite number",
+                next_step="correct the cell, or take the row out",
             )  # fmt: skip
+        in_si[name] = padded * parse_unit(unit).factor
+    return ReadColumns(file.name, in_si, heads, tuple(table.lines))
+
+
+_NAMES = {
+    "winkel": "angle", "drehmoment": "torque", "moment": "torque", "steifigkeit": "stiffness",
+    "gewicht": "weight", "couple": "torque", "raideur": "stiffness", "poids": "weight",
+    "rigidez": "stiffness", "momento": "torque", "coppia": "torque",
+}  # fmt: skip
+"""Names of the columns in languages of workshops."""
+
+
+def _heads(file: str, given: Sequence[str], columns: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """Return the unit of each column by its name, in the order of the file."""
     heads: dict[str, str] = {}
-    for head in (each.strip() for each in given):
+    for head in given:
         name, unit = (head, None) if head in columns else name_and_unit(head)
-        name, place = name.strip().lower(), f"{file}, line {line}, column '{head}'"
+        name, place = name.strip().lower(), f"{file}: column '{head}'"
+        name = name if name in columns else _NAMES.get(name, name)
         if name not in columns:
             raise MeasurementError(
                 place, "is none that is known here", did_you_mean=nearest(name, columns),
@@ -108,27 +109,6 @@ def _heads(file: str, row: tuple[int, list[str]], columns: Mapping[str, tuple[st
             )  # fmt: skip
         heads[name] = unit
     return heads
-
-
-def _numbers(file: str, line: int, cells: list[str], names: list[str]) -> list[float]:
-    if len(cells) != len(names):
-        raise MeasurementError(
-            f"{file}, line {line}", f"has {len(cells)} cells, the heads are {len(names)}",
-            next_step="separate the cells by commas, with a point in the numbers",
-        )  # fmt: skip
-    numbers = []
-    for name, cell in zip(names, cells, strict=True):
-        try:
-            number = float(cell)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            raise MeasurementError(
-                f"{file}, line {line}, column '{name}'", f"'{cell.strip()}' is no finite number",
-                next_step="correct the cell, or take the row out",
-            )  # fmt: skip
-        numbers.append(number)
-    return numbers
 
 
 _COLUMNS = {

@@ -18,8 +18,8 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, InfeasibleError
-from ...foundation.processes import parallel_map
 from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.work_sharing import parallel_map
 from .defaults import BREAKS
 from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError

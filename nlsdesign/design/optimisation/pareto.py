@@ -23,9 +23,9 @@ from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
 from ...foundation.errors import ConvergenceError, ValueRangeError
-from ...foundation.processes import parallel_map
 from ...foundation.quantity import parse_unit, typeset_unit, with_unit
 from ...foundation.text_files import write_table
+from ...foundation.work_sharing import parallel_map
 from ..curves.target import Target
 from .conflict import feasible_point
 from .design_search import Search

@@ -12,8 +12,8 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.processes import parallel_map
 from ...foundation.symbolic import Expression
+from ...foundation.work_sharing import parallel_map
 from ...model import Variable
 
 

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.processes import parallel_map
 from ...foundation.quantity import parse_unit, with_unit
+from ...foundation.work_sharing import parallel_map
 from .design_search import Search, row_of
 from .limits import MaximumTorqueError
 from .program import Program, Solution, scaled

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
-from ...foundation.processes import parallel_map
+from ...foundation.work_sharing import parallel_map
 from ...model import flatten
 from ...model.origin import derived
 from ...model.roles import series_cam

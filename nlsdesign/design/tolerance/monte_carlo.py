@@ -12,7 +12,7 @@ from scipy.special import ndtri
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.processes import parallel_map
+from ...foundation.work_sharing import parallel_map
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ..curves.target import Target

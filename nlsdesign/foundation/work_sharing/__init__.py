@@ -7,7 +7,7 @@ room that may import ``distributed``, ``dask`` and ``mpi4py``.
 from .chunks import CodeIdentity, PointOutcome, code_identity
 from .dask_scheduler import DaskScheduler
 from .mpi_ranks import MpiRanks
-from .shared_map import shared_map, spread_over
+from .shared_map import parallel_map, shared_map, spread_over
 from .teams import Executor, InThisProcess, Processes
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "PointOutcome",
     "Processes",
     "code_identity",
+    "parallel_map",
     "shared_map",
     "spread_over",
 ]

@@ -6,8 +6,10 @@ run other code, are refused.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
+import multiprocessing
 import os
 import pickle
 import socket
@@ -21,7 +23,6 @@ from typing import Any, Final
 
 from ..errors import NlsError, WorkSharingError
 from ..locations import folder, version
-from ..processes import alone
 
 _PACKAGE: Final = Path(__file__).resolve().parents[2]
 _SHOWING: Final = ("cli", "presentation", "live", "_bundled", "__pycache__")
@@ -89,6 +90,7 @@ def _digests(package: Path) -> Iterator[tuple[str, str]]:
 
 
 _LONGEST_REASON: Final = 500
+_alone = False
 _one_at_a_time = threading.Lock()
 """Symbolic expressions are not safe among threads, so a worker with several computes one chunk at a time."""
 
@@ -153,6 +155,22 @@ class WorkerRefusal:
 
     worker: str
     identity: CodeIdentity
+
+
+@contextlib.contextmanager
+def alone() -> Iterator[None]:
+    """Let this process do maps by itself until the end of the block: other workers have the other cores."""
+    global _alone
+    before, _alone = _alone, True
+    try:
+        yield
+    finally:
+        _alone = before
+
+
+def is_worker() -> bool:
+    """Tell whether this process is a worker, which shares its work with no other."""
+    return _alone or multiprocessing.current_process().daemon
 
 
 def here() -> str:

@@ -2,24 +2,26 @@
 
 Points are taken from their source only when a worker is free, in chunks that take about the same time
 whatever a point costs. A chunk that is lost with its worker is tried again point by point; a point that
-ends workers twice on its own is recorded as failed. :func:`spread_over` sends the maps within one
-computation to the same engine.
+ends workers twice on its own is recorded as failed. :func:`parallel_map` gives the results of one computation
+in order by the same engine.
 """
 
 from __future__ import annotations
 
+import os
 import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from ..errors import WorkSharingError
-from ..processes import mapped_by
-from .chunks import Chunk, ChunkLoss, PointOutcome, sendable
-from .teams import Executor, Team
+from .chunks import Chunk, ChunkLoss, PointOutcome, is_worker, sendable
+from .teams import Executor, Processes, Team, usable_cores
+
+T = TypeVar("T")
 
 _MOST_DEATHS: Final = 2
 _TICK: Final = 0.5
@@ -139,11 +141,54 @@ class _Queue:
         return []
 
 
+_MOST_PROCESSES: Final = 4
+_executor: Executor | None = None
+"""Of the innermost :func:`spread_over`."""
+
+
+def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
+    """Yield ``work(0)`` to ``work(count - 1)``, in order; the results do not depend on who computes them.
+
+    Processes of this machine do it, one for each core and at most four. They are forked, so that they see all
+    data of the work without copying; only results are pickled. Without fork, on one core, or in a worker the
+    work is done in this process.
+
+    Parameters
+    ----------
+    work
+        An exception in it is raised here and ends the map. Its results must be picklable.
+    count
+        Number of results.
+
+    Raises
+    ------
+    WorkSharingError
+        If workers end over a piece of the work, or :func:`spread_over` names an executor that cannot do it.
+    """
+    executor = _executor or Processes(min(_MOST_PROCESSES, usable_cores()))
+    if isinstance(executor, Processes):
+        can_fork = hasattr(os, "sched_getaffinity")
+        executor = Processes(max(1, min(count, executor.count or usable_cores())) if can_fork else 1)
+    if executor == Processes(1) or is_worker():
+        yield from map(work, range(count))
+        return
+    waiting: dict[int, PointOutcome] = {}
+    following = 0
+    points = enumerate(range(count))
+    one_by_one = ChunkSizes(largest=1)
+    with closing(shared_map(_Caller(work), points, executor, count=count, sizes=one_by_one)) as outcomes:  # type: ignore[type-var]
+        for batch in outcomes:
+            waiting.update((outcome.number, outcome) for outcome in batch)
+            while following in waiting:
+                yield _result(waiting.pop(following))
+                following += 1
+
+
 @contextmanager
 def spread_over(executor: Executor) -> Iterator[None]:
-    """Let an executor do what is otherwise mapped over processes of this machine, until the block ends.
+    """Let an executor do the work of :func:`parallel_map` until the block ends.
 
-    These are the starts of a design, the refits of a diagnosis, the candidates for the next record, the draws
+    That are the starts of a design, the refits of a diagnosis, the candidates for the next record, the draws
     of a regeneration and the causes of a tolerance analysis. The results are the same. Each map sends what it
     works on once, and begins with a connection, so this pays where a single result takes long. What a
     diagnosis works on cannot be sent: it takes processes of this machine, or its sets of records are the
@@ -152,7 +197,7 @@ def spread_over(executor: Executor) -> Iterator[None]:
     Parameters
     ----------
     executor
-        For instance :class:`DaskScheduler`.
+        For instance :class:`DaskScheduler`. With ``Processes(1)`` this process does the work.
 
     Raises
     ------
@@ -161,14 +206,17 @@ def spread_over(executor: Executor) -> Iterator[None]:
 
     Examples
     --------
-    >>> from nlsdesign.foundation.processes import parallel_map
-    >>> from nlsdesign.foundation.work_sharing import InThisProcess
+    >>> from nlsdesign.foundation.work_sharing import InThisProcess, parallel_map
     >>> with spread_over(InThisProcess()):
     ...     list(parallel_map(abs, 3))
     [0, 1, 2]
     """
-    with mapped_by(lambda work, count: _in_order(work, count, executor)):
+    global _executor
+    before, _executor = _executor, executor
+    try:
         yield
+    finally:
+        _executor = before
 
 
 @dataclass(frozen=True)
@@ -211,23 +259,11 @@ def _received(content: bytes) -> _Caller:
         return _Caller(pickle.loads(content))
 
 
-def _in_order(work: Callable[[int], Any], count: int, executor: Executor) -> Iterator[Any]:
-    """Yield the results in order, each as soon as it and all before it are there."""
-    waiting: dict[int, PointOutcome] = {}
-    following = 0
-    with closing(shared_map(_Caller(work), enumerate(range(count)), executor, count=count)) as outcomes:  # type: ignore[type-var]
-        for batch in outcomes:
-            waiting.update((each.number, each) for each in batch)
-            while following in waiting:
-                yield _result(waiting.pop(following))
-                following += 1
-
-
 def _result(outcome: PointOutcome) -> Any:
     if outcome.reason:
         raise WorkSharingError(
             f"part {outcome.number + 1} of the work", f"came to no result: {outcome.reason}",
-            next_step="look at the workers, or leave the executor out to use this machine",
+            next_step="look at the memory of the workers, or let this process do the work (--workers 1)",
         )  # fmt: skip
     if isinstance(outcome.value, _Caught):
         raise outcome.value.error

@@ -18,8 +18,8 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol
 
 from ..errors import ValueRangeError
-from ..processes import alone, ready_as_helper, signals_held
-from .chunks import Chunk, ChunkLoss, PointOutcome, computed, pickled
+from ..processes import ready_as_helper, signals_held
+from .chunks import Chunk, ChunkLoss, PointOutcome, alone, computed, pickled
 
 Finished = tuple[Chunk, list[PointOutcome] | ChunkLoss]
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from nlsdesign.cli.main import program
 from nlsdesign.cli.workers import workers_option
-from nlsdesign.foundation.processes import at_most, parallel_map
+from nlsdesign.foundation.work_sharing import Processes, parallel_map, spread_over
 
 linux = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="processes are forked on Linux only")
 
@@ -33,9 +33,9 @@ def test_work_is_done_in_as_many_processes_as_are_asked_for(
     cores: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(cores)))
-    with at_most(1):
+    with spread_over(Processes(1)):
         assert helpers() == {os.getpid()}
-    with at_most(5):
+    with spread_over(Processes(5)):
         assert 1 < len(helpers()) <= 5
         assert os.getpid() not in helpers()
     assert len(helpers()) <= (1 if cores == 1 else 4)

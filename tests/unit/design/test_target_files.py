@@ -36,6 +36,23 @@ def test_the_unit_behind_the_name_and_another_order(written: Callable[[str], Pat
     assert float(target.torque(0.5)) == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("Winkel [°];Drehmoment in Nm\n0;0\n30;0,5\n60;2\n", "cp1252"),
+        ("angle (deg)\ttorque (Nm)\n0\t0\n30\t0,5\n60\t2\n", "utf-8"),
+        ("angle,torque\ndeg,mNm\n0,0\n30,500\n# the last\n60,2000\n", "utf-16"),
+        ("# angle [deg], torque [N*m]\n0,0\n30,0.5\n60,2\n", "utf-8-sig"),
+    ],
+)
+def test_a_target_is_written_as_records_are(tmp_path: Path, text: str, encoding: str) -> None:
+    (tmp_path / "curve.csv").write_text(text, encoding=encoding)
+    target = read_target(tmp_path / "curve.csv")
+    assert isinstance(target, TabulatedTorque)
+    assert target.angles == pytest.approx(np.radians([0.0, 30.0, 60.0]))
+    assert target.torques == pytest.approx([0.0, 0.5, 2.0])
+
+
 def test_a_stiffness(written: Callable[[str], Path]) -> None:
     target = read_target(written("angle [deg],stiffness [N*m/deg]\n0,0.1\n10,0.1\n20,0.1\n"))
     assert isinstance(target, TabulatedStiffness)
@@ -72,20 +89,21 @@ HEAD = "angle [deg],torque [N*m]\n"
         (
             HEAD + "0,0\n10,nan\n20,2\n",
             MeasurementError,
-            "line 3, column 'torque': 'nan' is no finite number",
+            "line 3, column 'torque': is no finite number",
         ),
-        (HEAD + "0,0\n10,\n20,2\n", MeasurementError, "line 3, column 'torque': '' is no finite"),
-        (HEAD + "0,0\n10,1,5\n20,2\n", MeasurementError, "line 3: has 3 cells, the heads are 2"),
+        (HEAD + "0,0\n10,\n20,2\n", MeasurementError, "column 'torque .N.m.', row 3: '' is not a number"),
+        (HEAD + "0,0\n10,1,5\n20,2\n", MeasurementError, "row 3: has 3 cells, the heads are 2"),
         ("angle,torque [N*m]\n0,0\n1,1\n2,2\n", UnitError, "column 'angle': names no unit"),
         (
             "angle [N],torque [N*m]\n0,0\n1,1\n2,2\n",
             UnitError,
-            r"line 1, column 'angle \[N\]': 'N' is no unit",
+            r"target\.csv: column 'angle \[N\]': 'N' is no unit",
         ),
         ("angle [mm],torque [N*m]\n0,0\n1,1\n2,2\n", UnitError, "unit like 'rad'"),
         ("angle [rad],torque [N*m]\n0,0\n10,1\n20,2\n", ValueRangeError, "were degrees meant"),
         ("angle [deg],torqe [N*m]\n0,0\n1,1\n2,2\n", MeasurementError, "did you mean 'torque'"),
-        ("angle [deg],torque [N*m],torque [N*m]\n0,0,0\n", MeasurementError, "stands there twice"),
+        ("angle [deg],torque [N*m],torque [N*m]\n0,0,0\n", MeasurementError, "have the same head"),
+        ("angle [deg],torque [N*m],torque_mN*m\n0,0,0\n", MeasurementError, "stands there twice"),
         ("angle [deg],lower [N*m]\n0,0\n1,1\n2,2\n", MeasurementError, "has no column 'torque'.*read_band"),
         ("torque [N*m]\n0\n1\n2\n", MeasurementError, "has no column 'angle'"),
         (
@@ -124,6 +142,6 @@ def test_a_wrong_band_is_named(written: Callable[[str], Path]) -> None:
 def test_no_file_and_no_text(tmp_path: Path) -> None:
     with pytest.raises(MeasurementError, match="cannot be read: No such file"):
         read_target(tmp_path / "missing.csv")
-    (tmp_path / "photo.csv").write_bytes(b"\xff\xfe\x00\x80")
+    (tmp_path / "photo.csv").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00")
     with pytest.raises(MeasurementError, match="cannot be read"):
         read_target(tmp_path / "photo.csv")

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.foundation.processes import parallel_map
+from nlsdesign.foundation.work_sharing import parallel_map
 
 # Where the suite itself was begun in the background, children inherit that interrupts are ignored.
 ENDLESS = """
 import signal
 import time
-from nlsdesign.foundation.processes import parallel_map
+from nlsdesign.foundation.work_sharing import parallel_map
 
 def work(number):
     print("at work", flush=True)
@@ -80,7 +80,7 @@ def _running(pid: int) -> bool:
 INTERRUPTED_WHILE_FORKING = """
 import os
 import signal
-from nlsdesign.foundation.processes import parallel_map
+from nlsdesign.foundation.work_sharing import parallel_map
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGINT))
@@ -90,7 +90,7 @@ print(list(parallel_map(abs, 6)), flush=True)
 INTERRUPTED_WHILE_STARTING = """
 import os
 import signal
-from nlsdesign.foundation.processes import parallel_map
+from nlsdesign.foundation.work_sharing import parallel_map
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 os.register_at_fork(after_in_parent=lambda: os.kill(os.getpid(), signal.SIGINT))
@@ -120,7 +120,7 @@ def test_an_interrupt_at_the_moment_of_the_fork_leaves_nobody_waiting(program: s
 ASKED_TO_END_WHILE_FORKING = """
 import signal
 import sys
-from nlsdesign.foundation.processes import parallel_map
+from nlsdesign.foundation.work_sharing import parallel_map
 
 signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))
 for _ in range(300):

@@ -7,6 +7,7 @@ import pickle
 import signal
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,12 +18,12 @@ from nlsdesign.design.tolerance.monte_carlo import tolerance_analysis
 from nlsdesign.design.tolerance.tolerance_result import ToleranceResult
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import UnitError, WorkSharingError
-from nlsdesign.foundation.processes import parallel_map
 from nlsdesign.foundation.work_sharing import (
     DaskScheduler,
     Executor,
     InThisProcess,
     Processes,
+    parallel_map,
     spread_over,
 )
 from nlsdesign.foundation.work_sharing.chunks import sendable
@@ -70,6 +71,18 @@ def test_the_block_says_where_and_nothing_else_does() -> None:
 def test_work_that_ends_its_workers_is_an_error_and_not_a_missing_result() -> None:
     with spread_over(Processes(2)), pytest.raises(WorkSharingError, match="part 2 of the work: came to no"):
         list(parallel_map(lambda k: os.kill(os.getpid(), signal.SIGKILL) if k == 1 else k, 3))
+
+
+def test_a_map_goes_on_where_one_of_its_workers_is_killed(tmp_path: Path) -> None:
+    def killed_once(number: int) -> int:
+        mark = tmp_path / "killed"
+        if number == 1 and not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number
+
+    with spread_over(Processes(2)):
+        assert list(parallel_map(killed_once, 4)) == [0, 1, 2, 3]
 
 
 def content(result: ToleranceResult) -> dict[str, Any]:

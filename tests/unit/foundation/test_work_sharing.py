@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 
 from nlsdesign.foundation.errors import ValueRangeError, WorkSharingError
-from nlsdesign.foundation.processes import parallel_map
 from nlsdesign.foundation.work_sharing import (
     CodeIdentity,
     DaskScheduler,
@@ -25,6 +24,7 @@ from nlsdesign.foundation.work_sharing import (
     PointOutcome,
     Processes,
     code_identity,
+    parallel_map,
     shared_map,
 )
 from nlsdesign.foundation.work_sharing.chunks import (

@@ -135,6 +135,12 @@ def hook(root: Path) -> ModuleType:
     return module
 
 
+def test_an_old_python_is_told_by_one_sentence(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "version_info", (3, 9, 18))
+    with pytest.raises(SystemExit, match=r"^nlsdesign needs Python 3\.11 or newer; this is "):
+        hook(root)
+
+
 def test_links_are_words_without_a_home_and_absolute_with_one(root: Path) -> None:
     described = hook(root).described
     plain, linked = described(README), described(README, "https://example.org/home/")

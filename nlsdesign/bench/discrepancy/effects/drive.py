@@ -21,7 +21,7 @@ from ....components.mechanics.bodies import Free
 from ....components.mechanics.drive_faults import CURRENT, command_domain
 from ....foundation.quantity import same_dimension
 from .effect import Edit, Effect, Form, Places, Unknown, free_inside, number
-from .sizes import LONGEST, QUICKEST
+from .sizes import LONGEST, QUICKEST, SHIFT
 
 _FALLS_AT = (0.2, 1.5)
 """Where a drive may lose effort, in largest commands: short motions command several times what others do."""
@@ -79,7 +79,7 @@ def _commanded(assembly: Assembly, name: str) -> tuple[Domain, str] | None:
 
 def _delay(assembly: Assembly, name: str) -> Iterator[Edit]:
     edited, path = _put(assembly, name, "delay", DriveDelay(delay=number(1e-3, "s")))
-    unknown = Unknown(f"{path}.delay", (0.1,), 1e-3, 6.0, QUICKEST)
+    unknown = Unknown(f"{path}.delay", (0.1,), 1e-3, 6.0, QUICKEST, beyond=SHIFT)
     yield Edit(edited, (unknown,), {"explains_lag": True})
 
 

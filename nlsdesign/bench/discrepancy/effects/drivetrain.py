@@ -27,12 +27,16 @@ from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity
 from ....foundation.spread import RelativeSpread
 from ..fitting import Continuation, Plain
-from .effect import Edit, Effect, Form, Unknown, free_name, number, wrapped
+from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, wrapped
 from .friction import tied
 from .places import (
+    beside,
     domain_of,
+    effort_over_motion,
+    laws,
     restoring_ties,
     sliding_bodies,
+    ties_between_bodies,
     turning_bodies,
     turns_per_turn,
     wrapping,
@@ -73,17 +77,33 @@ def _driven_springs(assembly: Assembly) -> list[str]:
 
 
 def _without_shaft(assembly: Assembly) -> list[str]:
-    """Return the turning bodies that no spring ties to another body with a motion of its own."""
-    coupled = set()
-    for name in restoring_ties(assembly):
-        ends = _drivers(assembly, name)
-        coupled |= set(ends) if len(ends) > 1 else set()
-    return [body for body in turning_bodies(assembly) if body not in coupled]
+    """Return the turning bodies, unless an effect has put one of them behind a shaft already."""
+    bodies, numbers = turning_bodies(assembly), assembly.quantities()
+    return [] if any(numbers[f"{body}.inertia"].source == SOURCE for body in bodies) else bodies
 
 
 def _rigidly_driven_springs(assembly: Assembly) -> list[str]:
     bodies = _without_shaft(assembly)
     return [name for name in _driven_springs(assembly) if _drivers(assembly, name)[0] in bodies]
+
+
+def _undamped_springs(assembly: Assembly) -> list[str]:
+    """Return the springs between two moving bodies with no dashpot inside or between the same bodies."""
+    damped = {
+        assembly[name].between  # type: ignore[attr-defined]
+        for name in (path.partition(".")[0] for path, part in laws(assembly) if isinstance(part, Dashpot))
+        if isinstance(assembly[name], Tie)
+    }
+    pairs = ties_between_bodies(assembly)
+    return [name for name, ends in pairs.items() if ends not in damped and ends[::-1] not in damped]
+
+
+def _damping(assembly: Assembly, name: str) -> Iterator[Edit]:
+    domain, (effort, motion) = assembly.element(name).domain, effort_over_motion(assembly, name)
+    law = Dashpot(damping=number(1e-3, domain.unit("{effort}*s/{motion}")), domain=domain)
+    edited, path = beside(assembly, name, "damping", law)
+    size = f"{effort} * {QUICKEST} / {motion}"
+    yield Edit(edited, (Unknown(f"{path}.damping", (0.05,), 1e-5, 10.0, size),))
 
 
 def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -237,6 +257,19 @@ drivetrain_resonance = Effect(
             _absorber,
             "an oscillation of its own frequency after each jolt of the drive",
             "Hooke 1678; Leonhard 2001 (drives with an elastic shaft)",
+        ),
+    ),
+)
+spring_damping = Effect(
+    "spring_damping",
+    "A spring between two moving bodies that takes power as a dashpot beside it does.",
+    65,
+    (
+        Form(
+            _undamped_springs,
+            _damping,
+            "an effort between both bodies in proportion to the rate at which they move apart",
+            "Kelvin 1865; Voigt 1892",
         ),
     ),
 )

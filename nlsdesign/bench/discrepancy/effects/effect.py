@@ -38,6 +38,14 @@ class Unknown:
     null
         Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for
         a number that only shapes the effect, such as a time constant or an order.
+    beyond
+        Size below which something plainer explains the number, which is then a bound too; empty for none.
+    above
+        Name of a number of the edited assembly of which it is at least three times as much: a speed at which
+        friction falls lies above the width of its sign. Empty where there is none.
+    limiting
+        Whether the effect has a limiting form at both bounds, such as a corner that is as sharp as it gets:
+        then standing there is no objection.
     """
 
     name: str
@@ -46,6 +54,9 @@ class Unknown:
     upper: float
     of: str = ""
     null: float | None = 0.0
+    beyond: str = ""
+    above: str = ""
+    limiting: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,9 @@ class Candidate:
         Where its fits begin.
     explains_lag
         Whether readings that lag what they read are what it leaves.
+    bends_reading
+        Whether it is a fault of a sensor that changes a reading over its own value or over time, as a law of
+        what is read may do.
     simpler
         Identifiers of the effects of which this one is a richer form, so that it must predict better.
     """
@@ -82,6 +96,7 @@ class Candidate:
     source: str
     strategy: Strategy = field(default_factory=Plain)
     explains_lag: bool = False
+    bends_reading: bool = False
     simpler: tuple[str, ...] = ()
 
 

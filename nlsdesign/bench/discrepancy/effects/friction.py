@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from ....components import (
     Assembly,
     AsymmetricFriction,
     CoulombFriction,
+    Dashpot,
+    Driven,
     Element,
+    GearFriction,
     LoadFriction,
     QuadraticDrag,
     SpotFriction,
@@ -20,7 +24,8 @@ from ....components import (
 )
 from ....components.core.domain import Domain
 from ....components.mechanics.bodies import Free
-from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, numbers_of, wrapped
+from ....foundation.quantity import Quantity, significant
+from .effect import SOURCE, Edit, Effect, Form, Places, Unknown, free_name, number, numbers_of, wrapped
 from .places import (
     beside,
     domain_of,
@@ -29,15 +34,38 @@ from .places import (
     laws,
     loaded_ties,
     moving_bodies,
+    ties_between_bodies,
     turning_bodies,
 )
-from .sizes import efforts_on
+from .sizes import efforts_on, span_of
 
 
 def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[Assembly, str]:
     """Return the assembly with one more element on a body, and the element's name."""
     part = free_name(assembly, name)
     return assembly.with_part(part, tie(element, body)), part
+
+
+_SHARE_OF_SLOWEST = 0.2
+"""Width of the sign of friction, in the slowest speed that the records resolve: there the sign is 0.9999."""
+
+
+def with_resolved_signs(before: Assembly, after: Assembly, slowest: Mapping[str, float]) -> Assembly:
+    """Return an edited assembly whose new friction changes its sign as sharply as the records resolve.
+
+    A width that the records could see would be paid for by something else. What is declared ``before`` stays.
+    ``slowest``: least speed that the records resolve, by name of the body.
+    """
+    declared, widths = {id(each) for each in before.quantities().values()}, dict[str, Quantity]()
+    for name, width in after.quantities().items():
+        part = after[name.partition(".")[0]]
+        ends = part.between if isinstance(part, Tie) else ()
+        moving = [end for end in ends if isinstance(after[end], Driven | Free)]
+        if name.endswith(".creep_speed") and id(width) not in declared and set(moving) <= slowest.keys():
+            least = min((_SHARE_OF_SLOWEST * slowest[end] for end in moving), default=math.inf)
+            if 0.0 < least < width.number:
+                widths[name] = number(significant([least])[0], width.unit)
+    return after.with_values(widths) if widths else after
 
 
 def _with_law(
@@ -94,9 +122,14 @@ def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{path}.sliding_effort", (0.05,), 1e-4, 2.0, around.effort),
         Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
-        Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
+        _stribeck_speed(path, around),
     )
     yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
+
+
+def _stribeck_speed(path: str, around: _Signals) -> Unknown:
+    name, width = f"{path}.stribeck_speed", f"{path}.creep_speed"
+    return Unknown(name, (0.015, 0.08), 1e-3, 1.5, around.speed, null=None, above=width)
 
 
 def _even_friction(assembly: Assembly, place: str) -> str | None:
@@ -107,6 +140,17 @@ def _even_friction(assembly: Assembly, place: str) -> str | None:
         if type(part) is CoulombFriction and (on_body or path.startswith(f"{place}.")):
             return path
     return None
+
+
+def _without(kind: type[Element], bodies: Places) -> Places:
+    """Return the bodies on which no friction of a kind acts."""
+
+    def places(assembly: Assembly) -> list[str]:
+        owners = ((assembly[path.partition(".")[0]], part) for path, part in laws(assembly))
+        having = [p.between for p, law in owners if isinstance(law, kind) and isinstance(p, Tie)]
+        return [body for body in bodies(assembly) if not any(body in ends for ends in having)]
+
+    return places
 
 
 def _rubbing(assembly: Assembly) -> list[str]:
@@ -124,13 +168,9 @@ def _declared_friction(assembly: Assembly, place: str) -> str | None:
     return path if path and assembly.quantities()[f"{path}.sliding_effort"].source != SOURCE else None
 
 
-def _rubbing_as_declared(assembly: Assembly) -> list[str]:
-    """Return the bodies and ties with even dry friction that the deck declares."""
-    return [place for place in _rubbing(assembly) if _declared_friction(assembly, place)]
-
-
-def _turning_as_declared(assembly: Assembly) -> list[str]:
-    return [body for body in turning_bodies(assembly) if _declared_friction(assembly, body)]
+def _as_declared(places: Places) -> Places:
+    """Return the places with even dry friction that the deck declares."""
+    return lambda assembly: [each for each in places(assembly) if _declared_friction(assembly, each)]
 
 
 def _falling(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -142,7 +182,7 @@ def _falling(assembly: Assembly, place: str) -> Iterator[Edit]:
         falling = StribeckFriction(**numbers_of(even), breakaway=more, stribeck_speed=speed)
         unknowns = (
             Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
-            Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
+            _stribeck_speed(path, around),
         )
         yield Edit(assembly.with_part(path, falling), unknowns)
 
@@ -177,15 +217,40 @@ def _loaded(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
 
 
-def _drag(assembly: Assembly, place: str) -> Iterator[Edit]:
-    def law(domain: Domain) -> Element:
-        unit = domain.unit("{effort}*s^2/{motion}^2")
-        return QuadraticDrag(drag=number(1e-3, unit), domain=domain)
+def _geared(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Let the gear in front of a spring rub in proportion to what the spring carries."""
 
-    edited, path = _with_law(assembly, place, "drag", law)
-    around = _signals_at(assembly, place)
-    of = f"{around.effort} / {around.speed} / {around.speed}"
-    yield Edit(edited, (Unknown(f"{path}.drag", (0.05,), 1e-6, 10.0, of),))
+    def around(inner: str, element: Element) -> Element:
+        return GearFriction(members=((inner, element),), ratio=number(0.01, "1")).smooth()
+
+    edited = wrapped(assembly, name, "driven", around, read_outside=True)
+    yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
+
+
+def _undamped(assembly: Assembly) -> list[str]:
+    """Return the moving bodies on which no viscous friction against the resting frame is declared."""
+    ties = ((path.partition(".")[0], part) for path, part in laws(assembly) if isinstance(part, Dashpot))
+    ends = (assembly[name].between for name, _ in ties if isinstance(assembly[name], Tie))  # type: ignore[attr-defined]
+    free = {*moving_bodies(assembly)}
+    damped = {body for bodies in ends if len(free & set(bodies)) == 1 for body in bodies}
+    return [body for body in moving_bodies(assembly) if body not in damped]
+
+
+def _growing(power: int) -> Callable[[Assembly, str], Iterator[Edit]]:
+    """Return the edit that adds friction in proportion to a power of the speed, the first or the second."""
+    kind, name = ((Dashpot, "damping"), (QuadraticDrag, "drag"))[power - 1]
+
+    def edit(assembly: Assembly, place: str) -> Iterator[Edit]:
+        def law(domain: Domain) -> Element:
+            unit = domain.unit("{effort}*s/{motion}" if power == 1 else "{effort}*s^2/{motion}^2")
+            return kind(**{name: number(1e-3, unit)}, domain=domain)
+
+        edited, path = _with_law(assembly, place, "viscous_friction" if power == 1 else "drag", law)
+        around = _signals_at(assembly, place)
+        of = " / ".join([around.effort, *[around.speed] * power])
+        yield Edit(edited, (Unknown(f"{path}.{name}", (0.05,), 1e-4 * 0.1**power, 10.0, of),))
+
+    return edit
 
 
 def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -199,9 +264,10 @@ def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{path}.sliding_effort", (0.1,), 1e-4, 5.0, around.effort),
         Unknown(f"{path}.place", (-0.7, -0.35, 0.0, 0.35, 0.7), -1.2, 1.2, around.motion, null=None),
-        Unknown(f"{path}.width", (0.15,), 0.01, 3.0, around.motion, null=None),
+        # A spot as wide as the motion is friction everywhere.
+        Unknown(f"{path}.width", (0.25,), 0.01, 0.5, span_of(around.motion), null=None),
     )
-    yield Edit(edited, unknowns)
+    yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
 
 
 def _wavy(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -252,7 +318,7 @@ stribeck_friction = Effect(
             "dry friction",
         ),
         Form(
-            _rubbing_as_declared,
+            _as_declared(_rubbing),
             _falling,
             "more friction just off standstill than is declared for all speeds",
             "Stribeck 1902; Armstrong-Hélouvry 1991",
@@ -271,6 +337,26 @@ load_dependent_friction = Effect(
             "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
             "load friction",
         ),
+        Form(
+            ties_between_bodies,
+            _geared,
+            "a torque against the motion of the drive alone, in proportion to what it carries",
+            "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
+            "load friction",
+        ),
+    ),
+)
+viscous_friction = Effect(
+    "viscous_friction",
+    "Friction in proportion to the speed, on a body that turns or slides and has none declared.",
+    35,
+    (
+        Form(
+            _undamped,
+            _growing(1),
+            "an effort against the motion in proportion to the speed",
+            "Newton 1687, book II",
+        ),
     ),
 )
 quadratic_drag = Effect(
@@ -278,7 +364,7 @@ quadratic_drag = Effect(
     "Drag that grows with the square of the speed, on a body that turns or slides.",
     40,
     _on_bodies_and_strained_pieces(
-        _drag,
+        _growing(2),
         "an effort against the motion that grows with the square of the speed",
         "Newton 1687, book II; Batchelor 1967",
         "drag",
@@ -303,21 +389,21 @@ position_dependent_friction = Effect(
     165,
     (
         Form(
-            moving_bodies,
+            _without(WavyFriction, moving_bodies),
             _spot,
             "an effort against the motion in one place only",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
             "friction of a place",
         ),
         Form(
-            turning_bodies,
+            _without(SpotFriction, turning_bodies),
             _wavy,
             "a torque against the motion that is larger in one half of each turn",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
             "dry friction",
         ),
         Form(
-            _turning_as_declared,
+            _as_declared(turning_bodies),
             _waving,
             "more friction in one half of each turn than is declared, and less in the other",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",

@@ -106,6 +106,16 @@ def restoring_ties(assembly: Assembly) -> list[str]:
     return [n for n, p in assembly.parts if isinstance(p, Tie) and p.element.restores]
 
 
+def ties_between_bodies(assembly: Assembly) -> dict[str, tuple[str, ...]]:
+    """Return the ties that pull back between two bodies that both move freely, with these bodies."""
+    pairs = {name: assembly[name].between for name in restoring_ties(assembly)}  # type: ignore[attr-defined]
+    return {
+        name: ends
+        for name, ends in pairs.items()
+        if len(ends) == 2 and all(isinstance(assembly[end], Free) for end in ends)
+    }
+
+
 def loaded_ties(assembly: Assembly) -> list[str]:
     """Return the names of the ties whose load depends on where the body is: what pulls back, and weights.
 

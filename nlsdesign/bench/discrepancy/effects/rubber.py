@@ -147,7 +147,7 @@ def _round(assembly: Assembly, path: str, size: float, sizes: tuple[str, str]) -
     unknowns = (
         Unknown(f"{inner}.stiffness", (0.5 * size,), 1e-3 * size, 300.0 * size, stiffness),
         Unknown(f"{inner}.yield_effort", (0.05 * size,), 1e-4 * size, 3.0 * size, effort, null=None),
-        Unknown(f"{inner}.exponent", (1.0,), 0.15, 15.0, null=None),
+        Unknown(f"{inner}.exponent", (1.0,), 0.15, 15.0, null=None, limiting=True),
     )
     return Edit(edited, unknowns)
 

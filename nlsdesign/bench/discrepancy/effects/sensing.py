@@ -14,6 +14,7 @@ from ....components import (
     Drift,
     Eccentricity,
     Encoder,
+    EncoderOffset,
     ForceSensor,
     LoadNonlinearity,
     Part,
@@ -24,8 +25,8 @@ from ....components import (
 from ....components.core.domain import Domain
 from ....foundation.quantity import Quantity
 from .effect import Edit, Effect, Form, Places, Unknown, free_name, number
-from .places import turning_bodies, turns_per_turn
-from .sizes import LONGEST, QUICKEST
+from .places import domain_of, turning_bodies, turns_per_turn
+from .sizes import LONGEST, QUICKEST, SHIFT
 
 _CELLS = (ForceSensor, TorqueSensor)
 """What reads an effort: load cells and torque transducers have the same faults."""
@@ -68,12 +69,29 @@ def _with_fault(assembly: Assembly, sensor: str, wanted: str, fault: Sensor) -> 
     return replace(assembly, parts=tuple(parts)), name
 
 
+def _against_others(*faults: type[Sensor]) -> Places:
+    """Return the encoders without such a fault where there are several: one alone says where things are."""
+
+    def places(assembly: Assembly) -> list[str]:
+        encoders = [name for name, sensor in assembly.sensors().items() if isinstance(sensor, Encoder)]
+        return list(_chain_without((Encoder,), *faults)(assembly)) if len(encoders) > 1 else []
+
+    return places
+
+
 def _domain(cell: Sensor) -> Domain:
     return TRANSLATION if isinstance(cell, ForceSensor) else ROTATION
 
 
 def _bias(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(assembly, (Unknown(f"{name}.bias", (0.0,), -0.5, 0.5, f"{name}.reading"),))
+
+
+def _zero(assembly: Assembly, name: str) -> Iterator[Edit]:
+    kind = domain_of(assembly, assembly.measured(f"{name}.reading")[0].partition(".")[0])
+    off = EncoderOffset(of=assembly.sensors()[name].of, offset=number(0.0, kind.motion_unit), domain=kind)
+    edited, fault = _with_fault(assembly, name, "offset", off)
+    yield Edit(edited, (Unknown(f"{fault}.offset", (0.0,), -0.5, 0.5, f"{name}.reading"),))
 
 
 def _gain(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -83,7 +101,7 @@ def _gain(assembly: Assembly, name: str) -> Iterator[Edit]:
 def _delay(assembly: Assembly, name: str) -> Iterator[Edit]:
     delay = TransportDelay(of=assembly.sensors()[name].of, delay=number(1e-3, "s"))
     edited, fault = _with_fault(assembly, name, "delay", delay)
-    unknown = Unknown(f"{fault}.delay", (0.1,), 1e-3, 6.0, QUICKEST)
+    unknown = Unknown(f"{fault}.delay", (0.1,), 1e-3, 6.0, QUICKEST, beyond=SHIFT)
     yield Edit(edited, (unknown,), {"explains_lag": True})
 
 
@@ -99,7 +117,8 @@ def _drift(assembly: Assembly, name: str) -> Iterator[Edit]:
     kind = _domain(cell)
     drift = Drift(of=cell.of, drift=number(0.0, kind.unit("{effort}/s")), domain=kind)
     edited, fault = _with_fault(assembly, name, "drift", drift)
-    yield Edit(edited, (Unknown(f"{fault}.drift", (0.0,), -1.0, 1.0, f"{name}.reading / {LONGEST}"),))
+    unknown = Unknown(f"{fault}.drift", (0.0,), -1.0, 1.0, f"{name}.reading / {LONGEST}")
+    yield Edit(edited, (unknown,), {"bends_reading": True})
 
 
 def _nonlinearity(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -107,7 +126,8 @@ def _nonlinearity(assembly: Assembly, name: str) -> Iterator[Edit]:
     unit = Quantity(1.0, _domain(cell).effort_unit, "definition: the gain is told per unit of load")
     law = LoadNonlinearity(of=cell.of, nonlinearity=number(0.0, "1"), full_scale=unit)
     edited, fault = _with_fault(assembly, name, "nonlinearity", law)
-    yield Edit(edited, (Unknown(f"{fault}.nonlinearity", (0.0,), -0.45, 2.0, f"1 / {name}.reading"),))
+    unknown = Unknown(f"{fault}.nonlinearity", (0.0,), -0.45, 2.0, f"1 / {name}.reading")
+    yield Edit(edited, (unknown,), {"bends_reading": True})
 
 
 def _encoders_of_angles(assembly: Assembly) -> list[str]:
@@ -201,6 +221,32 @@ angle_sensor_eccentricity = Effect(
             _eccentric_disc,
             "force, torque and inertia that are off together, as a sine of the angle",
             "geometry; data sheets",
+        ),
+    ),
+)
+angle_sensor_bias = Effect(
+    "angle_sensor_bias",
+    "An encoder whose zero is off against that of another one.",
+    205,
+    (
+        Form(
+            _against_others(EncoderOffset),
+            _zero,
+            "a constant effort of what lies between two encoders, at any place and speed",
+            "data sheets of encoders",
+        ),
+    ),
+)
+angle_sensor_delay = Effect(
+    "angle_sensor_delay",
+    "An encoder whose reading comes late against that of another one.",
+    155,
+    (
+        Form(
+            _against_others(TransportDelay, ClockDrift),
+            _delay,
+            "an effort of what lies between two encoders in proportion to their speed",
+            "Golub and Van Loan 2013 (Padé table)",
         ),
     ),
 )

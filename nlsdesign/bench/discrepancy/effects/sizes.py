@@ -9,11 +9,18 @@ QUICKEST = "quickest motion"
 """Time in s in which the quickest measured motion changes by its own size: 1/ω of a sine."""
 LONGEST = "longest record"
 """Duration in s."""
+SHIFT = "shift of channels"
+"""Time in s by which two channels may be shifted against each other: half a sample of each."""
 
 
 def efforts_on(body: str) -> str:
     """Return the name of the largest effort on a body: of a tie, of its drive, or of its inertia."""
     return f"efforts on {body}"
+
+
+def span_of(motion: str) -> str:
+    """Return the name of the distance between both ends of a measured motion."""
+    return f"span of {motion}"
 
 
 class Sizes(Mapping[str, float]):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -57,6 +57,9 @@ _REACH = 5.0
 """Bounds of the control values, in the largest of them."""
 _ROUNDING = 1e-9
 """Least distance between two bounds of a regression."""
+_SPANNED, _INDEPENDENT = 0.1, 1e-6
+"""Share of its squares that a table leaves of what a number does, below which it can stand for it; singular
+values of a table, in the largest one, that count."""
 _SOURCE = "fitted to bench records; a table, no law"
 
 
@@ -106,6 +109,13 @@ class _Form:
             parts.append(basis * np.tanh(motion.rate / creep)[:, None])
         return np.hstack(parts)
 
+    def can_stand_for_any(self, held: Sequence[_Part], bounds: tuple[float, float, float]) -> bool:
+        """Tell whether such a table can stand for what one of the numbers in the slopes does."""
+        slopes = np.vstack([part.slope for part in held])
+        table = np.vstack([part.columns(self, bounds)[:, : self.size] for part in held])
+        left = slopes - table @ np.linalg.lstsq(table, slopes, rcond=_INDEPENDENT)[0]
+        return bool(np.any(np.sum(left**2, axis=0) < _SPANNED * np.sum(slopes**2, axis=0)))
+
     def least(self) -> Array:
         """Return the lower bounds: a spring may pull or push, friction only takes."""
         count = self.spans + 3
@@ -131,7 +141,9 @@ _FORMS = tuple(
 )
 
 
-def unnamed_part(assembly: Assembly, fit: Fit, bench: Bench, block: str) -> Candidate | None:
+def unnamed_part(
+    assembly: Assembly, fit: Fit, bench: Bench, block: str, named: Collection[str] = ()
+) -> Candidate | None:
     """Return what a block leaves over as a table over its motion, if that predicts records it has not seen.
 
     Parameters
@@ -144,6 +156,9 @@ def unnamed_part(assembly: Assembly, fit: Fit, bench: Bench, block: str) -> Cand
         Records; only those to be fitted are looked at.
     block
         Name of the block that is open.
+    named
+        Names of the numbers of effects that were named: they stay what they are, and no table is offered that
+        can stand for what one of them does.
 
     Returns
     -------
@@ -166,10 +181,15 @@ def unnamed_part(assembly: Assembly, fit: Fit, bench: Bench, block: str) -> Cand
     if high - low <= 0.0:
         return None
     creep = UnnamedFriction.rounding[place.domain]
-    numbers = [p for p in fit.parameters if p.name in evidence[0].driven.free]
-    parts = [_Part.of(e, fit, numbers, m) for e, m in zip(evidence, known, strict=True)]
-    shifts = _Shifts.of(numbers, fit)
-    chosen = _chosen(parts, shifts, (low, high, creep))
+    every = [p for p in fit.parameters if p.name in evidence[0].driven.free]
+    numbers = [p for p in every if p.name not in named]
+    parts, held = (
+        [_Part.of(e, fit, some, m) for e, m in zip(evidence, known, strict=True)]
+        for some in (numbers, [p for p in every if p.name in named])
+    )
+    bounds = (low, high, creep)
+    forms = [form for form in _FORMS if not form.can_stand_for_any(held, bounds)]
+    chosen = _chosen(forms, parts, _Shifts.of(numbers, fit), bounds)
     if chosen is None:
         return None
     form, values = chosen
@@ -301,17 +321,17 @@ def _folds(parts: Sequence[_Part]) -> list[list[_Fold]]:
 
 
 def _chosen(
-    parts: Sequence[_Part], shifts: _Shifts, bounds: tuple[float, float, float]
+    forms: Sequence[_Form], parts: Sequence[_Part], shifts: _Shifts, bounds: tuple[float, float, float]
 ) -> tuple[_Form, Array] | None:
     """Return the smallest form within one standard error of the best, with its control values."""
     scored, folds = [], _folds(parts)
-    for form in _FORMS:
+    for form in forms:
         regression = _Regression.of(form, parts, shifts, bounds)
         gains = regression.without_table(form.size).squares(folds) - regression.squares(folds)
         error = math.sqrt(len(gains)) * float(np.std(gains, ddof=1))
         scored.append((form, float(gains.sum()), error, regression))
-    best = max(scored, key=lambda each: each[1])
-    if best[1] <= _SURE * best[2]:
+    best = max(scored, key=lambda each: each[1], default=None)
+    if best is None or best[1] <= _SURE * best[2]:
         return None
     form, _, _, regression = next(s for s in scored if s[1] >= best[1] - best[2])
     return form, regression.solved()[: form.size]

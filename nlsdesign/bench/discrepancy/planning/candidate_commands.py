@@ -168,7 +168,8 @@ class _Family:
         for share in _SIZES[:1] if fewer else _SIZES:
             for frequency in self._frequencies(share * size)[-1 if fewer else 0 :]:
                 wave = _wave(frequency * self._time, centre != 0.0)
-                words = f"a sine of {_share(share)}{where} at {frequency:.2g} Hz"
+                part = "full travel" if share == 1.0 else f"{100 * share:.0f} % of the travel"
+                words = f"a sine of {part}{where} at {frequency:.2g} Hz"
                 yield words, self._window * share * _placed(centre, size, wave)
         for slowness in _SLOWNESS[1 if fewer else 0 :]:
             rate = slowness * min(self._speed / size, 2.0 * math.pi * self._highest)
@@ -282,10 +283,6 @@ class _Family:
         rate = max(float(np.max(np.abs(slope))), 1e-300)
         push = max(float(np.max(np.abs(np.gradient(slope, self._time)))), 1e-300)
         return value * min(1.0, self._speed / rate, self._acceleration / push)
-
-
-def _share(share: float) -> str:
-    return "full travel" if share == 1.0 else f"{100 * share:.0f} % of the travel"
 
 
 def _placed(centre: float, size: float, wave: Array) -> Array:

@@ -18,9 +18,9 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, MeasurementError
-from ....foundation.processes import parallel_map
 from ....foundation.quantity import parse_unit, with_unit
 from ....foundation.text_files import write_text
+from ....foundation.work_sharing import parallel_map
 from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ....model.structure import MovingBody, body_moved_by

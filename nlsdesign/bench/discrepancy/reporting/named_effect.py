@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from ....components.assembly.named_parts import Assembly
 from ....foundation.quantity import significant, three_digits, to_resolution, with_error, with_unit
@@ -67,6 +67,26 @@ class EffectEvidence:
         return f"{text}, which is little more than its error."
 
 
+Numbers: TypeAlias = Mapping[str, tuple[float, str, float]]
+"""Value, unit and standard error by full name."""
+
+
+def numbers_in_words(numbers: Numbers) -> str:
+    """Return numbers with their standard errors and units."""
+    return ", ".join(
+        f"{name.rpartition('.')[2].replace('_', ' ')} = {with_unit(with_error(value, error), unit)}"
+        for name, (value, unit, error) in numbers.items()
+    )
+
+
+def listed_numbers(numbers: Numbers) -> list[dict[str, Any]]:
+    """Return numbers for ``verdict.json``."""
+    return [
+        {"name": n, "value": to_resolution(v, s), "unit": u, "standard_error": significant([s], 4)[0]}
+        for n, (v, u, s) in numbers.items()
+    ]
+
+
 @dataclass(frozen=True)
 class NamedEffect:
     """An effect that was added.
@@ -91,7 +111,7 @@ class NamedEffect:
 
     name: str
     location: str
-    parameters: Mapping[str, tuple[float, str, float]]
+    parameters: Numbers
     aliases: tuple[str, ...]
     share: float
     signature: str
@@ -105,10 +125,7 @@ class NamedEffect:
 
     def numbers_in_words(self) -> str:
         """Return its numbers with their standard errors and units."""
-        return ", ".join(
-            f"{name.rpartition('.')[2].replace('_', ' ')} = {with_unit(with_error(value, error), unit)}"
-            for name, (value, unit, error) in self.parameters.items()
-        )
+        return numbers_in_words(self.parameters)
 
     def words(self, assembly: Assembly) -> str:
         """Return what it is, how large, and what speaks for it."""
@@ -133,15 +150,7 @@ class NamedEffect:
             "name": self.name,
             "location": self.location,
             "probability": self.probability,
-            "parameters": [
-                {
-                    "name": n,
-                    "value": to_resolution(v, s),
-                    "unit": u,
-                    "standard_error": significant([s], 4)[0],
-                }
-                for n, (v, u, s) in self.parameters.items()
-            ],
+            "parameters": listed_numbers(self.parameters),
             "aliases": list(self.aliases),
             "evidence": {
                 "share": self.share,

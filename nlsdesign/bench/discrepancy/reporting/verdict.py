@@ -26,7 +26,7 @@ from ..selection.measures import DECLARED
 from ..selection.trials import Skipped
 from .circumstances import DiagnosisRun, settings_of
 from .fitted_numbers import fitted_numbers
-from .named_effect import CONTRADICTION, LET_GO, as_sentence
+from .named_effect import CONTRADICTION, LET_GO, Numbers, as_sentence, listed_numbers, numbers_in_words
 from .named_effect import NamedEffect as NamedEffect
 from .remainder import Remainder
 
@@ -39,7 +39,7 @@ HEADLINES: Mapping[str, str] = {
 """What a verdict says in one line, where it names no effect."""
 EXPLANATIONS: Mapping[str, str] = {
     "none": "The refitted model explains the records down to their noise; nothing is missing.",
-    "unknown": "Something is missing that no effect of the catalogue explains.",
+    "unknown": "Something is missing; what was tried and how far it goes is listed below.",
     "undecidable": "Several effects explain these records equally well; the proposed record would tell.",
     "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
 }
@@ -169,8 +169,8 @@ class Verdict:
     block
         The block that was furthest from its noise floor; errors are summed up for it.
     runners_up
-        Effect and share of the excess that it would have explained, best first; perhaps with a third entry,
-        why it was not named.
+        Effect and share of the excess that it would have explained, best first; perhaps why it was not named,
+        or an empty text, and its numbers as those of a :class:`NamedEffect`.
     actuator
         The refitted assembly with the effects.
     declared
@@ -323,8 +323,9 @@ class Verdict:
             alone = (
                 f"{title(name)} alone explains {three_digits(100.0 * share)} % of the excess over the noise"
             )
-            reason = why[0] if why else _why_not(self, name, named)
-            sentences.append(f"{capitalised(alone)}: {reason}.")
+            reason = (why and why[0]) or _why_not(self, name, named)
+            numbers = f", with {numbers_in_words(why[1])}" if why[1:] and why[1] else ""
+            sentences.append(f"{capitalised(alone)}{numbers}: {reason}.")
         return tuple(sentences)
 
     def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
@@ -347,9 +348,7 @@ class Verdict:
                 },
                 "signal": {"name": gap.beside, "rms": gap.signal},
             },
-            "runners_up": [
-                dict(zip(("name", "share", "reason"), each, strict=False)) for each in self.runners_up
-            ],
+            "runners_up": [_runner_up(*each) for each in self.runners_up],
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "records": [asdict(each) for each in self.gaps],
         }
@@ -414,6 +413,14 @@ def best_forms(tried: Sequence[tuple[Any, ...]]) -> tuple[tuple[Any, ...], ...]:
     for each in tried:
         best.setdefault(each[0], each)
     return tuple(best.values())
+
+
+def _runner_up(name: str, share: float, reason: str = "", numbers: Numbers | None = None) -> dict[str, Any]:
+    return (
+        {"name": name, "share": share}
+        | ({"reason": reason} if reason else {})
+        | ({"parameters": listed_numbers(numbers)} if numbers else {})
+    )
 
 
 def _why_not(verdict: Verdict, name: str, named: Collection[str]) -> str:

@@ -30,7 +30,7 @@ from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ..block_prediction import shown_values
 from ..effects.places import efforts_of_ties
-from ..effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on
+from ..effects.sizes import LONGEST, QUICKEST, SHIFT, Sizes, efforts_on, span_of
 from ..selection.comparison import Comparison, Judged
 from ..selection.hypothesis import Hypothesis
 from ..tearing import blocks_of
@@ -136,7 +136,9 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
     """
     model = flatten(actuator)
     sizes = {LONGEST: max(float(r.trace.time[-1] - r.trace.time[0]) for r in records.records)}
+    sizes[SHIFT] = records.shift
     quickest: dict[str, float] = {}
+    ends: dict[str, list[float]] = {}
     signal_of = {r.measured: r.signal for r in _shown(model, records)}
     spans = {name: rate_span(records.records, signal) for name, signal in signal_of.items()}
     for record in records.records:
@@ -154,12 +156,15 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
             )
             quickest[body.name] = min(time or np.inf, quickest.get(body.name, np.inf))
         _enlarge(sizes, {name: _large(values)[0] for name, values in {**known, **shown}.items()})
+        for body in moving:
+            ends.setdefault(body.motion, []).extend(np.quantile(shown[body.motion], (1.0 - _USUAL, _USUAL)))
         for place in {_large(values)[1] for values in shown.values()}:
             state, inputs = (
                 [float(shown[v.name][place]) if v.name in shown else v.start for v in variables]
                 for variables in (model.states, model.inputs)
             )
             _enlarge(sizes, model.evaluate(state, inputs))
+    sizes |= {span_of(name): float(np.ptp(values)) for name, values in ends.items()}
     sizes |= {QUICKEST: min(quickest.values())} if quickest else {}
     for body in model.bodies:
         sizes[efforts_on(body.name)] = _effort(actuator, model, body, sizes, quickest.get(body.name))

@@ -15,8 +15,8 @@ from weakref import WeakKeyDictionary
 from ....components.assembly.named_parts import Assembly
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, unknown_name
-from ....foundation.processes import parallel_map
 from ....foundation.quantity import Quantity
+from ....foundation.work_sharing import parallel_map
 from ....model import Variable, flatten
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_noise import BlockNoise
@@ -26,11 +26,14 @@ from ...identification.least_squares import Fit
 from ...identification.parameters import Parameter, declared_parameter, free_parameter
 from ...identification.records.measurement import Record
 from ..effects.effect import Candidate, Unknown
+from ..effects.friction import with_resolved_signs
 from ..fitting import FitProblem, Key, Plain, Start, Tally, explains_enough, method_for, refusal
-from ..tearing import blocks_of
+from ..tearing import blocks_of, measured_signals
 from .cross_validation import Folds, by_pieces, by_records, tallies_of
 from .hypothesis import Hypothesis
 
+_ABOVE = 3.0
+"""Times as much as the number that it stands above a number is at least."""
 _FREE_REACH = 30.0
 """Factor to the bounds of a number of which nothing is taken as known."""
 
@@ -152,7 +155,7 @@ class HypothesisFit:
                 tuple(
                     _released(variables[n], begin.get(n))
                     if n in hypothesis.released
-                    else self._parameter(variables[n], known.get(n), begin.get(n))
+                    else self._parameter(variables, n, known.get(n), begin.get(n))
                     for n in free
                 )
             )
@@ -161,18 +164,24 @@ class HypothesisFit:
     def _scale(self, unknown: Unknown) -> float:
         return self._sizes.get(unknown.of, 1.0) if unknown.of else 1.0
 
-    def _parameter(self, variable: Variable, unknown: Unknown | None, start: float | None) -> Parameter:
+    def _parameter(
+        self, variables: Mapping[str, Variable], name: str, unknown: Unknown | None, start: float | None
+    ) -> Parameter:
+        variable = variables[name]
         if unknown is None:
             return declared_parameter(variable, start)
         scale = self._scale(unknown)
         low, high = unknown.lower * scale, unknown.upper * scale
+        low = max(low, self._sizes.get(unknown.beyond, 0.0)) if unknown.beyond else low
+        if unknown.above:
+            low = max(low, _ABOVE * variables[unknown.above].start)
         begin = variable.start if start is None else start
         log = unknown.lower > 0.0
         return Parameter(
             variable.name,
             variable.unit,
-            begin,
-            begin,
+            max(begin, low),
+            max(begin, low),
             float("inf"),
             max(low, variable.minimum),
             min(high, variable.maximum),
@@ -237,6 +246,7 @@ class Comparison:
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
         self.bench, self.sizes = bench, sizes
+        self._slowest: dict[str, float] = {}  # least speed that the records resolve, by the name of the body
         self._fit = HypothesisFit(bench, sizes)
         self._polished: WeakKeyDictionary[Hypothesis, Hypothesis] = WeakKeyDictionary()
         self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
@@ -261,7 +271,12 @@ class Comparison:
         for unknown in candidate.unknowns:
             if unknown.name.partition("[")[0] not in known:
                 raise unknown_name(f"effect '{candidate.effect}': number", unknown.name, known)
-        before = _edited(hypothesis, candidate)
+        if not self._slowest:
+            speeds = self.bench.slowest()
+            motions = measured_signals(flatten(hypothesis.assembly), self.bench.records.signals)
+            self._slowest = {m.body.name: speeds[m.signal] for m in motions if m.body and m.signal in speeds}
+        signed = with_resolved_signs(hypothesis.assembly, candidate.assembly, self._slowest)
+        before = _edited(hypothesis, replace(candidate, assembly=signed))
         names = {u.name for u in candidate.unknowns}
         groups = [g for g in self._groups(before) if any(names & set(each.free) for each in g)]
         if wanted and not any(each.block.name in wanted for g in groups for each in g):
@@ -318,7 +333,8 @@ class Comparison:
         for block in blocks_of(flatten(hypothesis.assembly), self.bench.records.signals):
             spread = [v.name for v in _refittable(block.model.parameters)]
             own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
-            blocks.append(FreeBlock(block, free_in(block, list(dict.fromkeys([*spread, *own])))))
+            wanted = [n for n in dict.fromkeys([*spread, *own]) if n not in hypothesis.held]
+            blocks.append(FreeBlock(block, free_in(block, wanted)))
         return _groups(blocks)
 
     def _refitted(
@@ -363,7 +379,7 @@ def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
         row, bracket, index = name.partition("[")
         return moved.get(row, row) + bracket + index
 
-    old = tuple(replace(u, name=renamed(u.name)) for u in hypothesis.unknowns)
+    old = tuple(replace(u, name=renamed(u.name), above=renamed(u.above)) for u in hypothesis.unknowns)
     values = {renamed(n): v for n, v in hypothesis.values.items()}
     # An edit may share a number out, for instance an inertia: what was fitted is shared out alike.
     then, now = hypothesis.assembly.quantities(), candidate.assembly.quantities()
@@ -372,9 +388,15 @@ def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
             values[name] *= now[name].number / then[name].number
     added = (*_with_unknowns(hypothesis.added, old), candidate)
     fits = {blocks: _renamed(fit, renamed) for blocks, fit in hypothesis.fits.items()}
-    released = frozenset(map(renamed, hypothesis.released))
+    released, held = (frozenset(map(renamed, names)) for names in (hypothesis.released, hypothesis.held))
     return replace(
-        hypothesis, assembly=candidate.assembly, added=added, values=values, fits=fits, released=released
+        hypothesis,
+        assembly=candidate.assembly,
+        added=added,
+        values=values,
+        fits=fits,
+        released=released,
+        held=held,
     )
 
 

@@ -16,16 +16,17 @@ Of several such effects the one that predicts best is taken, unless a simpler on
 
 The probability that a name is right is calibrated on cases with known answers:
 
-    ln(p/(1 − p)) = a + b·ln(r) + c·m,   r = (left by the best other name + n)/(left by the named + n)
+    ln(p/(1 − p)) = a + b·ln(r) + c·m − d·ln(l),   r = (left by the best other + n)/(left by the named + n)
 
 with what the rivals leave of the excess, the noise margin n, and m = 1 where nothing is left beyond the noise
-(Platt 1999: a logistic curve through scores). What the records cannot tell apart shares the probability.
+(Platt 1999: a logistic curve through scores), and l, what is left in the block in multiples of its noise: the
+right name may be in no list. What the records cannot tell apart shares the probability.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
@@ -68,7 +69,8 @@ class Criteria:
     )
     widest: float = _criterion(
         1.0,
-        "largest standard error of a number on the fitted scale: natural logarithm, or tenths of the range",
+        "largest standard error of a number: as a share of it (1 is 100 %) where it cannot change its sign, "
+        "in tenths of its range where it can",
     )
     worse: float = _criterion(
         0.25,
@@ -92,7 +94,7 @@ class Criteria:
         0.05, "share of the excess of a block that the inexact form of a named effect may leave in it"
     )
     stands_out: float = _criterion(
-        1.5, "where a block stays open, every other name must leave at least so many times as much"
+        1.2, "where a block stays open, every other name must leave at least so many times as much"
     )
     closed_share: float = _criterion(
         0.75, "share of the excess of a block that all effects in it together must explain for a name"
@@ -344,18 +346,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
         return None
     best = min(able, key=left)
 
-    def is_near(rival: Rival[T]) -> bool:
-        """Tell whether a rival predicts about as well as the best: within noise, or in proportion.
-
-        What it gains in another block does not make up for what it leaves in this one.
-        """
-        here, there = ({block: each.excesses[block]} for each in (rival, best))
-        gains = gain(here, there), gain(rival.excesses, best.excesses)
-        within = not any(criteria.is_more_than_noise(each) for each in gains)
-        nested = rival.effect in best.simpler
-        return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
-
-    near = [rival for rival in able if is_near(rival)]
+    near = [rival for rival in able if predict_alike(criteria, rival, best, block, left)]
     simplest = min(rival.numbers for rival in near)
     alike = dict[str, Rival[T]]()
     for rival in reversed(near):
@@ -368,6 +359,20 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     if any(imitates(criteria, taken, rival, block) for rival in unknown):
         return None
     return Choice(taken, tuple(alike.values()))
+
+
+def predict_alike(
+    criteria: Criteria, rival: Rival[T], best: Rival[T], block: str, left: Callable[[Rival[T]], float]
+) -> bool:
+    """Tell whether a rival predicts about as well as the best: within noise, or in proportion.
+
+    What it gains in another block does not make up for what it leaves in this one.
+    """
+    here, there = ({block: each.excesses[block]} for each in (rival, best))
+    gains = gain(here, there), gain(rival.excesses, best.excesses)
+    within = not any(criteria.is_more_than_noise(each) for each in gains)
+    nested = rival.effect in best.simpler
+    return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
 
 
 def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -> bool:
@@ -386,8 +391,8 @@ class Calibration:
 
     Parameters
     ----------
-    offset, distance, complete
-        a, b and c of the module's formula.
+    offset, distance, complete, left
+        a, b, c and d of the module's formula.
     most
         No more is stated: so many cases cannot show that one in a hundred is wrong.
     """
@@ -395,11 +400,13 @@ class Calibration:
     offset: float = 1.0
     distance: float = 1.05
     complete: float = 1.25
+    left: float = 0.5
     most: float = 0.99
 
-    def probability(self, distance: float, *, complete: bool) -> float:
+    def probability(self, distance: float, *, complete: bool, times_noise: float = 1.0) -> float:
         """Return the probability that a name is right."""
         score = self.offset + self.distance * distance + self.complete * complete
+        score -= self.left * math.log(times_noise)
         return min(self.most, 1.0 / (1.0 + math.exp(-score)))
 
 

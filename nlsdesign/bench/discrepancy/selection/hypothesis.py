@@ -41,6 +41,8 @@ class Hypothesis:
         Blocks and records that such a body makes unpredictable; they count as the others do.
     released
         Declared numbers of which nothing is taken as known, because the records contradict their spread.
+    held
+        Numbers that fits leave as they are in the assembly.
     """
 
     assembly: Assembly
@@ -52,6 +54,7 @@ class Hypothesis:
     has_free_flight: bool = False
     unpredictable: frozenset[Key] = frozenset()
     released: frozenset[str] = frozenset()
+    held: frozenset[str] = frozenset()
 
     @property
     def newest(self) -> Candidate:
@@ -90,6 +93,12 @@ class Hypothesis:
         """
         errors = {p.name: fit.standard_error(p.name) for fit in self.fits.values() for p in fit.parameters}
         return replace(self, values={n: to_resolution(v, errors.get(n, 0.0)) for n, v in self.values.items()})
+
+    def with_names_held(self) -> Hypothesis:
+        """Return the hypothesis with the numbers of its effects in the assembly, where no fit moves them."""
+        names = [u.name for u in self.unknowns]
+        assembly = self.assembly.with_values({n: self.values[n] for n in names if n in self.values})
+        return replace(self, assembly=assembly, held=frozenset(names))
 
     def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
         """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do."""

@@ -87,9 +87,9 @@ class EffectNumber(NamedTuple):
     decides
         Whether the effect vanishes with it.
     error
-        Standard error on the fitted scale.
+        Standard error: as a share of the number where its logarithm is fitted, else in the size of its fit.
     at_bound
-        Whether it stands at a bound of its search.
+        Whether it stands at a bound of its search that is no limiting form of the effect.
     """
 
     name: str
@@ -203,15 +203,17 @@ def _standing(known: dict[str, Unknown], fit: Fit, places: Sequence[int]) -> Sta
         parameter = fit.parameters[k]
         value, null = fit.values[parameter.name], known[parameter.name].null
         distance, slope = _distance(parameter, value, null)
-        at = parameter.inward(value)
+        at, error = parameter.inward(value), math.sqrt(fit.covariance[k, k])
         reach = _CLOSE * (high[k] - low[k]) if math.isfinite(low[k]) else 0.0
+        at_bound = bool(at - low[k] <= reach or high[k] - at <= reach)
+        is_limit = at_bound and known[parameter.name].limiting
         numbers.append(
             EffectNumber(
                 parameter.name,
                 distance,
                 null is not None,
-                math.sqrt(fit.covariance[k, k]),
-                bool(at - low[k] <= reach or high[k] - at <= reach),
+                0.0 if is_limit else math.expm1(min(error, 100.0)) if parameter.scale == "log" else error,
+                at_bound and not is_limit,
             )
         )
         if null is not None:

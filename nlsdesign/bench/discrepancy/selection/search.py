@@ -7,6 +7,8 @@ name: a smooth, passive table in place of an effect, if it predicts what it has 
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -14,9 +16,9 @@ from ....foundation.errors import ConvergenceError
 from ..effects.effect import Candidate, EffectFunction
 from ..effects.unnamed_tables import unnamed_part
 from .comparison import Comparison
-from .criteria import Change, Criteria, is_complete, lacking
+from .criteria import Change, Criteria, is_complete, lacking, predict_alike
 from .hypothesis import Hypothesis, excesses
-from .measures import explained, gain, gains_by_record, standing_of, total_excess
+from .measures import Standing, explained, gain, gains_by_record, standing_of, total_excess
 from .trials import Skipped, Step, Trials, Tried, account, rival_of
 
 
@@ -65,6 +67,44 @@ class Revision:
             else:
                 place += 1
         return steps
+
+    def sound(self, steps: list[Step]) -> list[Step]:
+        """Drop the effects that do not hold every clause beside all others, the last added first.
+
+        A fault of a sensor that bends a reading leaves too where a smooth law of what is read does as much.
+        """
+        place, excesses_of = len(steps) - 1, self.trials.excesses_of
+        while len(steps) > 1 and place >= 0:
+            if fewer := self._without(steps, place):
+                without, every = fewer[-1].chosen, steps[-1].chosen
+                added = every.added[place]
+                # Its numbers are asked on all samples.
+                change = Change(self.trials.criteria, excesses_of(without), excesses_of(every))
+                why = list(change.objections(Standing()))
+                if added.bends_reading and self._is_smooth_law(steps, place, without):
+                    why.append("a smooth law of what is read explains as much")
+                if why:
+                    reason = "; ".join(why)
+                    self.trials.skipped.append(Skipped(added.effect, added.location, without.names, reason))
+                    steps, place = fewer, len(fewer)
+            place -= 1
+        return steps
+
+    def _is_smooth_law(self, steps: Sequence[Step], place: int, fewer: Hypothesis) -> bool:
+        """Tell whether a table over the motion does what a sensor's fault does, beside a named law."""
+        block, sensors = steps[place].block, fewer.assembly.sensors()
+        laws = [s for s in steps if s.block == block and s.chosen.newest.location not in sensors]
+        fit = next((f for names, f in fewer.fits.items() if block in names), None)
+        comparison = self.trials.comparison
+        table = unnamed_part(fewer.assembly, fit, comparison.bench, block) if laws and fit else None
+        try:
+            smooth = comparison.with_effect(fewer, table) if table else None
+        except ConvergenceError:
+            return False
+        if smooth is None:
+            return False
+        law, fault = (self.trials.excesses_of(h)[block].excess for h in (smooth, steps[-1].chosen))
+        return law <= self.trials.criteria.equal * fault
 
     def enriched(self, steps: list[Step]) -> list[Step]:
         """Put a richer form of an effect in its place where it leaves much less.
@@ -222,7 +262,7 @@ class _Search:
         # with much left may have a name at all. Fits to all samples are the dearest, so they come after
         # that. What each effect gains is asked of the final set, because dropping any other one changes it.
         steps = revision.simplified(revision.backward(self._forward(start)))
-        steps = self._explaining(start, steps)
+        steps = self._explaining(start, revision.sound(steps))
         last = self._fitted_to_all(start, steps)
         skipped = tuple(dict.fromkeys(self.trials.skipped))
         if last is None:
@@ -254,12 +294,21 @@ class _Search:
         """
         if not steps:
             return []
-        first, last = (self.trials.excesses_of(each) for each in (start, steps[-1].chosen))
-        left = Change(self.trials.criteria, first, last).unexplained()
-        kept = [s for s in steps if s.block not in left or self.trials.criteria.is_outstanding(s.distance)]
+        excesses_of, criteria = self.trials.excesses_of, self.trials.criteria
+        first, last = (excesses_of(each) for each in (start, steps[-1].chosen))
+        left = Change(criteria, first, last).unexplained()
+
+        def stands_out(step: Step) -> bool:
+            """Tell whether an effect explains plainly more than any other, and than those in its class."""
+            own = excesses_of(step.chosen)[step.block].excess
+            alike = (excesses_of(each)[step.block].excess / max(own, 1.0) for each in step.equals)
+            nearest = min(alike, default=math.inf)
+            return criteria.is_outstanding(min(step.distance, math.log(max(nearest, 1e-300))))
+
+        kept = [s for s in steps if s.block not in left or stands_out(s)]
         if len(kept) == len(steps):
             return steps
-        shares, least = explained(first, last), self.trials.criteria.closed_share
+        shares, least = explained(first, last), criteria.closed_share
         why = {
             (step.chosen.newest.effect, step.chosen.newest.location): (
                 f"all that was found leaves more of '{step.block}' than a name may: it explains "
@@ -289,7 +338,7 @@ class _Search:
                 if step is not None:
                     break
             self.tried = self.tried or account(self.trials, present, tried)
-            further = [step] if step else []
+            further = self._plainer(step, tried, present, block) if step else []
             room = self._most_effects(present) - len(steps)
             if room > 1 and not further and self._is_far_from_closed(start, present, open_blocks[0]):
                 further = self._pair(tried, present, open_blocks[0])
@@ -321,6 +370,39 @@ class _Search:
             shares = explained(self.trials.on_all(start), now)
             blocks = [b for b in blocks if shares.get(b, 0.0) < self.trials.criteria.closed_share]
         return blocks
+
+    def _plainer(
+        self, step: Step, tried: Sequence[Hypothesis], present: Hypothesis, block: str
+    ) -> list[Step]:
+        """Return a step, or two simpler effects that predict as well with no more numbers."""
+        chosen = step.chosen.newest
+        forms = {chosen.effect, *chosen.simpler}
+        plain = [
+            h for h in tried if h.newest.effect in chosen.simpler and h.newest.location == chosen.location
+        ]
+        others = [h for h in self._best_of_each(tried) if h.newest.effect not in forms][:_PARTNERS]
+        room = self._most_effects(present) - len(present.added)
+        tasks = [
+            (one, again)
+            for one, other in itertools.product(plain if room > 1 else [], others)
+            if len(one.newest.unknowns) + len(other.newest.unknowns) <= len(chosen.unknowns)
+            and (again := same_again(self.trials, one, other.newest)) is not None
+        ]
+        before = self.trials.excesses_of(present)
+        fitted = [h for h in self.trials.fits(tasks) if not any(objections_of_all(self.trials.criteria, h))]
+        pair = self.trials.sound(
+            present, before, {h: self.trials.excesses_of(h) for h in (*fitted, step.chosen)}, block
+        )
+        if pair is None or pair.chosen is step.chosen:
+            return [step]
+        # What both leave alike is one class, with the richer form in it.
+        single = rival_of(step.chosen, self.trials.excesses_of(step.chosen))
+        best = rival_of(pair.chosen, self.trials.excesses_of(pair.chosen))
+        alike = predict_alike(self.trials.criteria, single, best, block, lambda each: each.left_in(block))
+        equals = (step.chosen,) if alike else ()
+        (alone,) = {one for one, _ in tasks if one.newest.effect == pair.chosen.added[-2].effect}
+        first = self.trials.made(before, rival_of(alone, self.trials.excesses_of(alone)), block)
+        return [replace(each, distance=step.distance, equals=equals) for each in (first, pair)]
 
     def _pair(self, tried: Sequence[Hypothesis], present: Hypothesis, block: str) -> list[Step]:
         """Return two effects that help together where none helps alone."""
@@ -357,12 +439,14 @@ def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criter
     """Return a hypothesis with a table for what each open block leaves over, where one predicts it.
 
     The clauses are those of an effect that ask for prediction; no share is asked for, since nothing is named.
+    What is named keeps the numbers that it was judged with.
     """
-    present = hypothesis
+    present, named = hypothesis.with_names_held(), len(hypothesis.added)
     for block in lacking(excesses(hypothesis, comparison.bench, criteria)):
         before = excesses(present, comparison.bench, criteria)
         fit = next((f for names, f in present.fits.items() if block in names), None)
-        candidate = unnamed_part(present.assembly, fit, comparison.bench, block) if fit else None
+        held = {u.name for each in present.added[:named] for u in each.unknowns}
+        candidate = unnamed_part(present.assembly, fit, comparison.bench, block, held) if fit else None
         if candidate is None:
             continue
         try:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ....foundation.errors import ConvergenceError
-from ....foundation.processes import parallel_map
+from ....foundation.work_sharing import parallel_map
 from ..effects.effect import Candidate, EffectFunction
 from .comparison import Comparison
 from .criteria import Change, Criteria, Rival, choose, distance_to_next, imitates

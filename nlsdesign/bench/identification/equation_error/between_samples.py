@@ -144,12 +144,13 @@ def resolving_step(block_records: Sequence[BlockRecord]) -> float:
     if any(each.driven.stiff for each in block_records):
         return math.inf
     return min(
-        (each.record.step / _needed(each) for each in block_records if _averages(each)), default=math.inf
+        (
+            each.record.step / _needed(each)
+            for each in block_records
+            if each.width >= _OVER_SAMPLES * each.record.step
+        ),
+        default=math.inf,
     )
-
-
-def _averages(seen: BlockRecord) -> bool:
-    return seen.width >= _OVER_SAMPLES * seen.record.step
 
 
 def _needed(seen: BlockRecord) -> int:

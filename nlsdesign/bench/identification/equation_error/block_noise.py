@@ -40,7 +40,7 @@ from ....foundation.quantity import with_unit
 from ..filters import Smoothing, derivative, difference, filter_weights, filtered, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
-from .block import Block
+from .block import Block, Drive
 from .noise import Noise, NoisePart, independent_number
 
 READING, BALANCE = 0.1, 0.2
@@ -221,16 +221,21 @@ def _rows(block: Block, record: Record, noise: Noise, filters: Filters, inputs: 
     rows = rows[~rows.touched_by(masked)]
     if block.moving is None:
         return rows
-    drive = block.drives[block.moving]
     rate = inputs[[v.name for v in block.model.inputs].index(block.moving)]
-    noisy = _NOISY * noise.behind(drive.signal, step, order=drive.order, span=span)
-    # A rate that is measured itself is not taken over a span.
-    blurred = _SMEARED * span * rmse(np.gradient(rate, step)) if drive.order else 0.0
     # The filter smears what happens at a reversal; so its whole reach must be in motion.
-    slow = np.abs(rate) < math.hypot(noisy, blurred)
+    slow = np.abs(rate) < slowest_rate(block.drives[block.moving], record, noise, span, rate)
     moving = _in_motion(rows, slow | _reverses(rate))
     # A motion that is never between two reversals for long, as one that shakes, is read across them.
     return moving if len(moving.places) >= LEAST_ROWS else _in_motion(rows, slow)
+
+
+def slowest_rate(drive: Drive, record: Record, noise: Noise, span: float, rate: Array) -> float:
+    """Return the least speed of a measured motion whose size a record resolves."""
+    step = record.step
+    noisy = _NOISY * noise.behind(drive.signal, step, order=drive.order, span=span)
+    # A rate that is measured itself is not taken over a span.
+    blurred = _SMEARED * span * rmse(np.gradient(rate, step)) if drive.order else 0.0
+    return math.hypot(noisy, blurred)
 
 
 def _in_motion(matrix: Smoothing, still: Mask) -> Smoothing:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,14 +12,16 @@ from scipy.ndimage import gaussian_filter1d
 
 from ....foundation.arrays import Array
 from ....simulation import Trace
-from ..filters import every
+from ..filters import derivative, every
 from ..records.measurement import Record, RecordSet, in_canonical_order
+from ..records.sampling import Sampling
 from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
 from .block import Block
-from .block_noise import BlockNoise, Filters, noise_of_blocks
+from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
+from .told_sampling import SeenBlock, with_sampling, with_told_sampling
 
 _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
@@ -73,6 +76,8 @@ class Bench:
     clock
         Time in s between samples at which the blocks show what they do, where that is known from other
         records of the same bench.
+    sampling
+        How inputs run between their samples, where that is known from other records of the same bench.
     """
 
     def __init__(
@@ -83,14 +88,22 @@ class Bench:
         noise: Noise | None = None,
         filters: Mapping[str, Filters] | None = None,
         clock: float | None = None,
+        sampling: Mapping[str, Sampling] | None = None,
     ) -> None:
         self._blocks = tuple(blocks)
-        self.records = in_canonical_order(records)
+        self.records = in_canonical_order(with_sampling(records, sampling or {}))
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
         self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
         self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
-        self.units = {block.name: block.unit for block in blocks}
         self._scales = {block.name: block.effort_per_drive for block in blocks}
+        self._as_measured, self._floors_as_measured = self.records, dict(self.floors)
+        if sampling is None:
+            self.records = self.inferred(blocks)
+        if self.records is not self._as_measured:
+            self.noise = self.noise.read_as(self.records)
+            self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
+        self._remarks = self.records.remarks
+        self.units = {block.name: block.unit for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, BlockNoise]] = {}
         if clock is None:
             clock = resolving_step(_block_records(self, blocks))
@@ -103,7 +116,35 @@ class Bench:
 
     def with_records(self, records: RecordSet) -> Bench:
         """Return other records of the same bench as they are seen with the same noise and filters."""
-        return Bench(records, self._blocks, noise=self.noise, filters=self.filters, clock=self.clock)
+        own = [remark for remark in self._remarks if remark not in records.remarks]
+        return Bench(
+            replace(records, remarks=(*records.remarks, *own)),
+            self._blocks,
+            noise=self.noise,
+            filters=self.filters,
+            clock=self.clock,
+            sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
+        )
+
+    def inferred(self, blocks: Sequence[Block]) -> RecordSet:
+        """Return the records with inputs of which nothing is said as they tell it by some blocks.
+
+        ``blocks``: of the declared model, or of a better one with the same names.
+        """
+        seen = [
+            SeenBlock(
+                block.scaled_to(self._scales[block.name]),
+                self.filters[block.name],
+                {
+                    record: floor
+                    for (name, record), floor in self._floors_as_measured.items()
+                    if name == block.name
+                },
+            )
+            for block in blocks
+            if block.name in self.filters
+        ]
+        return with_told_sampling(self._as_measured, seen)
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
@@ -153,6 +194,18 @@ class Bench:
         # One estimate of the noise serves all records, so more of them make it no better.
         doubt = float(np.mean([1.0 / f.known for (name, _), f in self.floors.items() if name == block]))
         return 1.0 / doubt if doubt else math.inf
+
+    def slowest(self) -> dict[str, float]:
+        """Return the least speed that some record resolves, by the measured signal that it is the rate of."""
+        speeds: dict[str, float] = {}
+        for block, record in itertools.product(self._blocks, self.records.deciding):
+            span = self.filters[block.name].span
+            for name, drive in block.drives.items():
+                if drive.order == 1 or name == block.moving:
+                    rate = derivative(record.trace[drive.signal], record.step, order=drive.order, span=span)
+                    least = slowest_rate(drive, record, self.noise, span, rate)
+                    speeds[drive.signal] = min(least, speeds.get(drive.signal, math.inf))
+        return speeds
 
     def _thinned(self, block: str, record: Record, *, whole: bool) -> tuple[Record, BlockNoise]:
         """Return every k-th sample unfiltered; with ``whole`` all are simulated and the same are compared."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -317,6 +317,13 @@ class Noise:
         parts = self.parts.get(signal, ())
         return tuple(NoisePart(variance_behind([p], weights, step), p.time) for p in parts)
 
+    def read_as(self, records: RecordSet) -> Noise:
+        """Return the noise as it is behind the way in which records run between their samples.
+
+        ``records``: those that are read.
+        """
+        return replace(self, taps={s: f.weights for r in records.records for s, f in r.sampling.items()})
+
     def _weights(self, signal: str, width: float, order: int, step: float, span: float) -> Array:
         """Return the weights of the samples of a signal behind a derivative and a filter."""
         weights, taps = filter_weights(width, order, step, span), self.taps.get(signal)
@@ -362,8 +369,7 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
             least = quanta[signal] / math.sqrt(12.0)
             level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
             lengths[signal] = tuple(s.step * len(s.samples) for s in at_rest + repeated)
-    taps = {s: form.weights for r in seen for s, form in r.sampling.items() if s in level}
-    return Noise(level, rounded, parts, evidence, lengths, taps)
+    return Noise(level, rounded, parts, evidence, lengths).read_as(records)
 
 
 def _length(stretches: Sequence[Stretch]) -> float:

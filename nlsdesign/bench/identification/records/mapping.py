@@ -90,6 +90,8 @@ class Column:
         Head of the clock of this column, in the unit of ``[time]``; empty for the clock of ``[time]``.
     sampling
         How the signal runs between its samples; ``None`` where the records are to tell.
+    declared
+        Whether that is said: otherwise the channel may be shifted by up to half a sample.
     """
 
     name: str
@@ -99,6 +101,7 @@ class Column:
     quantum: float = 0.0
     time: str = ""
     sampling: Sampling | None = SAMPLED
+    declared: bool = True
 
 
 @dataclass(frozen=True)
@@ -374,7 +377,7 @@ def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> Colu
     """
     motions = {name for body in model.bodies for name in (body.motion, body.rate)}
     shown = {r.signal for r in model.readings if r.measured in motions} | motions
-    given = mapping.inputs.commanded | mapping.inputs.shown
+    driving = mapping.inputs.commanded | mapping.inputs.shown
     columns = []
     for column in mapping.columns:
         if column.sampling is not None and column.sampling.held_from is not None and column.signal in shown:
@@ -383,8 +386,10 @@ def with_known_sampling(file: str, mapping: ColumnMap, model: FlatModel) -> Colu
                 f"is declared '{column.sampling.name}', but a motion moves on between its samples",
                 next_step='write between_samples = "sampled", or leave it out',
             )
-        known = column.sampling is not None or (column.signal in given and column.signal not in shown)
-        columns.append(column if known else replace(column, sampling=SAMPLED))
+        if column.sampling is None:
+            asked = column.signal in driving and column.signal not in shown
+            column = replace(column, sampling=None if asked else SAMPLED, declared=False)
+        columns.append(column)
     return replace(mapping, columns=tuple(columns))
 
 

@@ -16,13 +16,15 @@ from typing import Literal
 import numpy as np
 
 from ....foundation.arrays import Array, Mask
+from ....foundation.csv_tables import heads_with_units
 from ....foundation.errors import MeasurementError, nearest, unknown_name, visible
 from ....foundation.quantity import parse_unit
 from ....model import FlatModel
 from ....simulation import Trace
 from ..residuals import noise_of, quantum_of
 from .clocks import Resolution
-from .csv_files import default_mapping, heads_with_units, times_among, times_without_unit
+from .column_heads import default_mapping, times_among, times_without_unit
+from .gaps import between_gaps
 from .ingest import read_run
 from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
@@ -39,6 +41,8 @@ _LAGS = 100
 """Rates are taken over this part of the shortest record, where noise counts little."""
 _DIGITS = 9
 """Distances that agree to so many digits are equal: they must not depend on the order of a sum."""
+_PART = " part "
+"""Between the name of a file with gaps and the number of one of its records."""
 _COARSER = 3.0
 """Declared counts beyond which the smallest step in all records is no matter of chance."""
 
@@ -262,6 +266,15 @@ class RecordSet:
         """Records that may decide on noise and filters: those held out only where there are no others."""
         return self.of("fit", "selection") or self.records
 
+    @property
+    def shift(self) -> float:
+        """Time in s by which two channels may be shifted against each other without any fault.
+
+        Half a sample of each of which is not said how it runs between its samples.
+        """
+        loose = min(2, sum(not column.declared for column in self.columns))
+        return 0.5 * loose * max(record.step for record in self.records)
+
     def of(self, *roles: Role) -> tuple[Record, ...]:
         """Return the records of some roles.
 
@@ -363,12 +376,25 @@ def load_records(
     chosen = default_mapping(runs[first].heads, model, first.name, given)
     check_signals(first.name, chosen.columns, model)
     chosen = with_known_sampling(first.name, replace(chosen, inputs=Inputs.of(model)), model)
-    whole = [_record(file, table, chosen) for file, table in runs.items()]
+    pieces = {file: between_gaps(table, chosen) for file, table in runs.items()}
+    whole = [
+        _record(file, part, chosen, number if len(each.tables) > 1 else 0)
+        for file, each in pieces.items()
+        for number, part in enumerate(each.tables, 1)
+    ]
     records = [record for one in whole for record in one.records]
     findings = tuple(finding for one in whole for finding in one.findings)
-    remarks = [remark for one in whole for remark in one.remarks]
-    remarks += [_left_out(file) for file in tables if file not in runs]
-    remarks += [_not_read(file) for file in unread_tables(folder)]
+    remarks = [remark for each in pieces.values() for remark in each.remarks]
+    remarks += [remark for one in whole for remark in one.remarks]
+    remarks += [
+        Finding(file.name, "has no column of time, so it is not taken for a record")
+        for file in tables
+        if file not in runs
+    ]
+    remarks += [
+        Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
+        for file in unread_tables(folder)
+    ]
     chosen, coarser = _with_counts_as_seen(chosen, records)
     remarks += coarser
     held = tuple(hold_out) or chosen.held_out
@@ -444,14 +470,6 @@ def _without_time(where: str, tables: Iterable[RecordTable]) -> MeasurementError
     return MeasurementError(where, "has no column of time", next_step="name it 't_s' or 'time [s]'")
 
 
-def _left_out(file: Path) -> Finding:
-    return Finding(file.name, "has no column of time, so it is not taken for a record")
-
-
-def _not_read(file: Path) -> Finding:
-    return Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
-
-
 def _with_counts_as_seen(chosen: ColumnMap, records: Sequence[Record]) -> tuple[ColumnMap, list[Finding]]:
     """Put counts in the place of declared ones that are plainly finer: the noise floor would be too low."""
     remarks, columns = [], []
@@ -491,15 +509,15 @@ def split(
     if not held_out and len(records) == 1:
         return _cut_after_two_thirds(records[0])
     names = [r.name for r in records]
-    compared = {n for g in selection for n in fnmatch.filter(names, g)}
+    compared = {n for g in selection for n in _named_by(g, names)}
     if held_out:
-        chosen = {n for g in held_out for n in fnmatch.filter(names, g)}
+        chosen = {n for g in held_out for n in _named_by(g, names)}
     else:
         free = [r for r in records if r.name not in compared] if len(compared) < len(names) - 1 else records
         chosen = {free[k].name for k in surrounded([r.trace for r in free])}
     compared -= chosen
     for glob in (*held_out, *selection):
-        if not fnmatch.filter(names, glob):
+        if not _named_by(glob, names):
             raise MeasurementError(
                 f"held-out records '{glob}'",
                 "no record has such a name",
@@ -511,6 +529,11 @@ def split(
     if len(roles) == len(names):
         raise MeasurementError("records", "none is left for fitting", next_step="hold out fewer records")
     return tuple(replace(r, role=roles.get(r.name, "fit")) for r in records)
+
+
+def _named_by(glob: str, names: Iterable[str]) -> list[str]:
+    """Return the names that a glob fits; that of a file stands for all of its records."""
+    return [n for n in names if fnmatch.fnmatch(n, glob) or fnmatch.fnmatch(n.partition(_PART)[0], glob)]
 
 
 def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
@@ -552,14 +575,17 @@ def _part(record: Record, rows: slice, role: Role, label: str) -> Record:
     return replace(record, name=name, role=role, trace=part, masked=masked)
 
 
-def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> RecordSet:
-    run = read_run(file.stem, table, mapping)
+def _record(file: Path, table: RecordTable, mapping: ColumnMap, part: int = 0) -> RecordSet:
+    """Return one table as a record; ``part`` counts those of a file that has gaps."""
+    name = f"{file.stem}{_PART}{part}" if part else file.stem
+    run = read_run(name, table, mapping)
     sampling = {c.signal: c.sampling for c in mapping.columns if c.sampling not in (None, SAMPLED)}
     record = Record(
-        file.stem, run.trace, source=run.source, resolution=run.resolution, masked=run.masked,
-        sampling={} if mapping.resample else sampling,
+        name, run.trace, source=f"{run.source}{_PART}{part}" if part else run.source,
+        resolution=run.resolution, masked=run.masked, sampling={} if mapping.resample else sampling,
     )  # fmt: skip
-    return RecordSet((record,), mapping.columns, run.findings, run.remarks)
+    assumed = () if part > 1 else tuple(Finding(table.file, remark) for remark in table.remarks)
+    return RecordSet((record,), mapping.columns, run.findings, (*assumed, *run.remarks))
 
 
 def in_canonical_order(records: RecordSet) -> RecordSet:

@@ -26,7 +26,7 @@ from ....foundation.arrays import Array, Indices, Mask
 from ....foundation.errors import MeasurementError
 from ..residuals import noise_of, quantum_of
 
-_GAP = 1.5
+GAP = 1.5
 """A step this much longer than the usual one is a gap."""
 _BRIDGED = 20.0
 """Longest gap, in usual steps, for which a slower clock is proposed."""
@@ -135,12 +135,13 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged
             next_step="sort the record, or cut it where the clock was set back",
         )
     usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > max(_GAP * usual, (1.0 + _JITTER) * bridged))
+    gaps = np.flatnonzero(steps > max(GAP * usual, (1.0 + _JITTER) * bridged))
     if len(gaps):
         raise MeasurementError(
             f"{file}: column '{head}', {rows_in_words(gaps[:1] + 1, first_row)}",
             f"there is a gap of {steps[gaps[0]]:g} s; samples lie {usual:g} s apart ({len(gaps)} in all)",
-            next_step="split the record into one file before and one after the gap" + _slower(steps, usual),
+            next_step="split the record into one file before and one after the gap"
+            + slower_clock(steps, usual),
         )
     uneven = float(np.max(np.abs(steps - usual))) / usual
     return (
@@ -150,7 +151,7 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged
     )
 
 
-def _slower(steps: Array, usual: float) -> str:
+def slower_clock(steps: Array, usual: float) -> str:
     """Return the proposal of a clock slow enough for the gaps; none where these are too long."""
     longest = float(np.max(steps))
     if longest > _BRIDGED * usual:

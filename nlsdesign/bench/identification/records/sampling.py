@@ -18,6 +18,9 @@ import numpy as np
 
 from ....foundation.arrays import Array
 
+_REACH = 3
+"""Samples to either side from which a signal is read between two of them."""
+
 
 @dataclass(frozen=True)
 class Sampling:
@@ -120,3 +123,17 @@ AVERAGED = Sampling(
     -0.5,
 )
 FORMS = (SAMPLED, HELD, HELD_BEFORE, AVERAGED)
+
+
+def shifted(samples: float) -> Sampling:
+    """Return a signal that acts a part of a sample behind its stamps, read by a polynomial of sixth degree.
+
+    ``samples``: at most one, of either sign.
+    """
+    places = range(-_REACH, _REACH + 1)
+    # The weights of Lagrange: of the values at whole places in that of their polynomial in between.
+    taps = tuple(
+        (own, float(np.prod([(-samples - other) / (own - other) for other in places if other != own])))
+        for own in places
+    )
+    return Sampling("shifted", f"acts {samples:.2g} samples behind its stamps", taps, samples)

@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from ....foundation.arrays import Array
+from ....foundation.csv_tables import named_if_unreadable, read_csv
 from ....foundation.errors import MeasurementError, missing_library
 from ....foundation.text_files import is_there
-from .csv_files import read_csv
 
 _NUMBERS = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18))
 """Codes of the types of numbers and letters."""
@@ -149,12 +149,15 @@ class RecordTable:
         Number of the first row in messages: 2 in a CSV file whose heads are row 1.
     units
         Units of columns, by head, where the file gives them beside the heads.
+    remarks
+        What was assumed about the file.
     """
 
     file: str
     given: Mapping[str, Array]
     first_row: int = 1
     units: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     @property
     def heads(self) -> tuple[str, ...]:
@@ -222,35 +225,13 @@ def unread_tables(folder: Path) -> list[Path]:
 def read_table(file: Path) -> RecordTable:
     """Read the columns of one file.
 
-    A CSV file is read by :func:`~.csv_files.read_csv`. In a MAT file every numeric vector is a column,
-    fields of a
-    structure under ``structure.field``; in an HDF5 file every numeric vector under its path, ``group/name``.
+    A CSV file is read by :func:`~nlsdesign.foundation.csv_tables.read_csv`. In a MAT file every numeric
+    vector is a column, fields of a structure under ``structure.field``; in an HDF5 file every numeric
+    vector under its path, ``group/name``.
     """
     reader = {".csv": _csv, ".parquet": _parquet, ".mat": _mat}.get(file.suffix.lower(), _hdf5)
-    try:
+    with named_if_unreadable(file):
         return reader(file)
-    except UnicodeDecodeError as error:
-        with file.open("rb") as stream:
-            row = sum(1 for _ in itertools.takewhile(_is_utf8, stream)) + 1
-        raise MeasurementError(
-            f"{file.name}: row {row}",
-            f"is no text in UTF-8: {error.reason}",
-            next_step="save it as CSV in UTF-8; other kinds of file are told by their ending",
-        ) from None
-    except OSError as error:
-        raise MeasurementError(
-            file.name,
-            f"cannot be read: {error.strerror or error}",
-            next_step="put a file there that can be read, or take this one away",
-        ) from None
-
-
-def _is_utf8(line: bytes) -> bool:
-    try:
-        line.decode()
-    except UnicodeDecodeError:
-        return False
-    return True
 
 
 def _library(name: str, file: Path) -> Any:
@@ -262,10 +243,9 @@ def _library(name: str, file: Path) -> Any:
 
 def _csv(file: Path) -> RecordTable:
     table = read_csv(file)
-    rows = max((len(column) for column in table.columns.values()), default=0)
-    if rows < LEAST_ROWS:
-        raise _too_short(file.name, rows)
-    return RecordTable(file.name, table.columns, table.first_row, table.units)
+    if len(table.lines) < LEAST_ROWS:
+        raise _too_short(file.name, len(table.lines))
+    return RecordTable(file.name, table.columns, table.lines[0], table.units, table.remarks)
 
 
 def _parquet(file: Path) -> RecordTable:

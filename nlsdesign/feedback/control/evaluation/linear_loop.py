@@ -192,6 +192,15 @@ def assembled(
     return writer.loop(angles, mode)
 
 
+def restless(system: SampledSystem) -> ConvergenceError:
+    """Return the error of a loop whose observer learns."""
+    return ConvergenceError(
+        f"linear loop with {' and '.join(m.name for m in system.blocks.values())}",
+        "no rest is found, for what the observer has learned depends on what went before",
+        next_step="take a scheduled observer: design_observer(model, gain=CascadeGain())",
+    )
+
+
 class _Assembler:
     """Puts plant and blocks together by rows over all states and open inputs."""
 
@@ -224,7 +233,7 @@ class _Assembler:
         """Find the states of the blocks, and the goals, at which the loop rests."""
         if any(v.name.startswith(f"{PREFIX}.") for m in self.system.blocks.values() for v in m.states):
             # What was learned stays whatever it is, so every value of it would be a rest.
-            raise self._restless()
+            raise restless(self.system)
         goals = [n for n in self.inputs if n not in self.cut and not n.startswith(f"{PLANT}.")]
         columns = [len(self.states) + self.inputs.index(n) for n in goals]
         for b, m in self.system.blocks.items():
@@ -249,7 +258,7 @@ class _Assembler:
                 step = -(np.linalg.pinv(slope) @ residual[:, :, None])[:, :, 0]
             except np.linalg.LinAlgError as error:
                 # Values ran away: a covariance that is a state has no rest like this.
-                raise self._restless() from error
+                raise restless(self.system) from error
             for k, column in enumerate(columns):
                 self._moved(column, step[:, k])
             if np.max(np.abs(step)) < 1e-9:
@@ -258,13 +267,6 @@ class _Assembler:
         if wanted:
             _, rows, following = self.evaluated(at_rest=True)
             self.hears = self._passes(following[last][1], rows[name], last, wanted)
-
-    def _restless(self) -> ConvergenceError:
-        return ConvergenceError(
-            f"linear loop with {' and '.join(m.name for m in self.system.blocks.values())}",
-            "no rest is found, for what the observer has learned depends on what went before",
-            next_step="take a scheduled observer: design_observer(model, gain=CascadeGain())",
-        )
 
     def _wanted_as_estimated(self, goals: Sequence[str]) -> None:
         """Begin the search without an error of the torque: from a limit of the command no slope leads out."""

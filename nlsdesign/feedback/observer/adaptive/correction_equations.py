@@ -22,6 +22,8 @@ and the factors c are found by Bayesian regression, one reading at a time:
 
 - What no factor explains comes again with the motion, as the rounding of the encoder does. So a reading
   counts only as one of many over the correlation time, and a reading at standstill does not count.
+- Where residuals stay larger than expected, something acts that is none of the factors. What was learned then
+  fades, and the torque goes back to that of the cascade.
 - A residual beyond three deviations teaches the less the larger it is: a jump of the encoder is no news.
 - With a weight that grows with ln B from 0 to 1 the factors correct the torque. Where the numbers of the
   deck explain the readings as well, the torque is that of the cascade, so an exact deck costs nothing.
@@ -51,12 +53,12 @@ CORRELATION, DRIFT = 0.08, 60.0
 """Seconds over which it stays the same, and of motion after which nothing that was learned is left."""
 SURPRISE, REACH = 3.0, 3.5
 """Deviations of a residual from which on it teaches less, and of the torque within which it is held."""
-INFLATION_TIME, LARGEST_INFLATION = 1.0, 1e4
-"""Seconds in which residuals raise the noise that is reckoned with, and the largest factor."""
+RISE, FALL, LARGEST_INFLATION = 0.3, 1.0, 1e4
+"""Seconds in which residuals raise and lower the noise that is reckoned with, and the largest factor."""
+RESTLESS, QUICKEST = 100.0, 0.02
+"""How much faster what was learned fades per unit of unrest, and the largest share of it in one sample."""
 EVIDENCE_TIME, DECIDED = 5.0, 30.0
 """Seconds after which evidence is forgotten, and how much is kept at most (a natural logarithm)."""
-LEAST, MOST = -0.5, 0.9
-"""Range of a factor in which its logarithm is taken, by three terms of the series."""
 
 
 class CorrectionEquations:
@@ -161,10 +163,12 @@ class CorrectionEquations:
         nis = innovation**2 / (own + noise)
         heard = SURPRISE**2 / ca.fmax(nis, SURPRISE**2)
         gain = seen * (heard / total)
-        kept = moving * (1.0 - math.exp(-2.0 * self.time / DRIFT))
-        slow = self.slow + gain * innovation
+        # Where something acts that no factor explains, what was learned fades the faster the larger it is.
+        drift = 1.0 - math.exp(-2.0 * self.time / DRIFT)
+        faded = moving * ca.fmin(drift * (1.0 - RESTLESS) + drift * RESTLESS * unrest, QUICKEST)
+        slow = (self.slow + gain * innovation) * (1.0 - 0.5 * faded)
         prior = upper(ca.SX(ca.DM(self.balance.correlation)))
-        after = (self.packed - upper(ca.mtimes(gain, seen.T))) * (1.0 - kept) + kept * prior
+        after = (self.packed - upper(ca.mtimes(gain, seen.T))) * (1.0 - faded) + faded * prior
         # The same readings of a machine that is exactly the deck's, but for an offset of its drive.
         size = float(self.balance.deviations[-1])
         other, alone = residual - size * offset, size**2 * variance + carried
@@ -172,11 +176,12 @@ class CorrectionEquations:
         ratio = (total - alone) / alone
         news = other**2 / alone - innovation**2 / total - ratio * (6.0 + ratio) / (6.0 + 4.0 * ratio)
         forgotten = (1.0 - self.time / EVIDENCE_TIME) * evidence
-        excess = ca.fmin(nis, SURPRISE**2) - 1.0
+        excess = (ca.fmin(nis, SURPRISE**2) - 1.0) * self.time
+        grown = unrest * (1.0 + ca.fmax(excess * (1.0 / RISE), excess * (1.0 / FALL)))
         return slow, after, ca.vertcat(
             offset + share * other,
-            variance * (1.0 - share * size) * (1.0 - kept) + kept,
-            ca.fmin(ca.fmax(unrest * (1.0 + self.time / INFLATION_TIME * excess), 1.0), LARGEST_INFLATION),
+            variance * (1.0 - share * size) * (1.0 - faded) + faded,
+            ca.fmin(ca.fmax(grown, 1.0), LARGEST_INFLATION),
             ca.fmin(ca.fmax(forgotten + 0.5 * heard * news, -DECIDED), DECIDED),
             self.missing_torque(missing),
         )  # fmt: skip
@@ -200,7 +205,8 @@ class CorrectionEquations:
     ) -> tuple[Expression, Expression]:
         """Return the corrected torque, and the standard deviation that is expected of it."""
         b, (rest, relaxing) = self.balance, signals[2:]
-        factors = [ca.fmin(ca.fmax(d * slow[k], LEAST), MOST) for k, d in enumerate(b.deviations)]
+        factors = [d * slow[k] for k, d in enumerate(b.deviations)]
+        # Three terms of the series rise everywhere; what lies far off is held by the reach.
         logarithms = ca.vertcat(*[c * (1.0 - c * (0.5 - c * (1.0 / 3.0))) for c in factors])
         estimate = rest + relaxing
         for part, row, alone in zip((rest, relaxing), b.slopes, b.alone, strict=True):

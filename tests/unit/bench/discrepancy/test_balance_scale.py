@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.least_squares import fit
 from nlsdesign.bench.identification.parameters import Parameter, declared_parameter
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.components import Assembly, DriveSaturation, assembly, tie
+from nlsdesign.components import Assembly, DriveSaturation, TorqueConstantDrift, assembly, tie
 from nlsdesign.components.assembly.deck_template import load_template
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.quantity import Quantity
@@ -40,19 +42,20 @@ def drive(*chain: tuple[str, c.DrivePart], friction: float = 0.0) -> Assembly:
     return assembly("drive", motor=motor, bearing=bearing, spring=spring, **dry)
 
 
-def records(made: Assembly, seed: int = 3) -> RecordSet:
+def records(made: Assembly, seed: int = 3, *, logged: float = 1.0) -> RecordSet:
     rng, result = np.random.default_rng(seed), []
     for number, (size, pace) in enumerate([(2.0, 1.0), (4.0, 1.7), (5.0, 0.6)]):
         current = size * np.sin(2 * np.pi * pace * TIME) + 0.3 * size * np.sin(2 * np.pi * 2.3 * pace * TIME)
         run = simulate(flatten(made), TIME, inputs={"motor.current": current})
         signals = {
             "motor.angle": run["motor.angle"] + 2e-5 * rng.standard_normal(len(TIME)),
-            "motor.current": current + 5e-3 * rng.standard_normal(len(TIME)),
+            "motor.current": logged * current + 5e-3 * rng.standard_normal(len(TIME)),
         }
         result.append(Record(f"r{number}", Trace(TIME, signals, SIGNALS, f"r{number}")))
     return RecordSet(tuple(result), tuple(Column(n, n, u) for n, u in SIGNALS.items()))
 
 
+DRIFTING = ("drift", TorqueConstantDrift(drift=Quantity(0.0, "1/s", "to be fitted"), settling_time=0.5))
 SATURATED = ("iron", DriveSaturation(saturation_current=Quantity(50.0, "A", "to be fitted")))
 
 
@@ -63,6 +66,10 @@ def left(measured: RecordSet, hypothesis: Assembly) -> tuple[float, dict[str, fl
     parameters = [declared_parameter(v) for v in block.model.parameters if v.spread]
     if "motor.iron.saturation_current" in block.model.values:
         parameters.append(Parameter("motor.iron.saturation_current", "A", 8.0, 8.0, 1e3, 0.05, 200.0, "log"))
+    if "motor.drift.drift" in block.model.values:
+        parameters.append(
+            Parameter("motor.drift.drift", "1/s", 0.0, 0.0, math.inf, -5.0, 50.0, "linear", 5.0)
+        )
     names = [p.name for p in parameters]
     driven = bench.driven(block, names, {p.name: p.start for p in parameters})
     best = fit(bench.evidence(driven, measured.records, {p.name: p.start for p in parameters}), parameters)
@@ -77,6 +84,26 @@ def test_a_drive_that_does_not_saturate_gains_nothing_by_saturation() -> None:
     with_it, _ = left(measured, drive(SATURATED))
     assert without > 100.0
     assert with_it > 0.99 * without
+
+
+@pytest.mark.parametrize("logged", [0.0, 1.0])
+def test_dry_friction_is_no_drive_whose_torque_fades_or_grows(logged: float) -> None:
+    """A drive that grew without end would make any error small, and one that fades is gone."""
+    measured = records(drive(friction=0.8), logged=logged)
+    without, _ = left(measured, drive())
+    with_it, _ = left(measured, drive(DRIFTING))
+    assert without > 30.0
+    assert with_it > 0.7 * without
+
+
+def test_a_torque_that_fades_is_found_with_its_number() -> None:
+    fading = "drift", TorqueConstantDrift(drift=-0.6, settling_time=0.5)
+    measured = records(drive(fading))
+    without, _ = left(measured, drive())
+    with_it, numbers = left(measured, drive(DRIFTING))
+    assert without > 30.0
+    assert with_it < 0.02 * without
+    assert numbers["motor.drift.drift"] == pytest.approx(-0.6, rel=0.03)
 
 
 def test_a_drive_that_saturates_is_found_with_its_number() -> None:

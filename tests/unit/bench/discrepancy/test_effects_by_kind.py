@@ -21,7 +21,7 @@ COLUMNS = (
     "specimen",
 )  # fmt: skip
 TABLE = """
-    viscous_friction            .  o  o  o  o  o  o  .
+    viscous_friction            .  x  x  x  x  x  x  .
     coulomb_friction            x  x  x  x  x  x  x  x
     stribeck_friction           x  x  x  x  x  x  x  x
     load_dependent_friction     x  x  x  .  x  .  x  x
@@ -30,8 +30,8 @@ TABLE = """
     asymmetric_friction         .  .  .  .  .  .  .  .
     torque_ripple               x  x  x  x  x  o  x  .
     backlash                    x  x  o  .  x  o  o  .
-    drivetrain_resonance        x  o  x  x  o  o  x  .
-    spring_damping              .  o  .  .  o  .  o  .
+    drivetrain_resonance        x  x  x  x  x  o  x  .
+    spring_damping              .  x  .  .  x  .  x  .
     constant_torque             x  x  x  x  x  .  x  .
     constant_force              .  .  .  .  .  x  x  .
     gravity_load                x  x  x  x  x  .  x  .
@@ -41,8 +41,8 @@ TABLE = """
     winding_heat                x  x  x  x  x  x  x  .
     torque_constant_drift       x  x  x  x  x  x  x  .
     current_sensor_bias         x  x  x  x  x  .  x  .
-    angle_sensor_bias           .  o  .  .  o  .  o  .
-    angle_sensor_delay          .  o  .  .  o  .  o  .
+    angle_sensor_bias           .  x  .  .  x  .  x  .
+    angle_sensor_delay          .  x  .  .  x  .  x  .
     angle_sensor_eccentricity   x  x  x  x  x  .  x  .
     clock_drift                 x  x  x  x  x  .  x  x
     force_sensor_bias           x  .  .  .  .  .  .  x

@@ -159,10 +159,9 @@ def summary(candidate: Candidate, machine: Renamed | None = None) -> tuple[objec
 
     def size(unknown: Unknown) -> str:
         return " ".join(
-            f"efforts on {original(word.removeprefix('efforts on '))}"
-            if "efforts on" in word
-            else original(word)
+            kind + original(name)
             for word in re.split(r" (?=[*/] )|(?<=[*/]) ", unknown.of)
+            for kind, name in [re.fullmatch(r"(efforts on |span of |)(.*)", word).groups()]  # type: ignore[union-attr]
         )
 
     numbers = tuple((u.starts, u.lower, u.upper, u.null, size(u)) for u in candidate.unknowns)

@@ -33,5 +33,6 @@ def test_pairs_are_tried_where_no_effect_was_named_or_much_is_left_beside_it(
     monkeypatch.setattr(Revision, "enriched", lambda self, steps: steps)
     monkeypatch.setattr(Trials, "step", lambda *given: next(named, None))
     monkeypatch.setattr(_Search, "_pair", pair)
+    monkeypatch.setattr(_Search, "_plainer", lambda self, step, *given: [step])
     steps = _Search(Trials(cast(Comparison, None), (), Criteria(), lambda text: None))._forward(start)
     assert (len(steps), len(pairs)) == (alone, paired)

@@ -10,7 +10,7 @@ from scipy.io import savemat
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import resample_poly
 
-from nlsdesign.bench.identification import Record, load_records, noise_of
+from nlsdesign.bench.identification import Record, load_record, load_records, noise_of
 from nlsdesign.bench.identification.equation_error.evidence import estimate_noise
 from nlsdesign.bench.identification.records.alignment import aligned, joined, resampled
 from nlsdesign.bench.identification.records.clocks import Channel, lag_between, on_one_clock
@@ -265,7 +265,9 @@ def test_a_gap_names_the_clock_on_which_it_is_none(tmp_path: Path, model: object
     with pytest.raises(
         MeasurementError, match=r"a\.csv: column 't_s', row 102.*resample_Hz = 120 in records"
     ):
-        load_records(tmp_path, model)  # type: ignore[arg-type]
+        load_record(tmp_path / "a.csv", model)  # type: ignore[arg-type]
+    (remark,) = (r for r in load_records(tmp_path, model).remarks if "gap" in r.text)  # type: ignore[arg-type]
+    assert "resample_Hz = 120 in records" in remark.text
     (tmp_path / "records.toml").write_text(ASKED.replace("{rate}", "120"), encoding="utf8")
     assert load_records(tmp_path, model).records[0].step == pytest.approx(1 / 120)  # type: ignore[arg-type]
 

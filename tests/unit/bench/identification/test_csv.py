@@ -36,6 +36,10 @@ def with_commas(separator: str) -> list[str]:
     return [first, *(row.replace(".", ",") for row in rows)]
 
 
+def with_heads(*heads: str) -> list[str]:
+    return [";".join(heads), *with_commas(";")[1:]]
+
+
 UNITLESS = ("t", "encoder.reading", "cell.reading")
 WRITTEN = {
     "plain": (PLAIN, "utf-8"),
@@ -52,6 +56,9 @@ WRITTEN = {
     "a separator behind each row": ([f"{row}," for row in PLAIN], "utf-8"),
     "quotes": (['"' + PLAIN[0].replace(",", '","') + '"', *PLAIN[1:]], "utf-8"),
     "Windows": ([f"{row}\r" for row in PLAIN], "utf-8"),
+    "Excel in Europe": ([*with_heads("t [s]", "encoder.reading [°]", "cell.reading [N·m]")], "cp1252"),
+    "German heads": ([*with_heads("Zeit in s", "Winkel (°)", "Drehmoment / Nm")], "utf-8"),
+    "a comment between rows": ([*PLAIN[:9], "# a note", "", *PLAIN[9:]], "utf-8"),
 }  # fmt: skip
 
 
@@ -92,10 +99,6 @@ REFUSED = {
         [PLAIN[0], *(row.replace(".", ",") for row in PLAIN[1:])],
         r"row 2: has 6 cells, the heads are 3 -> separate the cells by semicolons",
     ),
-    "a comment between rows": (
-        [*PLAIN[:9], "# stopped here", *PLAIN[9:]],
-        r"a\.csv: row 10: has 1 cells, the heads are 3 -> give each row one cell for each head; comments",
-    ),
     "a word": (cell(9, "high"), r"row 9: 'high' is not a number -> correct the cell, or cut the record"),
     "nothing": ([], r"a\.csv: has 0 rows of numbers; at least 50 are needed -> take the file away"),
     "two units": (
@@ -116,11 +119,21 @@ def test_what_cannot_be_meant_is_refused_with_its_place(case: str, tmp_path: Pat
         read(tmp_path, "\n".join(rows) + "\n", model)
 
 
-def test_text_that_is_not_utf_8_is_named_by_its_row(tmp_path: Path, model: FlatModel) -> None:
+def test_text_that_is_no_utf_8_is_read_as_windows_writes_it_and_this_is_said(
+    tmp_path: Path, model: FlatModel
+) -> None:
+    records = read(tmp_path, "\n".join(["# Temperatur 20 °C", *PLAIN]) + "\n", model, "cp1252")
+    assert [(r.place, r.text) for r in records.remarks] == [("a.csv", "is no UTF-8 and was read as cp1252")]
+    (tmp_path / "a.csv").write_bytes(b"t_s,\x81\n")
     with pytest.raises(
-        MeasurementError, match=r"a\.csv: row 2: is no text in UTF-8.* -> save it as CSV in UTF-8"
+        MeasurementError, match=r"a\.csv: cannot be read: it is no text in UTF-8.* -> save it"
     ):
-        read(tmp_path, "\n".join(["# bench 3", "# Temperatur 20 °C", *PLAIN]) + "\n", model, "latin-1")
+        load_record(tmp_path / "a.csv", model)
+
+
+def test_rows_between_which_comments_stand_are_named_by_their_lines(tmp_path: Path, model: FlatModel) -> None:
+    with pytest.raises(MeasurementError, match=r"row 11: 'high' is not a number"):
+        read(tmp_path, "\n".join([*PLAIN[:5], "# one", "", *cell(9, "high")[5:]]), model)
 
 
 def test_a_comment_moves_the_rows_that_messages_name(tmp_path: Path, model: FlatModel) -> None:

@@ -1,4 +1,4 @@
-"""How a signal runs between its samples: what is declared, and who reads it.
+"""How a signal runs between its samples: what is declared, what the records tell, and who reads it.
 
 The machines are simulated here in NumPy, with a digital controller that holds its current.
 """
@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from nlsdesign.bench.discrepancy import diagnose
+from nlsdesign.bench.discrepancy import Verdict, diagnose
+from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
-from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, Sampling
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.changed_copies import smoothed
 from nlsdesign.components.assembly.deck_writer import declare
@@ -113,17 +115,17 @@ noise = {value = 0.005, unit = "A", source = "declared"}
 """
 
 
-def joint(seed: int) -> Array:
-    """Return time, angle and held current of a joint, 500 Hz."""
+def joint(seed: int, *, rate: float = 500.0, missing: float = 0.0) -> Array:
+    """Return time, angle and held current of a joint; ``missing`` is Coulomb friction beyond the declared."""
 
     def step(state: Array, current: float, h: float) -> Array:
         angle, before = state[:2]
         speed = before + h * (5.0 * current - 0.8 * before - 6.2 * math.sin(angle)) / 0.31
-        stuck = h * 2.1 / 0.31
+        stuck = h * (2.1 + missing) / 0.31
         speed = max(speed - stuck, 0.0) if speed > 0.0 else min(speed + stuck, 0.0)
         return np.array([angle + 0.5 * h * (before + speed), speed, 0.0, 0.0])
 
-    table = held(seed, step, rate=500.0, gains=(0.31 * 900.0 / 5.0, 0.31 * 48.0 / 5.0), size=0.9)
+    table = held(seed, step, rate=rate, gains=(0.31 * 900.0 / 5.0, 0.31 * 48.0 / 5.0), size=0.9)
     return np.column_stack([table[:, 0], 2e-5 * np.round(table[:, 1] / 2e-5), table[:, 3]])
 
 
@@ -196,18 +198,39 @@ def bench(
     return declared, load_records(folder, flatten(declared))
 
 
-def test_nothing_is_missing_from_a_joint_whose_controller_holds_its_current(tmp_path: Path) -> None:
-    found = diagnose(*bench(tmp_path, _JOINT, [joint(seed) for seed in range(4)], "held"))
+def forms(declared: Assembly, records: RecordSet) -> dict[str, Sampling | None]:
+    model = flatten(declared)
+    seen = Bench(records, blocks_of(model, records.signals))
+    return {column.name: column.sampling for column in seen.records.columns}
+
+
+def remarks(found: Verdict) -> str:
+    return " ".join(found.remarks)
+
+
+@pytest.mark.parametrize("between", [None, pytest.param("held", marks=pytest.mark.slow)])
+def test_nothing_is_missing_from_a_joint_whose_controller_holds_its_current(
+    tmp_path: Path, between: str | None
+) -> None:
+    found = diagnose(*bench(tmp_path, _JOINT, [joint(seed) for seed in range(5)], between))
     assert found.verdict == "none"
+    assert ("is taken as held" in remarks(found)) is (between is None)
 
 
 @pytest.mark.slow
 def test_nothing_is_missing_from_an_axis_and_the_damping_of_its_belt_is_right(tmp_path: Path) -> None:
-    found = diagnose(*bench(tmp_path, _AXIS, [axis(seed) for seed in range(5)], "held"))
+    found = diagnose(*bench(tmp_path, _AXIS, [axis(seed) for seed in range(5)]))
     assert found.verdict == "none"
     numbers = {p.name: (f.values[p.name], f.standard_error(p.name)) for f in found.fits for p in f.parameters}
     value, error = numbers["loss.damping"]
     assert value == pytest.approx(0.03, abs=max(3.0 * error, 6e-4))
+
+
+def test_a_held_current_is_told_beside_friction_that_nobody_declared(tmp_path: Path) -> None:
+    told = forms(*bench(tmp_path, _JOINT, [joint(seed, missing=3.0) for seed in range(4)]))
+    assert told["ammeter"] is not None
+    assert told["ammeter"].late == pytest.approx(0.5, abs=0.1)
+    assert told["encoder"] is SAMPLED
 
 
 @pytest.mark.parametrize("form", FORMS)

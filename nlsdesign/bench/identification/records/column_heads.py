@@ -1,0 +1,110 @@
+"""What the head of a column says: whether it is the time, which signal it holds, and in which unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ....foundation.errors import MeasurementError
+from ....foundation.quantity import same_dimension, typeset_unit
+from ....foundation.written_numbers import name_and_unit
+from ....model import FlatModel
+from ....model.readings import reading_of
+from .mapping import Column, ColumnMap
+
+_TIME_NAMES = ("t", "time")
+_TIME_WORDS = (
+    "timestamp", "seconds", "ms", "elapsed time", "zeit", "zeitstempel", "temps", "tiempo", "tempo", "tid",
+    "tijd", "czas", "aika", "idő", "время", "时间", "時間",
+)  # fmt: skip
+"""Further names of a time: of instruments, and in languages of benches."""
+
+
+def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
+    """Return heads that name a time, with their units; 't' and 'time' come before further words."""
+    named = [(head, *name_and_unit(head)) for head in heads]
+    timed = [(head, name.lower(), unit) for head, name, unit in named if unit and same_dimension(unit, "s")]
+    plain = [(head, unit) for head, name, unit in timed if name in _TIME_NAMES]
+    return plain or [(head, unit) for head, name, unit in timed if name in _TIME_WORDS]
+
+
+def times_without_unit(heads: Sequence[str]) -> list[str]:
+    """Return heads that are called like a time and give no unit of time."""
+    names = (*_TIME_NAMES, *_TIME_WORDS)
+    timed = {head for head, _ in times_among(heads)}
+    return [head for head in heads if head.lower().strip("[]() ") in names and head not in timed]
+
+
+def default_mapping(
+    heads: Sequence[str], model: FlatModel, file: str, given: ColumnMap | None = None
+) -> ColumnMap:
+    """Return the mapping that follows from the heads of the columns.
+
+    ``given``: where it maps columns, it is returned as it stands; else all but the columns are kept.
+    """
+    if given is not None and given.columns:
+        return given
+    split_heads = [(head, *name_and_unit(head)) for head in heads]
+    timed = given is not None and given.time.name in heads
+    times = [(given.time.name, given.time.unit)] if given is not None and timed else times_among(heads)
+    if not times:
+        raise MeasurementError(file, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+    columns = [
+        Column(head, signal, str(unit), *_declared(model, signal), sampling=None)
+        for head, name, unit in split_heads
+        if head != times[0][0] and (signal := _signal(head, name, unit, model, file))
+    ]
+    for column in columns:
+        if sum(other.signal == column.signal for other in columns) > 1:
+            raise MeasurementError(
+                f"{file}: column '{column.name}'",
+                f"is not the only one that could be '{column.signal}'",
+                next_step="write a records.toml that maps each column to its signal",
+            )
+    clock = Column(times[0][0], "time", times[0][1])
+    return replace(given or ColumnMap(clock, ()), time=clock, columns=tuple(columns))
+
+
+def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str) -> str | None:
+    everything = {v.name: v for v in model.states + model.inputs + model.signals}
+    if unit is None:
+        raise MeasurementError(
+            f"{file}: column '{head}'",
+            "names no unit",
+            next_step="write for instance 'force_N', or map it in records.toml",
+        )
+    if name in everything:
+        return name
+    for group in ([everything[r.signal] for r in model.readings], list(model.inputs)):
+        fitting = _last_of_chains(model, [v.name for v in group if same_dimension(v.unit, unit)])
+        if len(fitting) == 1:
+            return fitting[0]
+        if fitting:
+            break
+    raise MeasurementError(
+        f"{file}: column '{head}'",
+        f"could be {' or '.join(fitting)}"
+        if fitting
+        else f"no sensor of the model reads in {typeset_unit(unit)}",
+        next_step="write a records.toml that maps each column to its signal"
+        + ("" if fitting else ", or give the deck of the rig that was measured"),
+    )
+
+
+def _last_of_chains(model: FlatModel, signals: Sequence[str]) -> list[str]:
+    """Leave out readings that another one of these signals passes on: a bench writes down the last."""
+    readings = [r for r in model.readings if r.signal in signals]
+    passed_on = {sensor for r in readings for sensor in r.sensors[1:]}
+    return [s for s in signals if s not in {r.signal for r in readings if r.sensors[0] in passed_on}]
+
+
+def _declared(model: FlatModel, signal: str) -> tuple[float, float]:
+    """Return noise and count of a signal: the largest of the sensors that pass its value on."""
+    noise = quantum = 0.0
+    reading = reading_of(model.readings, signal)
+    for sensor, law in zip(reading.sensors, reading.laws, strict=True):
+        noise = max(noise, model.values.get(f"{sensor}.noise", 0.0))
+        quantum = max(quantum, model.values.get(f"{sensor}.quantum", 0.0))
+        if not law.shows_value:
+            break
+    return noise, quantum
