@@ -22,11 +22,11 @@ from .bench.identification import Record, RecordSet
 from .bench.identification.least_squares import Fit
 from .export import export_c, export_fmu
 from .feedback.observer import (
-    AdaptiveDesign,
+    CorrectedDesign,
     FixedGrid,
     Grid,
     ObserverDesign,
-    design_adaptive_observer,
+    design_corrected_observer,
     design_observer_with_details,
     observe,
 )
@@ -97,16 +97,16 @@ class Regeneration:
     plant
         The better model.
     observer
-        Of the better model, cascade or adaptive, whichever errs less on these records; ``None`` where none
-        can be designed.
+        Cascade or corrected, whichever errs less on the records that decide: of the better model, unless one
+        of the declared model errs less there; ``None`` where none can be designed.
     reasons
         Why there is no observer, or no comparison; empty if nothing is lacking.
     quantity, unit
         What is estimated.
     errors
         Of the cascade by record, with the nominal numbers.
-    adaptive
-        Of the adaptive observer by record, begun at the declared numbers; empty where it cannot be designed
+    corrected
+        Of the corrected observer by record, begun at the declared numbers; empty where it cannot be designed
         for both models or a record lacks an input of it.
     chosen
         Which observer was taken, and why.
@@ -123,7 +123,7 @@ class Regeneration:
     quantity: str = ""
     unit: str = "N*m"
     errors: tuple[ObserverTorqueError, ...] = ()
-    adaptive: tuple[ObserverTorqueError, ...] = ()
+    corrected: tuple[ObserverTorqueError, ...] = ()
     chosen: str = ""
     spread_before: tuple[float, ...] = ()
     spread_after: tuple[float, ...] = ()
@@ -136,8 +136,8 @@ class Regeneration:
 
     @property
     def learning(self) -> tuple[float, float]:
-        """Error of the adaptive observer over all records, before and after."""
-        return _over_records(self.adaptive)
+        """Error of the corrected observer over all records, before and after."""
+        return _over_records(self.corrected)
 
     @property
     def over_spread(self) -> tuple[float, float]:
@@ -158,7 +158,7 @@ class Regeneration:
             f"{three_digits(pair[0])} → {with_unit(three_digits(pair[1]), self.unit)}."
             for how, pair in pairs.items()
             if all(map(math.isfinite, pair))
-        ) + ((f"Generated is the {self.chosen}.",) if self.adaptive else ())
+        ) + ((f"Generated is the {self.chosen}.",) if self.chosen else ())
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``regeneration.json``."""
@@ -169,9 +169,9 @@ class Regeneration:
             "nominal": dict(zip(keys, map(_finite, self.nominal), strict=True)),
             "over_spread": dict(zip(keys, map(_finite, self.over_spread), strict=True)),
             "draws": {"before": list(self.spread_before), "after": list(self.spread_after)},
-            "adaptive": dict(zip(keys, map(_finite, self.learning), strict=True)),
+            "corrected": dict(zip(keys, map(_finite, self.learning), strict=True)),
             "records": [each._asdict() for each in self.errors],
-            "adaptive_records": [each._asdict() for each in self.adaptive],
+            "corrected_records": [each._asdict() for each in self.corrected],
             "chosen": self.chosen,
             "reasons": list(self.reasons),
         }
@@ -205,7 +205,8 @@ def regenerate(
 ) -> Regeneration:
     """Design the observer again, and compare it with the one from the declared model.
 
-    ``records``: bench records; those that no fit has seen are compared, or all where there are none.
+    ``records``: bench records. Which observer is generated is chosen on those that selected the better model,
+    or on those that were fitted where there are none. Those held out are compared, or all without them.
     ``choice``: what is estimated; by default the torque of the series spring, every millisecond. Result: with
     reasons in words where no observer can be designed or nothing can be compared.
     """
@@ -219,18 +220,20 @@ def regenerate(
     known: dict[str, Any] = {"quantity": spring.effort, "unit": better.variable(spring.effort).unit}
     try:
         before = _designed(declared, choice)
-        runs = [_Watched.of(better, spring, r, choice) for r in records.of("held_out") or records.records]
+        seen = {r.name: _Watched.of(better, spring, r, choice) for r in records.records}
     except NlsError as error:
         return Regeneration(better, after.model, (f"the observers are not compared: {error}",), **known)
+    runs = [seen[r.name] for r in records.of("held_out") or records.records]
+    deciding = [seen[r.name] for r in records.of("selection") or records.of("fit") or records.records]
     progress("designing the observers that learn")
     learned = [_learning(model, choice) for model in (declared, better)]
-    adaptive, lacking = _compared(learned, runs)
+    generated, chosen = _generated(((before, after), _both(learned)), deciding)
+    corrected, lacking = _compared(learned, runs)
     pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
     errors = tuple(
         ObserverTorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
         for run, (a, b) in zip(runs, pairs, strict=True)
     )
-    generated, chosen = _generated(after, learned[1], errors, adaptive)
     progress("designing observers over the spread of the numbers")
     draws = [*_draws(declared, ()), *_draws(better, fits)]
     models = [*[declared] * DRAWS, *[better] * DRAWS]
@@ -240,7 +243,7 @@ def regenerate(
         generated.model,
         (*lacking, *_failures(spread)),
         errors=errors,
-        adaptive=adaptive,
+        corrected=corrected,
         chosen=chosen,
         spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
         spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
@@ -259,10 +262,10 @@ def _designed(model: FlatModel, choice: ObserverChoice, grid: Grid | None = None
     )
 
 
-def _learning(model: FlatModel, choice: ObserverChoice) -> AdaptiveDesign | str:
-    """Return the adaptive observer of a model, or why there is none."""
+def _learning(model: FlatModel, choice: ObserverChoice) -> CorrectedDesign | str:
+    """Return the corrected observer of a model, or why there is none."""
     try:
-        return design_adaptive_observer(
+        return design_corrected_observer(
             model,
             estimate=series_spring(model, choice.spring).effort,
             measured=measured_motion(model, choice.measured),
@@ -274,10 +277,10 @@ def _learning(model: FlatModel, choice: ObserverChoice) -> AdaptiveDesign | str:
 
 
 def _compared(
-    learned: Sequence[AdaptiveDesign | str], runs: Sequence[_Watched]
+    learned: Sequence[CorrectedDesign | str], runs: Sequence[_Watched]
 ) -> tuple[tuple[ObserverTorqueError, ...], tuple[str, ...]]:
-    """Return the errors of the adaptive observers, before and after, or why there are none."""
-    words = "the adaptive observer is not compared: "
+    """Return the errors of the corrected observers, before and after, or why there are none."""
+    words = "the corrected observer is not compared: "
     designs = []
     for which, each in zip(("declared", "better"), learned, strict=True):
         if isinstance(each, str):
@@ -294,18 +297,42 @@ def _compared(
     return errors, ()
 
 
+def _both(learned: Sequence[CorrectedDesign | str]) -> tuple[CorrectedDesign, CorrectedDesign] | None:
+    """Return the observers that learn, of the declared and of the better model, where there are both."""
+    first, second = learned
+    return None if isinstance(first, str) or isinstance(second, str) else (first, second)
+
+
 def _generated(
-    cascade: ObserverDesign,
-    learning: AdaptiveDesign | str,
-    errors: Sequence[ObserverTorqueError],
-    adaptive: Sequence[ObserverTorqueError],
-) -> tuple[ObserverDesign | AdaptiveDesign, str]:
-    """Return the observer of the better model that errs less on the records, and why in words."""
-    if isinstance(learning, str) or not adaptive:
-        return cascade, "cascade"
-    if _over_records(adaptive)[1] < _over_records(errors)[1]:
-        return learning, "adaptive observer: it errs less on these records than the cascade"
-    return cascade, "cascade: it errs less on these records than the adaptive observer"
+    pairs: tuple[tuple[ObserverDesign, ObserverDesign], tuple[CorrectedDesign, CorrectedDesign] | None],
+    deciding: Sequence[_Watched],
+) -> tuple[ObserverDesign | CorrectedDesign, str]:
+    """Return the observer that errs least on the records that decide, and why in words.
+
+    It is one of the declared model where none of the better model errs less: what is worse replaces nothing.
+    """
+    cascades, corrected = pairs
+    named: list[tuple[str, ObserverDesign | CorrectedDesign, ObserverDesign | CorrectedDesign]] = [
+        ("cascade", *cascades)
+    ]
+    if corrected and not any(run.lacks(each) for run in deciding for each in corrected):
+        named.append(("corrected observer", *corrected))
+    errors = [
+        [_rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
+    ]
+    best = min(range(len(named)), key=lambda k: errors[k][1])
+    replaced = min(range(len(named)), key=lambda k: errors[k][0])
+    roles = ", ".join(sorted({run.record.role.replace("_", " ") for run in deciding}))
+    if errors[replaced][0] < errors[best][1]:
+        name = named[replaced][0]
+        return named[replaced][1], (
+            f"{name} of the declared model, which is not replaced: on the records that decide ({roles}) it "
+            "errs less than those of the better model"
+        )
+    name, _, design = named[best]
+    if len(named) == 1:
+        return design, name
+    return design, f"{name}: it errs less on the records that decide ({roles}) than the other"
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,18 +367,17 @@ class _Watched:
         """Root mean square of the torque."""
         return float(np.sqrt(np.mean(self.torque**2)))
 
-    def lacks(self, design: ObserverDesign | AdaptiveDesign) -> list[str]:
+    def lacks(self, design: ObserverDesign | CorrectedDesign) -> list[str]:
         """Return inputs of an observer that the record does not measure."""
         return [v.name for v in design.model.inputs if v.name in self.silent]
 
-    def estimate(self, design: ObserverDesign | AdaptiveDesign) -> Array:
+    def estimate(self, design: ObserverDesign | CorrectedDesign) -> Array:
         """Return what an observer makes of the record, begun at rest at its first angle."""
         inputs = {v.name for v in design.model.inputs}
         wires = {name: signal for name, signal in self.readings.items() if name in inputs}
         first = float(self.trace[self.readings.get(self.motion, self.motion)][0])
         run = observe(design.model, self.trace, readings=wires, start=design.start(first))
-        step = design.step.nominal if isinstance(design, AdaptiveDesign) else design.step
-        return run[step.plant.estimate.name]
+        return run[design.step.plant.estimate.name]
 
     def error(self, estimate: Array) -> float:
         """Return the root mean square error of an estimate."""

@@ -66,9 +66,10 @@ def loop(
 
     The load is fixed for responses, moved for the impedance. Where the spring gives torque of one sign only,
     each sine of the torque swings about 1.25 amplitudes, and 2.25 are held. Exit status 1 if the loop
-    limit-cycles or is unstable anywhere in the range that is looked at, with the gain where that begins, or
-    if a sine moves no torque. The observer is the cascade, with the numbers of the deck for the machine
-    as well.
+    limit-cycles or is unstable anywhere in the range that is looked at, with the gain where that begins, if
+    a sine moves no torque, or if the gain has less than 6 dB and 30 degrees in 95 % of the spread of the
+    deck, with the gain that has them. The observer is the cascade, with the numbers of the deck for the
+    machine as well.
     """
     from ..export import quickest
     from ..feedback.control import LoopRange, evaluate_loop
@@ -207,6 +208,10 @@ def _shown(result: LoopEvaluation) -> None:
         f"coupled at {math.degrees(result.coupled.angle):.3g}°: stable on {int(np.sum(stable_loads))} of "
         f"{stable_loads.size} loads"
     )
+    kicked = result.spread.kicked
+    if kicked is not None:
+        click.echo(f"after a kick at {abs(kicked.amplitude):.3g} N·m: {100 * kicked.held:.0f} % of "
+                   f"{len(kicked.verdicts)} machines of the spread settle")  # fmt: skip
     for sentence in result.findings():
         click.echo(f"finding: {sentence}")
     if result.stable:
