@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help study test thorough tutorial kernels mutation lint bench masters targets wheels docs gallery environment lock clean distclean
 
 help:
-	@echo 'make study      run the study of the published actuator; the report goes to $(OUT)/report.html'
+	@echo 'make study      a small study, then that of the published actuator; the report goes to $(OUT)/report.html'
 	@echo '                (another one: make study STUDY=name; another folder: make study OUT=folder)'
 	@echo 'make test       style, types and all tests but the slow ones'
 	@echo 'make thorough   the slow tests too, before a release'
@@ -37,7 +37,7 @@ help:
 	@echo 'make targets    generated C on processors of controllers in an emulator: docs/targets.md'
 	@echo 'make tutorial   run the tutorial and write its numbers, figures and notebook anew'
 	@echo 'make wheels     build wheel and sdist, install and try each on every Python that is here'
-	@echo 'make lock       write requirements/locked.txt anew (newest versions: make lock UPGRADE=--upgrade)'
+	@echo 'make lock       write requirements/*.txt anew (newest versions: make lock UPGRADE=--upgrade)'
 	@echo 'make clean      remove what study, test and build have written'
 	@echo 'make distclean  remove .venv too'
 	@echo 'All but lock and clean make .venv first where it is missing or out of date;'
@@ -46,7 +46,12 @@ help:
 environment:
 	@PYTHON='$(PYTHON)' $(SHELL) requirements/environment.sh
 
-study: environment
+# A study needs a part of the packages only. In front of the long one stands the smallest, a result within seconds.
+study:
+	@PYTHON='$(PYTHON)' $(SHELL) requirements/environment.sh study
+ifeq ($(STUDY),austin2015)
+	@$(BIN)/nlsdesign study run hello --out out/hello
+endif
 	@$(BIN)/nlsdesign study run '$(STUDY)' --out '$(OUT)'
 
 lint: environment
@@ -101,6 +106,9 @@ lock:
 		--universal --python-version 3.11 --generate-hashes --only-binary :all: \
 		--custom-compile-command 'make lock' --quiet $(UPGRADE) \
 		--output-file requirements/locked.txt
+	.venv-lock/bin/uv pip compile pyproject.toml --extra export --group build --constraint requirements/locked.txt \
+		--universal --python-version 3.11 --generate-hashes --only-binary :all: \
+		--custom-compile-command 'make lock' --quiet --output-file requirements/study.txt
 
 clean:
 	rm -rf out dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,11 +1,17 @@
 #!/bin/sh
 # Makes .venv with the locked packages and this checkout in it, or leaves it alone when it is up to date.
 # Called by make; needs a POSIX shell, coreutils and Python 3.11 or newer. PYTHON=/path/to/python chooses one.
+# With the argument "study" only what a study needs is installed; without, everything, which holds that too.
 set -eu
 cd "$(dirname "$0")/.."
 
 venv=.venv
 stamp=$venv/nlsdesign.stamp
+if [ "${1:-}" = study ]; then
+    lock=requirements/study.txt size='320 MB to download, 1.2 GB on disk'
+else
+    lock=requirements/locked.txt size='400 MB to download, 1.6 GB on disk'
+fi
 forms='The same without make (from the folder of the checkout):
   with pip:  python3 -m venv .venv && .venv/bin/python -m pip install -e ".[export,test,lint]"
   with uv:   uv venv --python 3.11 && uv pip install -e ".[export,test,lint]"
@@ -14,7 +20,10 @@ forms='The same without make (from the folder of the checkout):
 say() { printf '%s\n' "nlsdesign: $*" >&2; }
 
 # An environment knows where it stands, so the folder counts as well as what is to be installed.
-fingerprint() { pwd -P && cksum pyproject.toml requirements/locked.txt requirements/environment.sh; }
+fingerprint() { pwd -P && cksum pyproject.toml requirements/*.txt requirements/environment.sh && echo "$1"; }
+
+# Whether the environment holds what the given list of packages names.
+holds() { [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint "$1")" ]; }
 
 works() { [ -x "$venv/bin/python" ] && "$venv/bin/python" -m pip --version >/dev/null 2>&1; }
 
@@ -49,7 +58,7 @@ print("%d.%d" % sys.version_info[:2], "old" if sys.version_info < (3, 11) else
     exit 2
 }
 
-if [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint)" ] && works; then
+if { holds "$lock" || holds requirements/locked.txt; } && works; then
     exit 0
 fi
 
@@ -70,9 +79,9 @@ if ! works || [ "$(head -n 1 "$stamp" 2>/dev/null)" != "$(pwd -P)" ]; then
 fi
 rm -f "$stamp"
 
-say "installing the locked packages (once; 400 MB to download, 1.6 GB on disk) ..."
+say "installing the locked packages (once; $size) ..."
 # Not compiled here, one after the other: what is imported is compiled then, and most of it never is.
-"$venv/bin/python" -m pip install $quiet --no-compile --require-hashes --only-binary :all: -r requirements/locked.txt || {
+"$venv/bin/python" -m pip install $quiet --no-compile --require-hashes --only-binary :all: -r "$lock" || {
     say "the locked packages could not be installed; the reason stands above. Is there a network, a proxy to set?"
     say "With a Python that is newer than the lock, try an older one:  make PYTHON=python3.13 ..."
     exit 2
@@ -82,5 +91,5 @@ say "installing the locked packages (once; 400 MB to download, 1.6 GB on disk) .
     say "the packages are there, but nlsdesign itself could not be installed; the reason stands above."
     exit 2
 }
-fingerprint >"$stamp"
+fingerprint "$lock" >"$stamp"
 say "ready."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 import tomllib
@@ -37,7 +38,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "bench.discrepancy": SIMULATED | {"bench.identification"},
     "bench.calibration": SIMULATED | {"bench.identification", "bench.discrepancy"},
     "export": SIMULATED,
-    "regeneration": SIMULATED | {"feedback.observer", "bench.identification", "bench.discrepancy", "export"},
+    "regeneration": SIMULATED | FEEDBACK | BENCH | {"components", "design", "export"},
     "presentation.figures": SIMULATED | MIDDLE,
     "presentation.report": SIMULATED | MIDDLE | {"presentation.figures"},
     "sweeps": SIMULATED | MIDDLE | {"components"},
@@ -165,6 +166,21 @@ def objection(package: str, found: Import, known: dict[str, Path]) -> str | None
     return f"{here} may not know {there}"
 
 
+def behind_the_front(package: Path, found: Import) -> bool:
+    """Whether an import reaches into a room past its front; the modules of the foundation are open to all."""
+    if not inside(found.target, package.name) or found.target == package.name:
+        return False
+    room = room_of(package.name, found.target)
+    front = f"{package.name}.{room}"
+    if room in (room_of(package.name, found.source), "foundation") or found.target == front:
+        return False
+    # A module may be called as what the front hands out of it: ``flatten`` of ``model``.
+    text = package.joinpath(*room.split("."), "__init__.py").read_text(encoding="utf-8")
+    statements = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom)]
+    handed_out = {alias.asname or alias.name for node in statements for alias in node.names}
+    return found.target.removeprefix(f"{front}.") not in handed_out
+
+
 def floor_of(package: str, module: str) -> int | None:
     """Floor of a module within its room; -1 where the room has no inner rooms, None if it is in none."""
     room, inner = inner_room(package, module)
@@ -233,6 +249,35 @@ def test_the_drawing_is_not_empty(root: Path) -> None:
 
 def test_no_forbidden_import(root: Path) -> None:
     expect_none(forbidden(root / "nlsdesign"))
+
+
+def test_the_commands_import_from_a_room_only_its_front(root: Path) -> None:
+    package = root / "nlsdesign"
+    expect_none(
+        f"{found}, past the front of its room"
+        for found in imports(package)
+        if inside(found.source, "nlsdesign.cli") and behind_the_front(package, found)
+    )
+
+
+@pytest.mark.parametrize(
+    "text", ["..components.assembly.deck_writer import x", "..presentation.report.page import x"]
+)
+def test_an_import_past_the_front_of_a_room_is_caught(tmp_path: Path, text: str) -> None:
+    rooms = [
+        "components/assembly/deck_writer",
+        "presentation/report/page",
+        "foundation/deck",
+        "model/flatten",
+    ]
+    fronts = {"model/__init__": "from .flatten import flatten"}
+    front = (
+        "from ..foundation.deck import y\n from ..presentation.report import z\n from ..model import flatten"
+    )
+    files = {**dict.fromkeys(rooms, ""), **fronts, "cli/deck": f"def f():\n from {text}\n {front}"}
+    package = build(tmp_path, files)
+    known = [found for found in imports(package) if found.source == "nlsdesign.cli.deck"]
+    assert [found.line for found in known if behind_the_front(package, found)] == [2]
 
 
 def test_the_waist_hands_out_no_assembly() -> None:

@@ -434,6 +434,16 @@ def test_the_two_walks_name_the_lines_and_enter_no_room_twice(root: Path) -> Non
         assert len(entered) == len(set(entered)), entered
 
 
+def test_messages_that_are_explained_are_messages_of_the_package(root: Path) -> None:
+    page = (root / "docs" / "when_it_says.md").read_text(encoding="utf-8")
+    messages = [
+        m for bold in re.findall(r"^\*\*(.*?)\*\*", page, re.MULTILINE) for m in re.findall(r"`(.*?)`", bold)
+    ]
+    assert len(messages) > 12
+    sources = "\n".join(file.read_text(encoding="utf-8") for file in (root / "nlsdesign").rglob("*.py"))
+    assert [message for message in messages if message not in sources] == []
+
+
 def test_a_walk_that_lost_its_way_is_noticed(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("import b\n\n\ndef work() -> None: ...\n", encoding="utf-8")
     row = "## Two walks\n\n| room | where |\n| model | [`work`](../a.py#L{}) |\n"

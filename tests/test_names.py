@@ -51,7 +51,7 @@ DIALECT = frozenset(
 
 SAME_NAME = {
     # A command has the name of the room or module that it runs.
-    "cli": {"cosimulate", "design", "diagnose", "export", "materials", "sweep"},
+    "cli": {"cosimulate", "design", "export", "sweep"},
     # An effect of the catalogue has the name of the part that it adds.
     "bench/discrepancy/effects": {"friction"},
 }
@@ -235,7 +235,7 @@ def test_a_name_with_two_meanings_is_caught(tmp_path: Path) -> None:
     for name, text in {
         "design/point.py": "class Point: ...\nclass _Rows: ...\n",
         "analysis/sweep.py": "class Point: ...\nclass _Rows: ...\n",
-        "cli/materials.py": "class Command: ...\n",
+        "cli/sweep.py": "class Command: ...\n",
         "model/materials.py": "class Fit: ...\n",
         "figures/point.py": "",
     }.items():

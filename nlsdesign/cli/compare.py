@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import NlsError
-from .named_paths import NamedPath
-from .output import examples, json_option, show_json, show_table
+from .options import json_option
+from .output import examples, show_json, show_table
 from .overwriting import out_option
+from .typed_values import NamedPath
 
 if TYPE_CHECKING:
     from ..presentation.report import ComparedResult
@@ -70,7 +71,7 @@ def _labels(paths: tuple[Path, ...]) -> list[str]:
 
 def _read(path: Path, label: str) -> ComparedResult:
     """Read a folder or a deck."""
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare
     from ..foundation.deck import load_deck
     from ..model import flatten
     from ..presentation.report import ComparedResult

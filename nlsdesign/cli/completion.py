@@ -9,9 +9,11 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem, ShellComplete, get_completion_class
 
-from ..foundation.deck import deck_names
+from ..foundation.deck import deck_names, template_names
 from ..foundation.locations import folder
-from .output import examples, json_option, show_json
+from .options import json_option
+from .output import examples, show_json
+from .studies import study_names
 
 INSTALL = {
     "bash": "nlsdesign completion bash > ~/.local/share/bash-completion/completions/nlsdesign",
@@ -44,30 +46,16 @@ def completion(context: click.Context, /, shell: str, as_json: bool) -> None:
     click.echo(f"{first}{mark}# To install: {INSTALL[shell]}\n{rest}")
 
 
-def _decks() -> list[str]:
-    return deck_names()
-
-
 def _materials() -> list[str]:
     with (folder("models") / "materials.toml").open("rb") as stream:
         return sorted(name for name, each in tomllib.load(stream).items() if isinstance(each, dict))
 
 
-def _studies() -> list[str]:
-    from .studies import study_names
-
-    return study_names()
-
-
-def _templates() -> list[str]:
-    return sorted(path.stem for path in (folder("models") / "templates").glob("*.toml"))
-
-
 _NAMES: dict[str, tuple[Callable[[], list[str]], bool]] = {
-    "DECK": (_decks, True),
+    "DECK": (deck_names, True),
     "MATERIAL": (_materials, False),
-    "STUDY": (_studies, True),
-    "TEMPLATE": (_templates, False),
+    "STUDY": (lambda: study_names(), True),
+    "TEMPLATE": (template_names, False),
 }
 """What gives the names, and whether a file can be given as well, by the word that stands in a help text."""
 

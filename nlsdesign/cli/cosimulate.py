@@ -1,30 +1,28 @@
-"""``nlsdesign cosimulate``: FMUs wired by name and run together."""
+"""``nlsdesign cosimulate`` and ``export ssp``: FMUs wired by name, run together or written as one archive."""
 
 from __future__ import annotations
 
 import fnmatch
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..foundation.quantity import Quantity, quantity, typeset_unit
-from .named_paths import NamedPath
-from .output import examples, json_option, show_json, show_table
+from .export import export
+from .options import json_option
+from .output import examples, show_json, show_table, show_written
 from .overwriting import out_file_option
-from .units import Number, parse_number
+from .typed_values import NamedPath, Number, parse_number, read_pairs
 
 if TYPE_CHECKING:
-    from ..export import Convergence, CoSimulation, FmuSystem, SamplesOf, Stepping, Wire
-    from ..export.cosimulation.coupling import Coupling
-    from ..foundation.progress import Progress
+    from ..export import Convergence, CoSimulation, FmuSystem, SamplesOf, Wire
     from ..simulation import Sine
 
-T = TypeVar("T")
 _LATE = "late:"
 _SAMPLES = re.compile(r"(?P<count>[^a-z:]*)samples?(:(?P<instance>\w+))?$")
 _NUMBER = re.compile(r"(?P<number>[-+]?[\d.]+([eE][-+]?\d+)?)\s*(?P<unit>.*)$")
@@ -88,17 +86,23 @@ def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **
     """
     import tempfile
 
-    from ..export import convergence
+    from ..export import Coupling, Extrapolated, Held, Iterated, Stepping, convergence
     from ..foundation.progress import Steps
 
     _check_out(out, [*given["fmus"], *([str(given["system"])] if given.get("system") else [])])
     steps = Steps()
     with tempfile.TemporaryDirectory(prefix="nlsdesign-system-") as folder:
         system = _system(given, Path(folder))
-        inputs = pairs("--input", given["inputs"], _signal)
-        stepping = _stepping(given["step"], given["coupling"], given["patience"], steps)
-        if given["signals"]:  # before the work
-            _check_globs(given["signals"], [*system.recorded(), *inputs])
+        inputs = read_pairs("--input", given["inputs"], _signal)
+        couplings: dict[str, type[Coupling]] = {
+            "extrapolated": Extrapolated, "iterated": Iterated, "held": Held,
+        }  # fmt: skip
+        stepping = Stepping(
+            given["step"], coupling=couplings[given["coupling"]](), patience=given["patience"], progress=steps
+        )
+        for glob in given["signals"]:  # before the work
+            if not fnmatch.filter(names := [*system.recorded(), *inputs], glob):
+                raise unknown_name("--signals", glob, names)
         with steps.step("co-simulation"):
             run = system.run(inputs=inputs, stop=stop, stepping=stepping)
         study = None
@@ -122,9 +126,9 @@ def _system(given: Mapping[str, Any], folder: Path) -> FmuSystem:
     from ..export import FmuSystem, read_ssp
 
     own = FmuSystem(
-        fmus=pairs("--fmu", given["fmus"], Path),
-        wires=pairs("--wire", given["wires"], read_wire),
-        parameters=pairs("--set", given["parameters"], _finite),
+        fmus=read_pairs("--fmu", given["fmus"], Path),
+        wires=read_pairs("--wire", given["wires"], read_wire),
+        parameters=read_pairs("--set", given["parameters"], _finite),
         order=given["order"],
     )
     if given["system"] is None:
@@ -141,17 +145,6 @@ def _system(given: Mapping[str, Any], folder: Path) -> FmuSystem:
         parameters={**read.parameters, **own.parameters},
         order=own.order or read.order,
     )
-
-
-def _stepping(step: float | None, coupling: str, patience: float, progress: Progress) -> Stepping:
-    from ..export import Extrapolated, Held, Iterated, Stepping
-
-    chosen: Coupling = Extrapolated()
-    if coupling == "iterated":
-        chosen = Iterated()
-    elif coupling == "held":
-        chosen = Held()
-    return Stepping(step, coupling=chosen, patience=patience, progress=progress)
 
 
 def _check_out(out: Path, reads: list[str]) -> None:
@@ -182,12 +175,6 @@ def _as_json(run: CoSimulation, study: Convergence | None, out: Path) -> dict[st
     return content
 
 
-def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
-    for each in globs:
-        if not fnmatch.filter(names, each):
-            raise unknown_name("--signals", each, names)
-
-
 def _listed(run: CoSimulation, globs: tuple[str, ...]) -> list[str]:
     """Return the names that fit one of the globs; without a glob inputs and outputs, but no items of rows."""
     names = list(run.trace.signals)
@@ -199,7 +186,7 @@ def _listed(run: CoSimulation, globs: tuple[str, ...]) -> list[str]:
 def _show(
     run: CoSimulation, study: Convergence | None, wires: Mapping[str, str | Wire], listed: Sequence[str]
 ) -> None:
-    from ..export.cosimulation.wires import as_wire
+    from ..export import as_wire
 
     rows = []
     for to, delay in run.delays.items():
@@ -226,23 +213,6 @@ def _show(
     show_table("Change when the step is halved", ("name", *heads), changes)
 
 
-def pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
-    """Return what ``NAME=VALUE`` options give, by name."""
-    values: dict[str, T] = {}
-    for text in given:
-        name, sign, value = (part.strip() for part in text.partition("="))
-        if not (name and sign and value):
-            raise ValueRangeError(f"{option} '{text}'", "is not NAME=VALUE", next_step="write NAME=VALUE")
-        if name in values:
-            raise ValueRangeError(f"{option} '{text}'", f"'{name}' is given twice", next_step="remove one")
-        try:
-            values[name] = read(value)
-        except ValueError:
-            hint = "give a number, or for an input amplitude@frequency in Hz, for instance 1.5@2"
-            raise ValueRangeError(f"{option} '{text}'", f"'{value}' cannot be read", next_step=hint) from None
-    return values
-
-
 def read_wire(text: str) -> Wire:
     """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``."""
     from ..export import SamplesOf, Wire
@@ -255,19 +225,19 @@ def read_wire(text: str) -> Wire:
             f"--wire from '{text}'", "is not FROM[*GAIN][@DELAY]", next_step=f"write for instance {_EXAMPLES}"
         )
     waits = SamplesOf() if late else _delay(delay.strip()) if at else 0.0
-    return Wire(source, gain=_gain(gain) if gain else 1.0, delay=waits)
+    factor: float | Quantity = 1.0
+    if gain:
+        match = _NUMBER.match(gain)
+        if not match:
+            raise ValueRangeError(f"gain '{gain}' of a --wire", "does not start with a number")
+        factor = float(match["number"])
+        factor = quantity(factor, match["unit"]) if match["unit"] else factor
+    return Wire(source, gain=factor, delay=waits)
 
 
 _EXAMPLES = (
     "'link.torque=actuator.load.reaction*-1' or 'plant.motor.current=controller.motor.current@1sample'"
 )
-
-
-def _gain(text: str) -> float | Quantity:
-    match = _NUMBER.match(text)
-    if not match:
-        raise ValueRangeError(f"gain '{text}' of a --wire", "does not start with a number")
-    return quantity(float(match["number"]), match["unit"]) if match["unit"] else float(match["number"])
 
 
 def _delay(text: str) -> float | SamplesOf:
@@ -297,3 +267,39 @@ def _finite(text: str) -> float:
     if not math.isfinite(number):
         raise ValueError
     return number
+
+
+@export.command(
+    "ssp",
+    epilog=examples(
+        "nlsdesign export ssp --fmu plant=out/fmu/plant.fmu --fmu observer=out/fmu/observer.fmu "
+        "--wire observer.motor_encoder.reading=plant.motor_encoder.reading --out out/system.ssp"
+    ),
+)
+@click.option("--fmu", "fmus", multiple=True, required=True, metavar="INSTANCE=FILE", help="Repeatable.")
+@click.option("--wire", "wires", multiple=True, metavar="TO=FROM[*GAIN][@DELAY]", help=WIRE_HELP)
+@click.option("--set", "parameters", multiple=True, metavar="PARAMETER=NUMBER", help="Repeatable.")
+@click.option("--order", multiple=True, metavar="INSTANCE", help="As for 'cosimulate'; repeatable.")
+@click.option(
+    "--input", "inputs", multiple=True, metavar="INPUT", help="Becomes an input of the system; repeatable."
+)
+@click.option("--version", type=click.Choice(["1.0", "2.0"]), default="1.0", show_default=True,
+              help="Of the standard.")  # fmt: skip
+@out_file_option(None, "File to write, NAME.ssp.", ending=".ssp")
+@json_option
+def export_ssp(version: str, out: Path, as_json: bool, **given: tuple[str, ...]) -> None:
+    """Write FMUs and their wires as one SSP archive, which other tools and 'cosimulate --system' run."""
+    from ..export import write_ssp
+
+    written = write_ssp(
+        out,
+        fmus=read_pairs("--fmu", given["fmus"], Path),
+        wires=read_pairs("--wire", given["wires"], read_wire),
+        parameters=read_pairs("--set", given["parameters"], float),
+        order=given["order"],
+        inputs=given["inputs"],
+        version=version,
+    )
+    for note in written.notes:
+        click.echo(f"an annotation, which other tools may ignore: {note}", err=True)
+    show_written(as_json, (), [written.path], annotations=list(written.notes))

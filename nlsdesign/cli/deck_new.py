@@ -12,12 +12,12 @@ import click
 from ..foundation.errors import ExportError, NlsError, UnitError, nearest, unknown_name
 from ..foundation.quantity import Quantity, same_dimension, typeset_unit
 from ..foundation.text_files import write_text
-from .output import examples, json_option, next_command, show_json
-from .readiness import shown_command
-from .units import parse_number, split_number
+from .options import json_option
+from .output import examples, next_command, show_json
+from .typed_values import parse_number, split_number
 
 if TYPE_CHECKING:
-    from ..components.assembly.deck_template import AskedNumber, DeckTemplate, MotorInertia
+    from ..components import AskedNumber, DeckTemplate, MotorInertia
 
 ROTOR, OUTPUT = "rotor", "output"
 force_option = click.option("--force", is_flag=True, help="Replace the file where there is one.")
@@ -54,9 +54,7 @@ def new(
     On a terminal the numbers that matter are asked for, with unit and usual value; elsewhere, and with --yes,
     those of the template are taken unless --set gives another. A name without .toml gets it.
     """
-    from ..components.assembly.deck_remarks import deck_remarks
-    from ..components.assembly.deck_template import load_template, motor_inertia, plain_name
-    from ..components.assembly.deck_writer import declare
+    from ..components import deck_remarks, declare, load_template, motor_inertia, plain_name
     from ..foundation.deck import read_deck, template_names
 
     if path.endswith(("/", os.sep)) or not Path(path).name.strip("."):
@@ -111,7 +109,7 @@ def refuse_to_replace(file: Path, force: bool) -> None:
 
 
 def _given(template: DeckTemplate, given: tuple[str, ...]) -> dict[str, Quantity]:
-    from ..components.assembly.deck_template import GIVEN
+    from ..components import GIVEN
 
     numbers: dict[str, Quantity] = {}
     for text in given:
@@ -150,7 +148,7 @@ def _inertia(
     place: str | None,
 ) -> dict[str, Quantity]:
     """Return the inertia of the motor as its component takes it."""
-    from ..components.assembly.deck_template import GIVEN
+    from ..components import GIVEN
 
     if text is None and place is None:
         return {} if at is None else template.carried(at, numbers)
@@ -166,7 +164,7 @@ def _inertia(
 
 
 def _asked_material(template: DeckTemplate) -> str | None:
-    from ..components.materials.material_law import material_laws
+    from ..components import material_laws
 
     if not template.materials():
         return None
@@ -188,7 +186,7 @@ def _asked(
     template: DeckTemplate, at: MotorInertia | None, known: dict[str, Quantity]
 ) -> dict[str, Quantity]:
     """Ask for the numbers that are not given yet; the inertia last, for its ratio must be known."""
-    from ..components.assembly.deck_template import AskedNumber
+    from ..components import AskedNumber
 
     questions = [question for question in template.questions() if question.name not in known]
     click.echo("Press return to take the usual value; a number without a unit is in the unit that is shown.")
@@ -211,7 +209,7 @@ def _asked(
 
 
 def _answer(question: AskedNumber) -> dict[str, Quantity]:
-    from ..components.assembly.deck_template import GIVEN
+    from ..components import GIVEN
 
     usual = question.usual
 
@@ -245,3 +243,12 @@ def _asked_inertia(question: AskedNumber, at: MotorInertia, ratio: Quantity) -> 
     if not answer:
         return {}
     return {at.name: at.converted(answer[question.name], at=place, ratio=ratio)}
+
+
+_NEEDS = {"design": "a target", "fit": "records", "diagnose": "records"}
+"""What a command asks for besides a deck."""
+
+
+def shown_command(command: str) -> str:
+    """Return a command with what else it asks for, as ``fit (with records)``."""
+    return f"{command} (with {_NEEDS[command]})" if command in _NEEDS else command

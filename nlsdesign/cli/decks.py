@@ -1,4 +1,4 @@
-"""``nlsdesign deck``: check and show decks."""
+"""``nlsdesign deck``: begin, copy, check and show decks."""
 
 from __future__ import annotations
 
@@ -8,21 +8,31 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..foundation.deck import deck_names, load_deck, template_names
+from ..foundation.deck import (
+    commands_named_in,
+    deck_names,
+    load_deck,
+    read_deck,
+    template_names,
+    template_text,
+)
 from ..foundation.errors import NlsError
 from ..foundation.locations import bundled
-from ..foundation.quantity import Quantity, sources, with_unit
+from ..foundation.quantity import sources, with_unit
 from ..foundation.text_files import write_text
-from .deck_new import force_option, new, refuse_to_replace
-from .named_paths import NamedPath
-from .output import examples, json_option, line_width, next_command, show_json, show_table
+from .deck_new import force_option, new, refuse_to_replace, shown_command
+from .options import json_option
+from .output import examples, line_width, next_command, show_json, show_table
 from .overwriting import out_file_option
+from .typed_values import NamedPath
 
 if TYPE_CHECKING:
-    from ..components.assembly.named_parts import Assembly
-    from .readiness import Readiness
+    from ..components import Assembly
+    from ..regeneration import Readiness
 
 _file = NamedPath(dir_okay=False, exists=True)
+_LONG_ROW = 8
+"""Numbers of a row from which they are counted and not listed."""
 
 
 @click.group()
@@ -37,20 +47,20 @@ deck.add_command(new)
 @json_option
 def list_decks(as_json: bool) -> None:
     """List the decks that come with the project, and the templates of `deck new`."""
-    from ..components.assembly.deck_template import load_template
-
     decks = {name: load_deck(name) for name in deck_names()}
-    templates = {name: load_template(name) for name in template_names()}
+    texts = {name: template_text(name) for name in template_names()}
+    templates = {name: read_deck(text, Path(f"{name}.toml")) for name, text in texts.items()}
     if as_json:
         show_json({
             "decks": {n: {"description": d.description, "file": d.path} for n, d in decks.items()},
             "templates": {
-                n: {"description": t.deck.description, "ready_for": t.ready_for} for n, t in templates.items()
+                n: {"description": t.description, "ready_for": commands_named_in(texts[n])}
+                for n, t in templates.items()
             },
         })  # fmt: skip
         return
     show_table("Decks", ("name", "description"), [(n, d.description) for n, d in decks.items()])
-    rows = [(n, t.deck.description) for n, t in templates.items()]
+    rows = [(n, t.description) for n, t in templates.items()]
     show_table("Templates, for nlsdesign deck new --template", ("name", "description"), rows)
 
 
@@ -84,10 +94,8 @@ def check(deck_name: str, as_json: bool) -> None:
 
     Exit status 2 if the deck has a problem; a command that it is not ready for, or a warning, is none.
     """
-    from ..components.assembly.deck_remarks import deck_remarks
-    from ..components.assembly.deck_writer import deck_digest, deck_problems, declare
-    from .range_remarks import range_remarks
-    from .readiness import readiness
+    from ..components import deck_digest, deck_problems, deck_remarks, declare
+    from ..regeneration import range_remarks, readiness
 
     read = load_deck(deck_name)
     problems = deck_problems(read) or _model_problems(declare(read))
@@ -116,7 +124,7 @@ def check(deck_name: str, as_json: bool) -> None:
 
 
 def _show_readiness(commands: list[Readiness]) -> None:
-    ready = [each.shown for each in commands if each.ready]
+    ready = [shown_command(each.command) for each in commands if each.ready]
     click.echo(f"ready for: {', '.join(ready) or 'no command'}")
     reasons: dict[str, list[str]] = {}
     for each in commands:
@@ -149,8 +157,7 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
             raise click.UsageError("--toml and --json exclude each other; give one")
         click.echo(load_deck(deck_name).path.read_text(encoding="utf-8-sig"), nl=False)
         return
-    from ..components.assembly.circuit import draw
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare, draw
 
     assembly = declare(load_deck(deck_name))
     numbers = assembly.quantities()
@@ -164,7 +171,11 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
         return
     title = f"{assembly.name}: {assembly.description}".rstrip(": ")
     click.echo(draw(title, assembly.parts, width=line_width()) + "\n")
-    rows = [(n, _short(q), q.spread_text, q.source) for n, q in numbers.items()]
+    rows = []
+    for name, given in numbers.items():
+        row = with_unit(f"{len(given.values)} numbers in", given.unit)
+        shown = str(given) if len(given.values) < _LONG_ROW else row
+        rows.append((name, shown, given.spread_text, given.source))
     show_table("Numbers", ("name", "value", "spread", "source"), rows)
 
 
@@ -175,7 +186,7 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
 @json_option
 def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
     """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
-    from ..components.assembly.deck_writer import write_deck
+    from ..components import write_deck
 
     assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)
     write_deck(assembly, out)
@@ -185,7 +196,3 @@ def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
         return
     following = next_command("diagnose", "--deck", out, "--records", "FOLDER")
     click.echo(f"written: {out}, {numbers} numbers; next: {following}")
-
-
-def _short(given: Quantity) -> str:
-    return str(given) if len(given.values) < 8 else with_unit(f"{len(given.values)} numbers in", given.unit)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -12,17 +14,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import NlsError, ValueRangeError
-from .design_kinds import KINDS, show_kinds
-from .named_paths import NamedPath
-from .output import DECK_HELP, examples, json_option, show_json, show_table, spring_option
+from .options import DECK_HELP, json_option, spring_option, workers_option
+from .output import examples, show_json, show_table, warn
 from .overwriting import out_option
-from .range_remarks import range_remarks, warn
-from .units import parse_number
-from .workers import workers_option
+from .typed_values import NamedPath, parse_number
 
 if TYPE_CHECKING:
-    from ..components.assembly.named_parts import Assembly
+    from ..components import Assembly
     from ..design import CamDesign, DesignJob, Limit, Target, TaskTarget
+
+KINDS = ("targets", "limits", "goals")
+_FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*)\n(?P<text>(?:[ ]{4}.*\n?|\n(?=[ ]{4}))+)", re.MULTILINE)
+
+_MARKED = re.compile(r":\w+:`~?([^`]+)`")
 
 _LINE = "repeatable; a line as in a design file, for instance"
 _ENTRY = re.compile(r"""\s*([\w.-]+|"[^"]*"|'[^']*')\s*=""")
@@ -99,12 +103,13 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
     if given.pop("listed") is not None:
         show_kinds(context.params["listed"], as_json)
         return
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare
     from ..design import design_cam, design_summary, write_design
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..presentation.figures import DesignPictures
     from ..presentation.report import write_design_report
+    from ..regeneration import range_remarks
 
     actuator, job = declare(load_deck(deck_name)), _job(**given)
     steps = Steps()
@@ -140,11 +145,17 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
 
 def _job(**given: Any) -> DesignJob:
     """Return what is asked for, from a design file or from the options."""
-    from ..design import DesignJob, DesignSettings, read_job
-    from ..design.jobs.job_file import DRAWS, read_entries, read_stock
-    from ..design.optimisation.goals import Goal
-    from ..design.optimisation.limits import Limit
-    from ..design.optimisation.solve import GOALS
+    from ..design import (
+        DRAWS,
+        GOALS,
+        DesignJob,
+        DesignSettings,
+        Goal,
+        Limit,
+        read_entries,
+        read_job,
+        read_stock,
+    )
 
     options = ("target", "target_file", "maximum", "angle", "free", "limit", "goal", "stock")
     if given["task_file"] is not None:
@@ -179,8 +190,7 @@ def _job(**given: Any) -> DesignJob:
 
 def _target(given: dict[str, Any]) -> tuple[Target | TaskTarget, tuple[Limit, ...]]:
     """Return the target that the options name, and the band that stands beside it in a file."""
-    from ..design import ExponentialTorque
-    from ..design.jobs.job_file import read_target_entry, target_of_file
+    from ..design import ExponentialTorque, read_target_entry, target_of_file
 
     if bool(given["maximum"]) != bool(given["angle"]):
         raise ValueRangeError(
@@ -256,3 +266,70 @@ def _show(designed: CamDesign, files: Iterable[Path]) -> None:
     click.echo("written: " + ", ".join(str(path) for path in files))
     if not designed.met:
         click.echo("no drawings are written of a design that misses its target")
+
+
+def show_kinds(what: str, as_json: bool) -> None:
+    """Print the targets, limits or goals that a design file can name."""
+    known = design_kinds(what)
+    if as_json:
+        show_json(known)
+        return
+    rows = []
+    for name, content in known.items():
+        rows.append((name, "", "", content["meaning"]))
+        for field, about in content["fields"].items():
+            rows.append(("", field, str(about["default"]) if about["optional"] else "", about["meaning"]))
+    show_table(f"{what.capitalize()} of a design", ("name", "field", "default", "meaning"), rows)
+    option = {"targets": "--target", "limits": "--limit", "goals": "--goal"}[what]
+    table = "target" if what == "targets" else what
+    click.echo(
+        f"on the command line: {option} 'NAME = {{field = \"number unit\", ...}}'; in a design file the same "
+        f"line stands below [{table}]"
+    )
+
+
+def design_kinds(what: str) -> dict[str, dict[str, Any]]:
+    """Return meaning and fields of what a design file can name, by name."""
+    from ..design import Goal, Limit, Target, TaskTarget, kinds
+
+    base: type = {"targets": Target, "limits": Limit, "goals": Goal}[what]
+    known = kinds(base) | ({"TaskTarget": TaskTarget} if what == "targets" else {})
+    return {
+        name: {"meaning": _plain((inspect.getdoc(kind) or "").split("\n\n")[0]), "fields": _fields(kind)}
+        for name, kind in sorted(known.items())
+    }
+
+
+def _plain(text: str) -> str:
+    """Return a text of a docstring on one line, without marks."""
+    return " ".join(_MARKED.sub(lambda each: each[1].rpartition(".")[2], text).replace("``", "").split())
+
+
+def _fields(kind: type) -> dict[str, dict[str, Any]]:
+    meanings: dict[str, str] = {}
+    for each in reversed(kind.__mro__):
+        meanings |= _documented(each)
+    result = {}
+    for field in dataclasses.fields(kind):
+        if not field.init:
+            continue
+        given, made = field.default, field.default_factory
+        optional = given is not dataclasses.MISSING or made is not dataclasses.MISSING
+        default = given if given is not dataclasses.MISSING else "as declared" if optional else None
+        plain = default if isinstance(default, (int, float, str, type(None))) else str(default)
+        result[field.name] = {
+            "meaning": meanings.get(field.name, ""), "optional": optional, "default": plain,
+        }  # fmt: skip
+    return result
+
+
+def _documented(kind: type) -> dict[str, str]:
+    """Return what the docstring of a class says of its parameters."""
+    text = inspect.cleandoc(kind.__dict__.get("__doc__") or "")
+    _, mark, section = text.partition("Parameters\n----------\n")
+    section = re.split(r"\n\n(?=\w[\w ]*\n-{3,})", section)[0] + "\n"
+    meanings = {}
+    for match in _FIELD.finditer(section) if mark else ():
+        for name in match["names"].split(", "):
+            meanings[name] = _plain(match["text"])
+    return meanings

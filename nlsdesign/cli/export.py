@@ -1,23 +1,30 @@
-"""``nlsdesign export``: C code, FMUs and Modelica text."""
+"""``nlsdesign export``: C code and Modelica text, and whether exported files belong together."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .controller import controller_of, export_controller, law_options
-from .export_check import check_exports
-from .export_fmu import export_fmus
-from .export_modelica import export_modelica_text
-from .flash import controller_size, flash_options, sized_observer
-from .observer import real_option, sample_time_option
-from .observer_kinds import kind_option
-from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
-from .overwriting import c_names, out_option
-from .range_remarks import range_remarks, warn
+from .options import (
+    DECK_HELP,
+    controller_of,
+    deck_option,
+    flash_options,
+    json_option,
+    kind_option,
+    law_options,
+    measured_option,
+    real_option,
+    sample_time_option,
+    spring_option,
+)
+from .output import examples, show_json, show_table, show_written, warn
+from .overwriting import c_names, out_file_option, out_option
+from .typed_values import NamedPath
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -28,12 +35,6 @@ OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 @click.group()
 def export() -> None:
     """Write C code, FMUs or Modelica text."""
-
-
-export.add_command(export_controller)
-export.add_command(export_fmus)
-export.add_command(export_modelica_text)
-export.add_command(check_exports)
 
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
@@ -78,11 +79,12 @@ def export_code(
 
     The observer is by default the one that is best over the spread of the deck.
     """
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare
     from ..export import export_c, write_examples
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
+    from ..regeneration import range_remarks
 
     declared = declare(load_deck(deck_name))
     plant = flatten(declared)
@@ -102,18 +104,142 @@ def sampled_part(
     plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]
 ) -> tuple[str, FlatModel, tuple[str, ...]]:
     """Return what a controller runs, what its files are called, and what is to be known of its size."""
+    from ..feedback.control import joined
+    from ..regeneration import require_flash, sized_observer
+
     law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
     others = {name: value for name, value in chosen.items() if name not in law}
     if what == CONTROLLER:
         if chosen["table_error"] is not None:
             raise click.BadParameter("--table-error is of an observer; leave it out, or take --what both")
         controller = controller_of(plant, sample_time, **law)
-        return CONTROLLER, controller, controller_size(controller, chosen["real"], chosen["flash"])
+        return CONTROLLER, controller, (require_flash(controller, chosen["real"], chosen["flash"]),)
     if what == OBSERVER:
         sized = sized_observer(plant, sample_time, **others)
-        return OBSERVER, sized.designed.model, sized.sentences
-    from ..feedback.control import joined
-
+        return OBSERVER, sized.designed.model, sized.findings()
     controller = controller_of(plant, sample_time, **law)
-    sized = sized_observer(plant, sample_time, part_of=lambda each: joined(each, controller), **others)
-    return "torque_loop", joined(sized.designed.model, controller), sized.sentences
+    sized = sized_observer(
+        plant, sample_time, part_of=lambda observer: joined(observer, controller), **others
+    )
+    return "torque_loop", joined(sized.designed.model, controller), sized.findings()
+
+
+@export.command(
+    "controller",
+    epilog=examples(
+        "nlsdesign export controller --deck austin2015_figure_consistent",
+        "nlsdesign export controller --deck my.toml --law scheduled --bandwidth '8 Hz' --fmu",
+    ),
+)
+@deck_option
+@law_options
+@sample_time_option
+@out_option(
+    "out/controller",
+    writes=lambda given: [*c_names("controller"), *(["controller.fmu"] if given["fmu"] else [])],
+)
+@real_option
+@click.option("--fmu", is_flag=True, help="Write an FMU for co-simulation (FMI 3.0) beside the C code.")
+@json_option
+def export_controller(
+    deck_name: str, sample_time: float, out: Path, real: str, fmu: bool, as_json: bool, **chosen: Any
+) -> None:
+    """Write the torque controller as C99 with a self-test."""
+    from ..components import declare
+    from ..export import export_c, export_fmu
+    from ..feedback.control import largest_torque
+    from ..foundation.deck import load_deck
+    from ..model import flatten
+    from ..regeneration import range_remarks
+
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
+    model = controller_of(plant, sample_time, **chosen)
+    most = largest_torque(plant)
+    source = export_c(model, out, real=real, name="controller")
+    written = [source.header, source.source, source.selftest]
+    if fmu:
+        written.append(export_fmu(model, out / "controller.fmu"))
+    sentences = (str(model), f"largest torque that the drive can hold: {most:.4g} N·m")
+    remarks = range_remarks(declared)
+    warn(remarks)
+    show_written(as_json, sentences, written, largest_torque=most, warnings=remarks)
+
+
+@export.command(
+    "modelica",
+    epilog=examples(
+        "nlsdesign export modelica --deck austin2015_figure_consistent --out plant.mo",
+        "nlsdesign export modelica --deck own.toml --smooth --output motor.angle --out plant.mo",
+    ),
+)
+@deck_option
+@out_file_option(None, "File to write, NAME.mo.", ending=".mo")
+@click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
+@click.option(
+    "--output",
+    "outputs",
+    multiple=True,
+    metavar="NAME",
+    help="State or signal that becomes an output, in place of the readings of the sensors; repeatable.",
+)
+@json_option
+def export_modelica_text(
+    deck_name: str, out: Path, smooth: bool, outputs: tuple[str, ...], as_json: bool
+) -> None:
+    """Write the plant of a deck as one flat Modelica class, with units, values and sources.
+
+    Names are those of the deck between quotation marks, such as 'motor.angle'.
+    """
+    from ..components import declare, smoothed
+    from ..export import export_modelica
+    from ..foundation.deck import load_deck
+    from ..model import flatten
+
+    assembly = declare(load_deck(deck_name))
+    model = flatten(smoothed(assembly) if smooth else assembly, outputs=list(outputs) or None)
+    show_written(as_json, (), [export_modelica(model, out)])
+
+
+TOGETHER, APART, UNREADABLE = 0, 1, 2
+"""Exit status."""
+
+
+@export.command(
+    "check",
+    epilog=examples(
+        "nlsdesign export check out/fmu",
+        "nlsdesign export check out/c --deck austin2015_figure_consistent --json",
+    ),
+)
+@click.argument("folder", type=NamedPath(example="out/c"))
+@click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
+@json_option
+def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
+    """Say whether C files, Modelica texts, FMUs and decks in a folder belong together, and to a deck.
+
+    Exit status 0 if all do and none was edited, 1 if not, 2 if a file cannot be read.
+    """
+    from ..components import deck_digest, declare
+    from ..export import read_exports
+    from ..foundation.deck import load_deck
+
+    exports = read_exports(folder, reference=deck_digest(declare(load_deck(deck_name))) if deck_name else "")
+    status = UNREADABLE if exports.problems else TOGETHER if exports.together else APART
+    judged = [(str(file.path.relative_to(folder)), file, why)
+              for file, why in zip(exports.files, exports.apart, strict=True)]  # fmt: skip
+    if as_json:
+        rows = [{**asdict(file), "path": path, "belongs": not why, "why": why} for path, file, why in judged]
+        show_json({"folder": folder, "deck": exports.reference, "status": status,
+                   "together": exports.together, "files": rows,
+                   "unreadable": [str(problem) for problem in exports.problems]})  # fmt: skip
+        return status
+    if judged:
+        show_table(
+            str(folder),
+            ("file", "kind", "deck", "digest", "state"),
+            [(path, file.kind, file.deck, file.short, why or "belongs") for path, file, why in judged],
+        )
+    for sentence in exports.findings():
+        click.echo(sentence)
+    return status

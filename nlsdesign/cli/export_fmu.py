@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..foundation.errors import NlsError
-from .controller import controller_of, law_options
-from .observer import sample_time_option
-from .observer_kinds import kind_option
-from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
+from .export import export
+from .options import (
+    controller_of,
+    deck_option,
+    json_option,
+    kind_option,
+    law_options,
+    measured_option,
+    sample_time_option,
+    spring_option,
+)
+from .output import examples, show_written, warn
 from .overwriting import out_option
-from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
-    from ..export import Authorship
-    from ..model.flat import FlatModel
+    from ..model import FlatModel
 
 FILES = {
     "plant": "plant",
@@ -28,54 +35,6 @@ FILES = {
     "both": "observer_and_controller",
 }
 """Name of the file, without its ending, by what is exported."""
-
-
-class _Models:
-    """The models of a deck, each designed once and only when it is asked for."""
-
-    def __init__(
-        self, plant: FlatModel, sample_time: float, chosen: dict[str, Any], law: dict[str, Any]
-    ) -> None:
-        self.plant, self.sample_time, self.chosen, self.law = plant, sample_time, chosen, law
-        self._made: dict[str, FlatModel] = {"plant": plant}
-
-    def __getitem__(self, what: str) -> FlatModel:
-        if what not in self._made:
-            makers: dict[str, Callable[[], FlatModel]] = {
-                "observer": self._observer,
-                "controller": self._controller,
-                "both": self._both,
-            }
-            self._made[what] = makers[what]()
-        return self._made[what]
-
-    def _observer(self) -> FlatModel:
-        from ..feedback.observer import designed_observer
-
-        return designed_observer(self.plant, sample_time=self.sample_time, **self.chosen).model
-
-    def _controller(self) -> FlatModel:
-        return controller_of(self.plant, self.sample_time, **self.law)
-
-    def _both(self) -> FlatModel:
-        from ..feedback.control import joined
-
-        return joined(self["observer"], self["controller"])
-
-    def only(self, what: Sequence[str]) -> tuple[dict[str, FlatModel], dict[str, str]]:
-        """Return what is asked for; nothing is left out."""
-        return {each: self[each] for each in dict.fromkeys(what)}, {}
-
-    def possible(self) -> tuple[dict[str, FlatModel], dict[str, str]]:
-        """Return what this deck allows, and why the rest is left out."""
-        models: dict[str, FlatModel] = {"plant": self.plant}
-        reasons: dict[str, str] = {}
-        for what in ("observer", "controller", "both"):
-            try:
-                models[what] = self[what]
-            except NlsError as error:  # not every machine has one; the reason is printed
-                reasons[what] = str(error)
-        return models, reasons
 
 
 def _date(_context: click.Context, _parameter: click.Parameter, text: str | None) -> datetime | None:
@@ -97,7 +56,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     return [f"{stem}{ending}" for stem in stems for ending in (".fmu", *further)]
 
 
-@click.command(
+@export.command(
     "fmu",
     epilog=examples(
         "nlsdesign export fmu --deck austin2015_figure_consistent --what plant",
@@ -147,51 +106,66 @@ def export_fmus(
     **others: Any,
 ) -> None:
     """Write plant, torque observer, torque controller, and observer with controller in one, as FMUs."""
-    from ..components.assembly.deck_writer import declare
-    from ..export import Authorship
+    from ..components import declare
+    from ..export import ALL_PLATFORMS, Authorship, export_fmu, write_reference
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
+    from ..regeneration import range_remarks
 
-    chosen = {name: others[name] for name in ("kind", "spring", "measured")}
-    law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
-    declared = declare(load_deck(deck_name))
-    made, steps = _Models(flatten(declared), sample_time, chosen, law), Steps()
+    declared, steps = declare(load_deck(deck_name)), Steps()
     # Before anything is written: not every system has an observer.
     with steps.step("models"):
-        models, reasons = made.only(what) if what else made.possible()
-    about = Authorship(others["author"], others["copyright_"], others["licence"], date=others["date"])
+        models, reasons = _models(flatten(declared), what, sample_time, others)
+    about = Authorship(others["author"], others["copyright_"], others["licence"], date=others["date"]).dated()
+    systems, version = (ALL_PLATFORMS if "all" in platforms else platforms) or None, others["version"]
     with steps.step("FMUs"):
-        written = _write(models, out, others["version"], _systems(platforms), about)
+        written = [
+            export_fmu(
+                model, out / f"{FILES[name]}.fmu", version=version, platforms=systems, authorship=about
+            )
+            for name, model in models.items()
+        ]
     if others["reference"]:
-        from ..export import write_reference
-
         written += [
             file for name in models for file in write_reference(models[name], out / f"{FILES[name]}.fmu")
         ]
     show_written(as_json, (), written, left_out=reasons)
     for name, reason in {} if as_json else reasons.items():
         click.echo(f"left out: {name}: {reason}")
-    warn(range_remarks(declared, measured=chosen["measured"]))
+    warn(range_remarks(declared, measured=others["measured"]))
 
 
-def _systems(platforms: Sequence[str]) -> Sequence[str] | None:
-    from ..export import ALL_PLATFORMS
+def _models(
+    plant: FlatModel, what: Sequence[str], sample_time: float, chosen: Mapping[str, Any]
+) -> tuple[dict[str, FlatModel], dict[str, str]]:
+    """Return what is asked for; if nothing is, what this deck allows, and why the rest is left out."""
+    from ..feedback.control import joined
+    from ..feedback.observer import designed_observer
 
-    return (ALL_PLATFORMS if "all" in platforms else platforms) or None
+    @cache
+    def observer() -> FlatModel:
+        roles = {name: chosen[name] for name in ("kind", "spring", "measured")}
+        return designed_observer(plant, sample_time=sample_time, **roles).model
 
+    @cache
+    def controller() -> FlatModel:
+        law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
+        return controller_of(plant, sample_time, **law)
 
-def _write(
-    models: dict[str, FlatModel],
-    out: Path,
-    version: str,
-    systems: Sequence[str] | None,
-    about: Authorship,
-) -> list[Path]:
-    from ..export import export_fmu
-
-    dated = about.dated()
-    return [
-        export_fmu(model, out / f"{FILES[name]}.fmu", version=version, platforms=systems, authorship=dated)
-        for name, model in models.items()
-    ]
+    makers: dict[str, Callable[[], FlatModel]] = {
+        "plant": lambda: plant,
+        "observer": observer,
+        "controller": controller,
+        "both": lambda: joined(observer(), controller()),
+    }
+    if what:
+        return {name: makers[name]() for name in dict.fromkeys(what)}, {}
+    models: dict[str, FlatModel] = {}
+    reasons: dict[str, str] = {}
+    for name, make in makers.items():
+        try:
+            models[name] = make()
+        except NlsError as error:  # not every machine has one; the reason is printed
+            reasons[name] = str(error)
+    return models, reasons

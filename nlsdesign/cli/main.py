@@ -2,39 +2,37 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import platform
 import re
 import sys
+import tempfile
+import traceback
 
 import click
 
-from ..foundation.errors import NlsError, nearest
+from ..foundation.command_words import typed_command
+from ..foundation.errors import NlsError, fit_for_message, nearest
 from ..foundation.locations import version
+from ..foundation.processes import usual_temporary_folder, was_interrupted
 from .analyse import analyse
-from .analyse_angle import analyse_angle
-from .analyse_loop import loop
-from .calibrate import calibrate
+from .bench import calibrate, diagnose, fit
 from .compare import compare
 from .completion import COMPLETE, complete_names, completion
 from .cosimulate import cosimulation
 from .decks import deck
+from .describe import records
 from .design import design
-from .diagnose import diagnose
-from .docs import docs
 from .export import export
-from .export_ssp import export_ssp
-from .fit import fit
-from .materials import materials
+from .export_fmu import export_fmus as export_fmus
+from .look_up import docs, materials, parts
 from .observer import observer
-from .observer_certificate import verify_certificate
-from .observer_proofs import certify_adaptive_estimate, certify_continuous_gain
 from .output import examples
-from .parts import parts
-from .report import report
 from .serve import serve
 from .simulate import simulate
 from .studies import study
-from .sweep import sweep
-from .unexpected import BROKEN_PIPE
+from .sweep import report, sweep
 
 
 @click.group(
@@ -63,16 +61,12 @@ def program(context: click.Context, packages: tuple[str, ...]) -> None:
         context.with_resource(extended_by(*(load_extension(name) for name in packages)))
 
 
-export.add_command(export_ssp)
-for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, verify_certificate):
-    observer.add_command(part)
+observer.add_command(calibrate)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(sweep, report, cosimulation, simulate, fit, diagnose, compare, study, serve, completion, docs),
+    *(sweep, report, cosimulation, simulate, records, fit, diagnose, compare, study, serve, completion, docs),
 ):
     program.add_command(command)
-for analysis in (analyse_angle, loop):  # the first is the default
-    analyse.add_command(analysis)
 complete_names(program)
 
 
@@ -115,6 +109,57 @@ def main() -> None:
         click.echo(f"error: {error}", err=True)
         sys.exit(2)
     except Exception as error:
-        from .unexpected import status_of
-
         sys.exit(status_of(error))
+
+
+_ADVICE = {
+    errno.ENAMETOOLONG: "give a shorter name",
+    errno.ELOOP: "give a name that is no link to itself",
+    errno.EACCES: "give a file that you may use",
+    errno.EPERM: "give a file that you may use",
+    errno.EROFS: "name a place that can be written",
+    errno.ENOSPC: "make room for it",
+    errno.EDQUOT: "make room for it",
+    errno.EIO: "give a file on a device that works",
+}
+"""What the system refuses whatever the program does, and what helps."""
+FAULT, BROKEN_PIPE, INTERRUPTED, BAD_INPUT = 70, 141, 130, 2
+
+
+def status_of(error: Exception) -> int:
+    """Tell the user of an error that no command has expected, and return the exit status."""
+    if was_interrupted():
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    if isinstance(error, BrokenPipeError):
+        # Whoever read the output has seen enough; nothing more may be written, at the very end neither.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    if isinstance(error, MemoryError):
+        click.echo("error: there is not enough memory for this -> ask for less at once", err=True)
+        return BAD_INPUT
+    if isinstance(error, OSError) and error.errno in _ADVICE:
+        name = fit_for_message(str(error.filename or "a file"))
+        click.echo(f"error: {name}: {error.strerror} -> {_ADVICE[error.errno]}", err=True)
+        return BAD_INPUT
+    reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    click.echo(f"error: this is a fault of nlsdesign, not of your input ({reason})", err=True)
+    click.echo(f"-> please report it together with {_written(error)}", err=True)
+    return FAULT
+
+
+def _written(error: Exception) -> str:
+    """Write what a report of a fault needs, and return the name of the file."""
+    lines = [
+        f"nlsdesign {version()}, Python {platform.python_version()}, {platform.platform()}",
+        typed_command("nlsdesign", *sys.argv[1:]),
+        *traceback.format_exception(error),
+    ]
+    text = "\n".join(lines).encode("utf-8", "backslashreplace")
+    try:
+        handle, name = tempfile.mkstemp(".txt", "nlsdesign-fault-", usual_temporary_folder())
+        with os.fdopen(handle, "wb") as file:
+            file.write(text)
+    except OSError:
+        return "these lines:\n" + text.decode("utf-8")
+    return name

@@ -1,31 +1,61 @@
-"""``nlsdesign observer``: the torque observer as C; sub-commands stand in modules of their own."""
+"""``nlsdesign observer``: the torque observer as C, its errors over the spread, and what is proved of it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .observer_certificate import CERTIFICATE, given_ranges, range_options
-from .observer_kinds import CASCADE, CERTIFIED, kind_option
-from .output import DECK_HELP, examples, json_option, measured_option, show_json, spring_option
-from .overwriting import c_names, out_option
-from .range_remarks import range_remarks, warn
-from .units import Number
-
-sample_time_option = click.option(
-    "--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
-    help="Of what is computed in steps.",
-)  # fmt: skip
-real_option = click.option(
-    "--real",
-    type=click.Choice(["double", "float"]),
-    default="double",
-    show_default=True,
-    help="Type of the numbers in C.",
+from ..foundation.quantity import typeset_unit
+from ..foundation.written_numbers import shared_prefix, without_power
+from .options import (
+    CASCADE,
+    CERTIFIED,
+    DECK_HELP,
+    deck_option,
+    json_option,
+    kind_option,
+    measured_option,
+    real_option,
+    sample_time_option,
+    spring_option,
 )
+from .output import examples, next_command, show_json, show_table, show_written, warn
+from .overwriting import c_names, out_option
+from .typed_values import NamedPath, Number
+
+if TYPE_CHECKING:
+    from ..feedback.observer import SpreadErrors
+    from ..model import FlatModel
+
+CERTIFICATE = "certificate.json"
+"""File that is announced; the library is not loaded for it."""
+
+
+def range_options(command: Any) -> Any:
+    """Add the options for the ranges over which a bound on the torque is to hold.
+
+    ``command``: gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
+    """
+    for option in (
+        click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
+                     "count of the deck's encoder by default."),
+        click.option("--speed", type=Number("rad/s"), help="Largest speed; 20 rad/s by default."),
+        click.option("--angles", type=Number("rad"), nargs=2, metavar="LOW HIGH", help="Range of the angle, "
+                     "such as --angles '-46 deg' '46 deg'; the whole table by default."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the ranges that were given."""
+    named = {name: options[name] for name in ("angles", "speed", "angle_error")}
+    return {name: value for name, value in named.items() if value is not None}
 
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
@@ -73,13 +103,13 @@ def observer(
         return
     if deck_name is None:
         raise click.MissingParameter(ctx=context, param_type="option", param_hint="'--deck'")
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare
     from ..export import export_c, quickest
     from ..feedback.observer import certified_design, designed_observer, errors_beside
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
-    from .observer_spread import show_errors, write_errors
+    from ..regeneration import range_remarks
 
     drawn = context.get_parameter_source("draws") is not click.core.ParameterSource.DEFAULT
     if drawn and not options["with_errors"]:
@@ -109,9 +139,9 @@ def observer(
     statement = () if proved is None else proved.statement
     remarks = range_remarks(declared, measured=options["measured"])
     warn(remarks)
-    words = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
+    sentences = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
     if errors is not None:
-        files += write_errors(errors, out, model=model, words=words, files=files)
+        files += write_errors(errors, out, model=model, words=sentences, files=files)
     if as_json:
         content = {
             "kind": chosen.kind, "reason": chosen.reason, "expected_rms": list(chosen.expected),
@@ -120,7 +150,7 @@ def observer(
         }  # fmt: skip
         show_json(content | ({} if errors is None else {"errors": errors.content()}))
         return
-    for sentence in words:
+    for sentence in sentences:
         click.echo(sentence)
     if proved is None:
         click.echo("not certified; --kind certified or --certificate proves what can be proved")
@@ -163,3 +193,203 @@ def _refuse_misplaced(context: click.Context) -> None:
                 "options of a sub-command stand behind its name",
                 ctx=context,
             )
+
+
+CAUSES = 8
+"""Rows of the table of causes."""
+
+
+def write_errors(
+    errors: SpreadErrors, out: Path, *, model: FlatModel, words: Sequence[str], files: Sequence[Path]
+) -> list[Path]:
+    """Write the errors as table, JSON, figure and page.
+
+    ``files``: written before; the page lists them too.
+    """
+    from ..presentation import figures
+    from ..presentation.report import write_observer_report
+
+    written = [
+        *errors.write(out),
+        *figures.write_figures(out, {"errors": figures.errors_over_spread(errors)}),
+    ]
+    page = out / "report.html"
+    return [*written, write_observer_report(page, model, errors, words=words, files=[*files, *written])]
+
+
+def show_errors(errors: SpreadErrors, kind: str, deck_name: str) -> None:
+    """Print both tables, and where the way goes on."""
+    unit, causes = typeset_unit(errors.unit), errors.ranked_causes(kind)[:CAUSES]
+    factor, shown = shared_prefix([size for _, size in causes], errors.unit)
+    title = (
+        f"Torque error in {errors.shown_in} rms, sines of {errors.torque:.3g} {unit}, "
+        f"{errors.drawn.shape[1]} draws of the spread"
+    )
+    heads = ("observer", "Hz", "exact numbers", "median", "90 %", "rms", "bound on rms")
+    show_table(title, heads, errors.rows())
+    ranked = [[name, without_power(factor * size)] for name, size in causes]
+    show_table("Causes", (f"{kind}: cause, one standard deviation off", f"{shown} rms"), ranked)
+    if errors.lost:
+        click.echo(f"{errors.lost} drawn machines do not run and are in no figure")
+    if len(errors.bound):
+        click.echo(
+            "the bound is on the rms over all machines within the spread, for any estimator with these "
+            "sensors; a few draws scatter about it"
+        )
+    click.echo(f"least over the spread: {errors.best}")
+    following = next_command("observer", "calibrate", "--deck", deck_name, "--plan")
+    click.echo(f"what a calibration would buy: {following}")
+
+
+@observer.command(
+    "verify",
+    epilog=examples(
+        "nlsdesign observer verify out/observer/certificate.json",
+        "nlsdesign observer verify out/observer/certificate.json --deck my.toml --c out/observer --json",
+    ),
+)
+@click.argument("certificate", type=NamedPath(dir_okay=False, example="out/observer/certificate.json"))
+@click.option("--deck", "deck_name", metavar="DECK", help="Deck that should be the certified one.")
+@click.option(
+    "--c",
+    "code",
+    type=NamedPath(file_okay=False),
+    help="Folder of the C files; they are written anew from the deck and compared.",
+)
+@json_option
+def verify_certificate(certificate: Path, deck_name: str | None, code: Path | None, as_json: bool) -> None:
+    """Check a certificate again, without the solver; exit status 1 where it does not hold."""
+    from ..components import declare
+    from ..export import export_c
+    from ..feedback.observer import CodeToCompare, read_certificate, verify
+    from ..foundation.deck import load_deck, read_deck
+    from ..model import flatten
+
+    proved, untouched = read_certificate(certificate)
+    given = load_deck(deck_name).path.read_text(encoding="utf-8-sig") if deck_name else None
+    name, text = proved.deck
+    model = flatten(declare(read_deck(text, Path(f"{name}.toml")))) if text else None
+    result = verify(
+        proved, untouched=untouched, model=model, deck=given,
+        code=None if code is None else CodeToCompare(code, export_c),
+    )  # fmt: skip
+    if as_json:
+        checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in result.checks]
+        show_json({"holds": result.holds, "statement": list(proved.statement), "checks": checks})
+    else:
+        for sentence in proved.statement:
+            click.echo(sentence)
+        click.echo(str(result))
+        click.echo("the certificate holds" if result.holds else "the certificate DOES NOT HOLD")
+    if not result.holds:
+        sys.exit(1)
+
+
+def _plant(deck_name: str) -> tuple[tuple[str, str], FlatModel]:
+    """Return name and text of a deck, and its flat model."""
+    from ..components import declare
+    from ..foundation.deck import load_deck
+    from ..model import flatten
+
+    deck = load_deck(deck_name)
+    return (deck.name, deck.path.read_text(encoding="utf-8-sig")), flatten(declare(deck))
+
+
+def _roles(plant: FlatModel, options: dict[str, Any]) -> dict[str, str]:
+    from ..model import measured_motion, series_spring
+
+    return {
+        "estimate": series_spring(plant, options["spring"]).effort,
+        "measured": measured_motion(plant, options["measured"]),
+    }
+
+
+@observer.command(
+    "certify-continuous",
+    epilog=examples(
+        "nlsdesign observer certify-continuous --deck austin2015_figure_consistent",
+        "nlsdesign observer certify-continuous --deck austin2015_figure_consistent --published "
+        "--angles '-40 deg' '40 deg'",
+    ),
+)
+@deck_option
+@spring_option
+@measured_option
+@out_option("out/observer", writes=(CERTIFICATE,))
+@click.option("--published", is_flag=True, help="States of Austin et al. 2015 instead of the minimal ones.")
+@click.option("--decay", type=float, metavar="PER_SECOND", help="As fast as can be proved by default.")
+@click.option("--condition", type=float, default=100.0, show_default=True, help="Largest condition of P.")
+@click.option(
+    "--angles", type=Number("rad"), nargs=2, metavar="LOW HIGH", help="The whole contour by default."
+)
+@json_option
+def certify_continuous_gain(
+    deck_name: str,
+    out: Path,
+    published: bool,
+    angles: tuple[float, float] | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Design one gain in continuous time with the proof that every error vanishes."""
+    from ..feedback.observer import Minimal, PaperForm, certify_continuous, write_certificate
+
+    text, plant = _plant(deck_name)
+    proved = certify_continuous(
+        plant, **_roles(plant, options), form=PaperForm() if published else Minimal(),
+        decay=options["decay"], condition=options["condition"], angles=angles,
+    )  # fmt: skip
+    proved = replace(proved, deck=text)
+    path = write_certificate(proved, out / CERTIFICATE)
+    gains = dict(zip(proved.proof.system.states, proved.proof.gain, strict=True))
+    rows = [f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}" for name, row in gains.items()]
+    show_written(as_json, (*proved.statement, *rows), [path], gains=gains)
+
+
+@observer.command(
+    "certify-adaptive",
+    epilog=examples(
+        "nlsdesign observer certify-adaptive --deck austin2015_figure_consistent --out out/certified"
+    ),
+)
+@deck_option
+@sample_time_option
+@spring_option
+@measured_option
+@out_option("out/observer", writes=(CERTIFICATE, *c_names("observer")))
+@real_option
+@click.option("--limit", type=float, metavar="DEVIATIONS", help="Of the slow states; that of the adaptive "
+              "observer by default.")  # fmt: skip
+@range_options
+@json_option
+def certify_adaptive_estimate(
+    deck_name: str,
+    sample_time: float,
+    out: Path,
+    real: str,
+    limit: float | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Write the adaptive observer as C, with a bound on how far its estimate can leave the deck's torque."""
+    from ..export import export_c
+    from ..feedback.observer import (
+        AdaptiveSettings,
+        Trust,
+        certify_held_estimate,
+        design_adaptive_observer,
+        held_assumptions,
+    )
+
+    text, plant = _plant(deck_name)
+    trust = Trust() if limit is None else Trust(limit=limit)
+    roles = _roles(plant, options)
+    design = design_adaptive_observer(
+        plant, estimate=roles["estimate"], measured=roles["measured"], sample_time=sample_time,
+        settings=AdaptiveSettings(trust=trust),
+    )  # fmt: skip
+    assumed = replace(held_assumptions(plant, design), real=real, **given_ranges(options))
+    proved = certify_held_estimate(plant, design, assumptions=assumed, settings=asdict(trust), deck=text)
+    source = export_c(proved.stated(design.model), out, real=real, name="observer")
+    path = proved.write_beside(source.header, source.source)
+    show_written(as_json, proved.statement, [path, source.header, source.source, source.selftest])

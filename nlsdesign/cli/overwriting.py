@@ -14,8 +14,8 @@ import click
 
 from ..foundation.errors import ValueRangeError
 from ..foundation.text_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
-from .named_paths import NamedPath
 from .output import show_json
+from .typed_values import NamedPath
 
 F = TypeVar("F", bound=Callable[..., Any])
 Names: TypeAlias = Iterable[str] | Callable[[Mapping[str, Any]], Iterable[str]]

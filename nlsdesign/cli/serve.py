@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from .output import examples, json_option, show_json
+from .options import json_option
+from .output import examples, show_json
 
 
 @click.command(
@@ -31,7 +32,7 @@ def serve(
     DECK is a file, or the name of a deck or template that comes with the project; without it the page begins
     with a template. The address holds a random token, without which nothing is answered.
     """
-    from ..live.server import serve as run
+    from ..live import serve as run
 
     if deck_name:
         deck_name = _checked(deck_name)
@@ -63,7 +64,7 @@ def _checked(name: str) -> str:
     if not name.endswith(".toml") and not Path(name).is_dir():
         raise unknown_name("deck", name, bundled)
     deck = load_deck(name)
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare
 
     declare(deck)
     return str(Path(name).resolve())

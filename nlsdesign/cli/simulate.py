@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,23 +11,19 @@ import click
 
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..foundation.quantity import typeset_unit
-from .driving_signals import FORMS, check_rows, read_input_file, read_inputs
-from .given_numbers import BARE, given_start, given_words, with_given_values
-from .named_paths import NamedPath
-from .output import deck_option, examples, json_option, show_json, show_table
+from .options import deck_option, json_option
+from .output import examples, show_json, show_table
 from .overwriting import out_file_option
-from .units import Number
+from .typed_signals import BARE, FORMS, given_start, read_inputs, with_given_values
+from .typed_values import NamedPath, Number
 
 if TYPE_CHECKING:
-    from ..components.assembly.named_parts import Assembly
+    from ..components import Assembly
+    from ..foundation.arrays import Array
     from ..model import FlatModel
-    from ..simulation import Trace
 
 _file = NamedPath(dir_okay=False)
-_MOST_ROWS = 2_000_000
 _SHOWN_EVENTS = 5
-_ROUNDING = 1e-13
-"""Share of the largest value of a signal that is no more than the rounding of its numbers, and shown as 0."""
 _FORWARD = (
     "inputs",
     "input_file",
@@ -41,11 +36,6 @@ _FORWARD = (
     "readings",
     "table_only",
 )
-
-
-def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the suffixes of what stands beside the table."""
-    return () if given["record"] or given["table_only"] else (".svg", ".html")
 
 
 @click.command(
@@ -86,7 +76,8 @@ def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
 @click.option("--mapping", type=_file, default=None,
               help="Of --record: TOML that maps columns to signals.")  # fmt: skip
 @out_file_option("out/simulation/run.csv", "CSV to write; picture and page stand beside it.",
-                 beside=_further, ending=".csv")  # fmt: skip
+                 beside=lambda asked: () if asked["record"] or asked["table_only"] else (".svg", ".html"),
+                 ending=".csv")  # fmt: skip
 @json_option
 @click.pass_context
 def simulate(
@@ -98,10 +89,19 @@ def simulate(
     page.
     With a record: writes the predictions of the measured signals, and what the motion leaves unbalanced.
     """
+    out = given["out"]
     for read in (record, given["input_file"]):
-        _check_out(given["out"], read)
+        if read is not None and out.exists() and read.exists() and out.samefile(read):
+            raise ValueRangeError(f"--out {out}", "is the file that is read", next_step="name another file")
     if record is not None:
-        _refuse_beside_record(context)
+        for parameter in context.command.params:
+            source = context.get_parameter_source(parameter.name or "")
+            if parameter.name in _FORWARD and source is click.core.ParameterSource.COMMANDLINE:
+                raise click.UsageError(
+                    f"{parameter.opts[0]} stands beside --record, whose signals drive the model; "
+                    "leave one out",
+                    ctx=context,
+                )
         predict_record(deck_name, record, mapping, given["out"], given["as_json"])
         return
     if mapping is not None:
@@ -109,253 +109,136 @@ def simulate(
     _forward(deck_name, given)
 
 
-def _refuse_beside_record(context: click.Context) -> None:
-    for parameter in context.command.params:
-        source = context.get_parameter_source(parameter.name or "")
-        if parameter.name in _FORWARD and source is click.core.ParameterSource.COMMANDLINE:
-            words = (
-                f"{parameter.opts[0]} stands beside --record, whose signals drive the model; leave one out"
-            )
-            raise click.UsageError(words, ctx=context)
-
-
-def _check_out(out: Path, read: Path | None) -> None:
-    """Refuse to write over what is read."""
-    if read is not None and out.exists() and read.exists() and out.samefile(read):
-        raise ValueRangeError(f"--out {out}", "is the file that is read", next_step="name another file")
-
-
 def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare, sharpened, smoothed
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
-    from ..simulation import limits_reached, measure
+    from ..presentation.report import SIZES, write_simulation_report
+    from ..simulation import (
+        as_recorded,
+        limits_reached,
+        main_signals,
+        measure,
+        only,
+        require_visible,
+        signal_names,
+        signal_sizes,
+    )
     from ..simulation import simulate as integrate
 
     actuator, values = with_given_values(declare(load_deck(deck_name)), given["values"])
-    actuator = _read_as_asked(actuator, given["friction"])
-    model = flatten(actuator)
-    inputs: dict[str, Any] = dict(read_inputs(model, given["inputs"]))
-    times = _times(given["stop"], given["step"])
-    if given["input_file"] is not None:
-        inputs, times = _with_file(given, model, inputs)
-    if times is None:
-        raise ValueRangeError("--stop", "is not given", next_step='write for instance --stop "2 s"')
-    check_rows(inputs, float(times[-1]), float(times[1] - times[0]))
+    readings: dict[str, Callable[[Assembly], Assembly]] = {"sharp": sharpened, "smooth": smoothed}
+    if given["friction"] in readings:
+        actuator = readings[given["friction"]](actuator)
+    model, out = flatten(actuator), given["out"]
+    inputs, times = _driven(given, model)
+    require_visible(inputs, times)
     start, begin = given_start(model, given["initial"])
-    _chosen(model, given["signals"])  # before the work
+    chosen = _chosen(signal_names(model), given["signals"])  # before the work
     steps = Steps()
     with steps.step("simulation"):
         run = integrate(model, times, inputs=inputs, start=start)
     warnings = [*map(str, run.warnings), *map(str, limits_reached(model, run))]
-    shown = _shown(model, run, given["signals"])
-    written = _only(run, _chosen(model, given["signals"]))
+    listed = chosen if given["signals"] else main_signals(model, run)
+    written = only(run, chosen)
     if given["readings"] is not None:
-        written = _recorded(measure(run, actuator, seed=given["readings"]), model, run)
-    written.write_csv(given["out"])
-    files = [given["out"]]
+        written = as_recorded(measure(run, actuator, seed=given["readings"]), model, run)
+    written.write_csv(out)
+    files = [out]
     if not given["table_only"]:
-        files += _drawn(model, run, shown, (given["out"], deck_name, warnings, {**values, **begin}))
+        facts = {"deck": f"`{deck_name}`", "time": f"{run.time[-1]:g} s", **values, **begin}
+        files += write_simulation_report(out, model, run, listed, facts=facts, warnings=warnings)
+    sizes = {name: signal_sizes(run[name]) for name in listed}
     if given["as_json"]:
-        show_json(_content(run, shown, warnings, files) | {"values": values, "initial": begin})
+        signals = {name: {**row, "unit": run.units[name]} for name, row in sizes.items()}
+        events = [{"time": e.time, "name": e.name, "what": e.what} for e in run.events]
+        show_json({"signals": signals, "events": events, "warnings": warnings, "files": files,
+                   "values": values, "initial": begin})  # fmt: skip
         return
-    for line in given_words(values, begin):
-        click.echo(line)
-    show_table(f"{model.name} over {times[-1]:g} s", _COLUMNS, _rows(run, shown))
+    for name, taken in values.items():
+        click.echo(f"with {name} = {taken}")
+    for name, taken in begin.items():
+        click.echo(f"begins at {name} = {taken}")
+    rows = [
+        (n, *(f"{size:.4g}" for size in row.values()), typeset_unit(run.units[n])) for n, row in sizes.items()
+    ]
+    show_table(f"{model.name} over {times[-1]:g} s", SIZES, rows)
     for event in run.events[:_SHOWN_EVENTS]:
         click.echo(f"event: {event}")
     if len(run.events) > _SHOWN_EVENTS:
         where = "" if given["table_only"] else f", all in {files[-1]}"
         click.echo(f"and {len(run.events) - _SHOWN_EVENTS} more events{where}")
-    for each in warnings:
-        click.echo(f"warning: {each}")
+    for warning in warnings:
+        click.echo(f"warning: {warning}")
     click.echo(f"written: {', '.join(map(str, files))}")
 
 
-_COLUMNS = ("signal", "smallest", "largest", "rms", "at the end", "unit")
-
-
-def _read_as_asked(actuator: Assembly, friction: str) -> Assembly:
-    """Return the machine with the reading of friction that is asked for."""
-    from ..components.assembly.changed_copies import sharpened, smoothed
-
-    if friction == "sharp":
-        return sharpened(actuator)
-    return smoothed(actuator) if friction == "smooth" else actuator
-
-
-def _times(stop: float | None, step: float) -> Any:
-    """Return equal steps no longer than asked for, ``None`` without an end."""
+def _driven(given: Mapping[str, Any], model: FlatModel) -> tuple[dict[str, Any], Array]:
+    """Return the inputs that are typed and those of a file, linear between its rows; and the times."""
     import numpy as np
 
-    if stop is None:
-        return None
-    if step > stop:
-        raise ValueRangeError(
-            f"--step {step:g} s", f"is longer than the run, {stop:g} s", next_step="take a shorter --step"
-        )
-    count = max(1, math.ceil(stop / step * (1.0 - 1e-12)))
-    if count > _MOST_ROWS:
-        raise ValueRangeError(
-            f"--stop {stop:g} s in steps of {step:g} s",
-            f"are {count} rows, at most {_MOST_ROWS} are written",
-            next_step="take a longer --step",
-        )  # fmt: skip
-    return np.linspace(0.0, stop, count + 1)
+    from ..bench.identification import read_input_columns
+    from ..simulation import even_times
 
-
-def _with_file(given: Mapping[str, Any], model: FlatModel, typed: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Return all inputs with those of the file, and the times; linear between its rows."""
-    import numpy as np
-
-    time, columns = read_input_file(given["input_file"], model)
+    inputs: dict[str, Any] = dict(read_inputs(model, given["inputs"]))
+    stop, file = given["stop"], given["input_file"]
+    if file is None:
+        if stop is None:
+            raise ValueRangeError("--stop", "is not given", next_step='write for instance --stop "2 s"')
+        return inputs, even_times(stop, given["step"])
+    time, columns = read_input_columns(file, model)
     for name in columns:
-        if name in typed:
-            raise ValueRangeError(
-                f"--input {name}", f"stands in {given['input_file'].name} too", next_step="leave one out"
-            )
-    stop = given["stop"] if given["stop"] is not None else float(time[-1])
+        if name in inputs:
+            raise ValueRangeError(f"--input {name}", f"stands in {file.name} too", next_step="leave one out")
+    stop = float(time[-1]) if stop is None else stop
     if stop > time[-1] * (1.0 + 1e-9):
         raise ValueRangeError(
-            f"--stop {stop:g} s", f"lies behind the end of {given['input_file'].name}, {time[-1]:g} s",
+            f"--stop {stop:g} s", f"lies behind the end of {file.name}, {time[-1]:g} s",
             next_step="leave it out, or give a longer file",
         )  # fmt: skip
-    times = _times(stop, given["step"])
-    return {**typed, **{n: np.interp(times, time, v) for n, v in columns.items()}}, times
+    times = even_times(stop, given["step"])
+    return {**inputs, **{n: np.interp(times, time, v) for n, v in columns.items()}}, times
 
 
-def _chosen(model: FlatModel, globs: Sequence[str]) -> list[str]:
+def _chosen(names: Sequence[str], globs: Sequence[str]) -> list[str]:
     """Return the names that fit one of the globs, all without a glob."""
-    everything = model.states + model.inputs + model.outputs + model.signals
-    names = list(dict.fromkeys(v.name for v in everything))
-    for each in globs:
-        if not fnmatch.filter(names, each):
-            raise unknown_name("--signals", each, names)
-    return [n for n in names if not globs or any(fnmatch.fnmatchcase(n, each) for each in globs)]
-
-
-def _shown(model: FlatModel, run: Trace, globs: Sequence[str]) -> list[str]:
-    """Return what is listed and drawn: inputs, motions, torques and forces of springs, strains."""
-    if globs:
-        return _chosen(model, globs)
-    names = [v.name for v in model.inputs]
-    names += [name for body in model.bodies for name in (body.motion, body.rate)]
-    for spring in model.springs:
-        names += [spring.effort, *(piece.strain for cam in spring.cams for piece in cam.specimens)]
-    return [name for name in dict.fromkeys(names) if name in run]
-
-
-def _only(run: Trace, names: Sequence[str]) -> Trace:
-    from dataclasses import replace
-
-    return replace(run, signals={name: run[name] for name in names}, units={n: run.units[n] for n in names})
-
-
-def _recorded(readings: Trace, model: FlatModel, run: Trace) -> Trace:
-    """Return the readings, and the inputs that no sensor reads, as a bench would record them."""
-    seen = {reading.measured for reading in model.readings}
-    names = [v.name for v in model.inputs if v.name not in seen]
-    return readings.with_signals({n: run[n] for n in names}, {n: run.units[n] for n in names})
-
-
-def _drawn(
-    model: FlatModel,
-    run: Trace,
-    shown: Sequence[str],
-    about: tuple[Path, str, Sequence[str], Mapping[str, str]],
-) -> list[Path]:
-    """Write the picture and the page beside the table."""
-    from ..presentation.figures import run_over_time, write_figures
-    from ..presentation.report import FigureSection, FileSection, TableSection, TextSection, write_report
-
-    out, deck_name, warnings, taken = about
-    picture = run_over_time(run, shown)
-    (file,) = write_figures(out.parent, {out.stem: picture})
-    page = out.with_suffix(".html")
-    rows = tuple((f"{event.time:.6g}", event.name, event.what) for event in run.events)
-    sections = [
-        TextSection("Warnings", "\n\n".join(warnings) or "No law leaves its range, no limit is reached."),
-        FigureSection("Signals over time", picture, caption="Signals of one unit share a panel."),
-        TableSection("Sizes", _COLUMNS, tuple(_sized(run, shown)), caption="Over the whole run."),
-        *(
-            [
-                TableSection(
-                    "Events",
-                    ("time in s", "part", "what"),
-                    rows,
-                    caption="What sticks, slides, strikes or switches, and when.",
-                    folded=True,
-                )
-            ]
-            if rows
-            else []
-        ),
-        FileSection("Files", {out: "all rows", file: "the picture"}, caption="Written beside this page."),
-    ]
-    facts = {"deck": f"`{deck_name}`", "time": f"{run.time[-1]:g} s", **taken}
-    return [file, write_report(page, *sections, title=f"{model.name}: simulation", facts=facts)]
-
-
-def _sizes(values: Any) -> tuple[float, float, float, float]:
-    import numpy as np
-
-    sizes = [values.min(), values.max(), np.sqrt(np.mean(values**2)), values[-1]]
-    least = _ROUNDING * float(np.max(np.abs(values)))
-    smallest, largest, rms, last = (float(size) if abs(size) > least else 0.0 for size in sizes)
-    return smallest, largest, rms, last
-
-
-def _sized(run: Trace, names: Sequence[str]) -> list[tuple[str | float, ...]]:
-    return [(n, *_sizes(run[n]), typeset_unit(run.units[n])) for n in names]
-
-
-def _rows(run: Trace, names: Sequence[str]) -> list[tuple[str, ...]]:
-    return [(str(n), *(f"{size:.4g}" for size in sizes), str(u)) for n, *sizes, u in _sized(run, names)]
-
-
-def _content(run: Trace, names: Sequence[str], warnings: list[str], files: list[Path]) -> dict[str, Any]:
-    heads = ("smallest", "largest", "rms", "last")
-    sizes = {n: dict(zip(heads, _sizes(run[n]), strict=True)) | {"unit": run.units[n]} for n in names}
-    events = [{"time": e.time, "name": e.name, "what": e.what} for e in run.events]
-    return {"signals": sizes, "events": events, "warnings": warnings, "files": files}
+    for glob in globs:
+        if not fnmatch.filter(names, glob):
+            raise unknown_name("--signals", glob, names)
+    return [n for n in names if not globs or any(fnmatch.fnmatchcase(n, glob) for glob in globs)]
 
 
 def predict_record(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
     """Drive a deck with a measured record; write its predictions and print their errors."""
     from ..bench.discrepancy import band_errors, predict
     from ..bench.identification import load_record
-    from ..components.assembly.deck_writer import declare
+    from ..components import declare
     from ..foundation.deck import load_deck
     from ..model import flatten
+    from ..simulation import rms_against
 
     actuator = declare(load_deck(deck_name))
     records = load_record(record, flatten(actuator), mapping=mapping)
     (measured,) = records.records
     predicted = predict(actuator, records, measured.name)
     predicted.write_csv(out)
-    rows = agreement_rows(measured.trace, predicted)
+    rms = {name: f"{error:.4g}" for name, error in rms_against(measured.trace, predicted).items()}
     band = band_errors(actuator, records, measured.name)
     if as_json:
-        rms = {name: float(value) for name, value, _ in rows}
-        shown = {"rms": rms, "in_band": {name: each._asdict() for name, each in band.items()}}
-        show_json({"file": out, **shown, "warnings": [str(each) for each in predicted.warnings]})
+        show_json({
+            "file": out, "rms": {name: float(error) for name, error in rms.items()},
+            "in_band": {name: errors._asdict() for name, errors in band.items()},
+            "warnings": [str(warning) for warning in predicted.warnings],
+        })  # fmt: skip
         return
-    sizes = {n: (f"{each.error:.4g}", f"{each.noise_floor:.4g}") for n, each in band.items()}
+    sizes = {n: (f"{errors.error:.4g}", f"{errors.noise_floor:.4g}") for n, errors in band.items()}
     columns = ("signal", "rms error", "in the band of a fit", "noise floor there", "unit")
-    table = [(name, rms, *sizes.get(name, ("", "")), unit) for name, rms, unit in rows]
+    table = [
+        (name, error, *sizes.get(name, ("", "")), typeset_unit(predicted.units[name]))
+        for name, error in rms.items()
+    ]
     show_table(f"{record.name} against {actuator.name}", columns, table)
-    for each in predicted.warnings:
-        click.echo(f"warning: {each}")
+    for warning in predicted.warnings:
+        click.echo(f"warning: {warning}")
     click.echo(f"written: {out}")
-
-
-def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
-    """Return name, rms error and unit of each predicted signal; one that is not measured should be zero."""
-    import numpy as np
-
-    rows = []
-    for name, values in predicted.signals.items():
-        error = values - measured[name] if name in measured else values
-        rows.append((name, f"{float(np.sqrt(np.mean(error**2))):.4g}", typeset_unit(predicted.units[name])))
-    return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import importlib.util
 import inspect
@@ -20,10 +21,10 @@ from ..foundation.errors import NlsError, brief, unknown_name
 from ..foundation.locations import bundled, folder
 from ..foundation.quantity import with_unit
 from ..foundation.text_files import is_there, listed_files, make_folder, text_of
-from .named_paths import NamedPath
-from .output import examples, json_option, show_json, show_table
+from .options import json_option, workers_option
+from .output import examples, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files
-from .workers import workers_option
+from .typed_values import NamedPath
 
 _SIGNATURE = "def main(out, fast=False): ..."
 
@@ -173,11 +174,18 @@ def study() -> None:
 @json_option
 def list_studies(as_json: bool) -> None:
     """List the studies that come with the project."""
-    rows = [(name, (load_study(name).__doc__ or "").strip().splitlines()[0]) for name in study_names()]
+    rows = [(name, _first_line(name)) for name in study_names()]
     if as_json:
         show_json(dict(rows))
         return
     show_table("Studies", ("name", "what it shows"), rows)
+
+
+def _first_line(name: str) -> str:
+    """Return the first line of the docstring of a study, which is read and not loaded."""
+    place = folder("studies")
+    file = next(path for path in (place / f"{name}.py", place / name / "__init__.py") if path.exists())
+    return (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]
 
 
 @study.command(

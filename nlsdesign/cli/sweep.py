@@ -1,4 +1,4 @@
-"""``nlsdesign sweep``: one question asked of many designs, draws or decks, on one machine or many."""
+"""``nlsdesign sweep`` and ``report``: one question asked of many designs, draws or decks, and its page."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..foundation.errors import ExportError, ValueRangeError
-from .named_paths import NamedPath
-from .output import examples, json_option, next_command, show_json, show_table
-from .overwriting import folder_option, kept
+from ..foundation.errors import ExportError, NlsError, ValueRangeError
+from .options import json_option
+from .output import examples, next_command, show_json, show_table, show_written
+from .overwriting import folder_option, kept, out_option
+from .typed_values import NamedPath, parse_number
 
 if TYPE_CHECKING:
     from ..foundation.progress import Progress
@@ -62,8 +63,7 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     executor = _executor(given)
-    from ..sweeps.sweep_columns import libraries
-    from ..sweeps.sweep_file import read_sweep_file
+    from ..sweeps import libraries, read_sweep_file
 
     libraries()
     task = read_sweep_file(file)
@@ -74,7 +74,12 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     if pages is not None:
         _require_room(pages)
     table = _run(task, out, executor, given)
-    page = None if pages is None else _page(table, pages, out)
+    page = None
+    if pages is not None:
+        from ..presentation.sweep_report import write_sweep_report
+
+        with kept(pages, []):
+            page = write_sweep_report(table, pages, source=out).page
     _show_result(table, out, page, as_json=as_json)
     ctx.exit(0 if table.done.all() else 1)
 
@@ -92,16 +97,9 @@ def _require_room(folder: Path) -> None:
             )  # fmt: skip
 
 
-def _page(table: SweepTable, folder: Path, source: Path) -> Path:
-    from ..presentation.sweep_report import write_sweep_report
-
-    with kept(folder, []):
-        return write_sweep_report(table, folder, source=source).page
-
-
 def _show_result(table: SweepTable, out: Path, page: Path | None, *, as_json: bool) -> None:
     """Show how many points there are, why some failed, and the commands that come next."""
-    file, reasons, following = out / "results.parquet", _reasons(table), _following(table, out, page)
+    file, reasons, following = out / "results.parquet", table.failures(), _following(table, out, page)
     failed = len(table) - int(table.done.sum())
     if as_json:
         content = {"points": len(table), "failed": failed, "reasons": {r: n for r, n, _ in reasons}}
@@ -152,7 +150,7 @@ def _executor(given: dict[str, Any]) -> Executor:
 
 def _run(task: SweepTask, out: Path, executor: Executor, given: dict[str, Any]) -> SweepTable:
     from ..foundation.progress import Steps
-    from ..sweeps.run_sweep import SweepSettings, run_task
+    from ..sweeps import SweepSettings, run_task
 
     settings = SweepSettings(again=given["again"], retry_failed=given["retry_failed"])
     steps = Steps()
@@ -175,7 +173,7 @@ class _Lines:
 
 
 def _show_plan(task: SweepTask, out: Path, as_json: bool) -> None:
-    from ..sweeps.sweep_folder import standing_points
+    from ..sweeps import standing_points
 
     standing = standing_points(out, task.about, task.columns, plan=task.plan)
     rows = [
@@ -189,12 +187,93 @@ def _show_plan(task: SweepTask, out: Path, as_json: bool) -> None:
     click.echo(f"{len(task.plan)} points, {standing} of them stand in {out}; nothing was computed")
 
 
-def _reasons(table: SweepTable) -> list[tuple[str, int, int]]:
-    """Return each reason of failures, the most frequent first, with its number of points and the first."""
-    counts: dict[str, list[int]] = {}
-    failed = ~table.done
-    for point, reason in zip(table.values["point"][failed], table.values["reason"][failed], strict=True):
-        counts.setdefault(str(reason), [0, int(point)])[0] += 1
-    return sorted(
-        ((reason, count, first) for reason, (count, first) in counts.items()), key=lambda each: -each[1]
+@click.command(
+    epilog=examples(
+        "nlsdesign report out/sweep --smaller torque_error_rms --smaller cam_radius",
+        "nlsdesign report out/sweep --larger bandwidth --at-most 'strain=3'",
+        "nlsdesign report out/sweep --deck-of 17 --deck-of 42 --out out/chosen --json",
     )
+)
+@click.argument("folder", metavar="FOLDER", type=NamedPath(example="out/sweep"))
+@click.option("--smaller", multiple=True, metavar="ANSWER", help="The smaller, the better; repeatable.")
+@click.option("--larger", multiple=True, metavar="ANSWER", help="The larger, the better; repeatable.")
+@click.option("--near", multiple=True, metavar="ANSWER=VALUE", help="The nearer, the better; repeatable.")
+@click.option(
+    "--at-most", multiple=True, metavar="ANSWER=VALUE", help="A point beyond it is a miss; repeatable."
+)
+@click.option(
+    "--at-least", multiple=True, metavar="ANSWER=VALUE", help="A point below it is a miss; repeatable."
+)
+@click.option("--deck-of", multiple=True, type=int, metavar="POINT",
+              help="Write only the deck behind a point, no page; repeatable.")  # fmt: skip
+@out_option("out/sweep_report", writes=("sweep.html", "points.csv"))
+@json_option
+def report(
+    folder: Path, deck_of: tuple[int, ...], out: Path, as_json: bool, **given: tuple[str, ...]
+) -> None:
+    """Write the page of a sweep: what was asked, failures, the best points with their decks, figures.
+
+    FOLDER is what `nlsdesign sweep` wrote, also where the sweep is not finished.
+
+    Which values are better is never guessed: without --smaller, --larger or --near there is no front. Where a
+    sweep has an answer `met`, a point that has not met its target is a miss, unless --at-most or --at-least
+    say what a miss is.
+    """
+    from ..foundation.text_files import write_text
+    from ..sweeps import (
+        LargerIsBetter,
+        NearIsBetter,
+        NotAbove,
+        NotBelow,
+        Preference,
+        Requirement,
+        SmallerIsBetter,
+        point_deck_text,
+        read_sweep,
+    )
+
+    table = read_sweep(folder)
+    if deck_of:
+        texts = {
+            out / f"point_{point}.toml": point_deck_text(table, point) for point in dict.fromkeys(deck_of)
+        }
+        for file, text in texts.items():
+            write_text(file, text)
+        show_written(as_json, [], list(texts))
+        return
+    from ..presentation.sweep_report import write_sweep_report
+
+    preferences: list[Preference] = [
+        *(SmallerIsBetter(name) for name in given["smaller"]),
+        *(LargerIsBetter(name) for name in given["larger"]),
+        *(NearIsBetter(*_answer_value(table, text, "--near")) for text in given["near"]),
+    ]
+    requirements: list[Requirement] = [
+        *(NotAbove(*_answer_value(table, text, "--at-most")) for text in given["at_most"]),
+        *(NotBelow(*_answer_value(table, text, "--at-least")) for text in given["at_least"]),
+    ]
+    written = write_sweep_report(
+        table, out, preferences=preferences, requirements=requirements or None, source=folder
+    )
+    failed = int((~table.done).sum())
+    sentences = [f"{len(table)} points, {failed} of them failed", *written.remarks]
+    if preferences:
+        shown = ", ".join(map(str, written.front[:10])) + (", ..." if len(written.front) > 10 else "")
+        sentences.insert(1, f"{len(written.front)} points on the front: {shown or 'none'}")
+    else:
+        sentences.insert(
+            1, "no direction is stated, so there is no front; --smaller, --larger, --near state one"
+        )
+    show_written(
+        as_json, sentences, [written.page, written.points, *written.decks.values()],
+        points=len(table), failed=failed, front=list(written.front),
+    )  # fmt: skip
+
+
+def _answer_value(table: SweepTable, text: str, option: str) -> tuple[str, float]:
+    """Read ``NAME=VALUE`` with a unit like that of the answer; gives the value in SI."""
+    name, sign, value = text.rpartition("=")
+    if not sign:
+        raise NlsError(f"{option} '{text}'", "has no value", next_step=f"write {option} 'ANSWER=5 mm'")
+    unit = table.column(name.strip()).unit or "1"
+    return name.strip(), parse_number(value.strip(), unit).number

@@ -2,15 +2,31 @@
 
 from typing import TYPE_CHECKING
 
+from .assembly.changed_copies import sharpened as sharpened
 from .assembly.changed_copies import smoothed
-from .assembly.deck_reader import component_classes
+from .assembly.changed_copies import with_moved_load as with_moved_load
+from .assembly.circuit import draw as draw
+from .assembly.deck_reader import component_classes as component_classes
+from .assembly.deck_remarks import deck_remarks as deck_remarks
+from .assembly.deck_template import GIVEN as GIVEN
+from .assembly.deck_template import AskedNumber as AskedNumber
+from .assembly.deck_template import DeckTemplate as DeckTemplate
+from .assembly.deck_template import MotorInertia as MotorInertia
+from .assembly.deck_template import load_template as load_template
+from .assembly.deck_template import motor_inertia as motor_inertia
+from .assembly.deck_template import plain_name as plain_name
+from .assembly.deck_writer import deck_digest as deck_digest
+from .assembly.deck_writer import deck_problems as deck_problems
+from .assembly.deck_writer import declare as declare
+from .assembly.deck_writer import write_deck as write_deck
 from .assembly.library_rubber import with_rubber
 from .assembly.named_parts import Assembly, assembly
-from .assembly.renamed import renamed
+from .assembly.renamed import renamed as renamed
 from .core.contacts import Regularised, Rounded, Sharp
 from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .core.element import Element, Parallel, Tie, parallel, tie
+from .core.part import ParameterInfo as ParameterInfo
 from .core.part import Part
 from .core.part_numbers import NotDeclared
 from .core.series import Series, series
@@ -19,6 +35,7 @@ from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
+from .materials.library import CONDITIONS as CONDITIONS
 from .materials.library import Material, material, materials
 from .materials.loss_tangent import (
     KnownLoss,
@@ -29,6 +46,7 @@ from .materials.loss_tangent import (
     peaked_relaxation,
 )
 from .materials.material_law import MaterialLaw, law_of, rubber_of
+from .materials.material_law import material_laws as material_laws
 from .materials.named_networks import (
     burgers,
     generalised_maxwell,

@@ -34,7 +34,13 @@ from .drawing.machined_cam import (
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
 )
+from .jobs.job_file import DRAWS as DRAWS
 from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.job_file import kinds as kinds
+from .jobs.job_file import read_entries as read_entries
+from .jobs.job_file import read_stock as read_stock
+from .jobs.job_file import read_target_entry as read_target_entry
+from .jobs.job_file import target_of_file as target_of_file
 from .jobs.task_target import TaskTarget
 from .jobs.written_design import (
     DESIGN_FILES,
@@ -79,6 +85,7 @@ from .optimisation.limits import (
 from .optimisation.pareto import ParetoFront, pareto
 from .optimisation.result import CamDesign, LimitState
 from .optimisation.settings import DesignSettings
+from .optimisation.solve import GOALS as GOALS
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom

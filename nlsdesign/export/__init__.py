@@ -9,12 +9,15 @@ from .c.writer import CSource
 from .compilation.compiled_step import natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS
 from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
+from .compilation.target_build import controller_sizes as controller_sizes
 from .compilation.target_run import TargetMeasurement, measure_on_target
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
+from .cosimulation.coupling import Coupling as Coupling
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
 from .cosimulation.ssp import WrittenSystem, read_ssp, write_ssp
 from .cosimulation.wires import Late, SamplesOf, Wire
+from .cosimulation.wires import as_wire as as_wire
 from .exported_files import ExportedFile, ExportedFolder, read_exports
 from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu

@@ -231,6 +231,22 @@ def template_names() -> list[str]:
     return sorted(path.stem for path in (folder("models") / "templates").glob("*.toml"))
 
 
+_READY = "# Ready for: "
+
+
+def template_text(name: str) -> str:
+    """Return the text of a template: TOML, with a comment that names the commands that it is meant for."""
+    if name not in template_names():
+        raise unknown_name("template", name, template_names())
+    return (folder("models") / "templates" / f"{name}.toml").read_text(encoding="utf8")
+
+
+def commands_named_in(template: str) -> tuple[str, ...]:
+    """Return the commands that the text of a template says that it is ready for."""
+    line = next(line for line in template.splitlines() if line.startswith(_READY))
+    return tuple(line.removeprefix(_READY).split(", "))
+
+
 def load_deck(name: str | Path) -> Deck:
     """Read a deck by file name, or by the name of one that comes with the project.
 

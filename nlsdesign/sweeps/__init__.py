@@ -5,11 +5,20 @@ The report of a sweep and the command import it. It decides no physics: question
 
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import Subject
+from .point_deck import point_deck_text as point_deck_text
 from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
+from .preferences import NotAbove as NotAbove
+from .preferences import Preference as Preference
+from .preferences import Requirement as Requirement
 from .questions import AngleQuestion, DesignQuestion, DiagnosisQuestion, LoopQuestion, SpreadQuestion
+from .run_sweep import SweepSettings as SweepSettings
 from .run_sweep import SweepTask, sweep
+from .run_sweep import run_task as run_task
 from .saltelli import SaltelliSample
 from .sweep_columns import SweepColumn
+from .sweep_columns import libraries as libraries
+from .sweep_file import read_sweep_file as read_sweep_file
+from .sweep_folder import standing_points as standing_points
 from .sweep_question import FunctionQuestion, SweepQuestion
 from .sweep_table import SweepTable, read_sweep
 

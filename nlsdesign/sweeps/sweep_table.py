@@ -82,6 +82,15 @@ class SweepTable:
         result: Mask = self.values["status"] == DONE
         return result
 
+    def failures(self) -> list[tuple[str, int, int]]:
+        """Return each reason of failures, the most frequent first, with number of points and first point."""
+        counts: dict[str, list[int]] = {}
+        failed = ~self.done
+        for point, reason in zip(self.values["point"][failed], self.values["reason"][failed], strict=True):
+            counts.setdefault(str(reason), [0, int(point)])[0] += 1
+        reasons = [(reason, count, first) for reason, (count, first) in counts.items()]
+        return sorted(reasons, key=lambda row: -row[1])
+
     def column(self, name: str) -> SweepColumn:
         """Return one column.
 
@@ -120,12 +129,7 @@ class SweepTable:
         return int(rows[0])
 
     def assembly_at(self, point: int) -> Assembly:
-        """Return the assembly behind a point: its deck with the numbers and materials of the point.
-
-        Parameters
-        ----------
-        point
-            Number of the point, from 0.
+        """Return the assembly behind a point, from 0: its deck with the numbers and materials of the point.
 
         Raises
         ------

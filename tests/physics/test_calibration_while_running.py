@@ -18,7 +18,7 @@ from nlsdesign.bench.calibration import (
     what_calibration_buys,
 )
 from nlsdesign.bench.calibration.plan import BoughtBy
-from nlsdesign.cli.calibrate import calibrate
+from nlsdesign.cli.bench import calibrate
 from nlsdesign.feedback.observer import (
     CascadeGain,
     design_observer,

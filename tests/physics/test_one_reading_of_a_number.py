@@ -20,7 +20,7 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
 from nlsdesign.model import FlatModel
-from nlsdesign.regeneration import DRAWS, _draws
+from nlsdesign.regeneration.regenerated_observer import DRAWS, _draws
 from nlsdesign.simulation.prior import declared_prior
 from nlsdesign.sweeps import AngleQuestion, RandomDraws, Subject
 

@@ -7,23 +7,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlsdesign.cli.analyse_loop import _loops
+from nlsdesign.components import declare, with_moved_load
 from nlsdesign.export import quickest
-from nlsdesign.feedback.control import ClosedLoop, loop_margins
-from nlsdesign.feedback.control.evaluation.onset import loop_over_spread
+from nlsdesign.feedback.control import ClosedLoop, cascade_loops, loop_margins
+from nlsdesign.feedback.control.evaluation.responses import held_drive
 from nlsdesign.feedback.control.evaluation.spread_margins import (
     GAIN_MARGIN,
     PHASE_MARGIN,
     SpreadMargins,
     spread_margins,
 )
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import flatten
 
 GAIN, LAST = "controller.proportional", np.radians(50.0)
 
 
+def loop_of(deck: str) -> ClosedLoop:
+    assembly = declare(load_deck(deck))
+    machines = [flatten(each) for each in (assembly, with_moved_load(assembly))]
+    return cascade_loops(*machines, delay=1, sample_time=1e-3)[0]
+
+
 @pytest.fixture(scope="module")
 def loop() -> ClosedLoop:
-    return _loops("austin2015_figure_consistent", {"gains": None}, 1, 1e-3)[0]
+    return loop_of("austin2015_figure_consistent")
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +45,7 @@ def test_the_published_gain_is_a_finding_with_the_gain_that_has_a_margin(publish
     assert published.least[0] < 1.0
     margin, kick = published.findings()
     assert "6 dB, 30° are asked for: 14" in margin
-    assert "machines of the spread limit-cycle at 3.5 N·m after a kick of 10 ms" in kick
+    assert "machines of the spread limit-cycle at 3.5 N·m after a step and a kick of 10 ms" in kick
     assert 0.05 < published.cycling < 0.4
 
 
@@ -56,17 +64,18 @@ def test_the_gain_that_is_named_has_the_margin_and_survives_the_kick(
     assert np.min(margins.phase) >= PHASE_MARGIN
 
 
-def test_a_kick_finds_more_limit_cycles_than_a_gentle_start(loop: ClosedLoop) -> None:
-    """Between the onset for a kicked and for a quiet loop friction holds what begins gently."""
-    quiet, kicked = (
-        loop_over_spread(loop, amplitude=3.5, frequency=0.0, draws=24, kick=kick, translate=quickest())
-        for kick in (0.0, 1.0)
-    )
-    assert kicked.held <= quiet.held < 1.0
+def test_a_kick_is_wanted_for_ten_milliseconds_once_the_torque_is_reached(loop: ClosedLoop) -> None:
+    time = 1e-3 * np.arange(3000)
+    drives = [held_drive(loop, torques=np.array([2.0]), kick=kick).drives for kick in (0.0, 1.0)]
+    plain, kicked = (np.asarray(each(time, np.zeros(1, dtype=np.intp))[loop.desired])[0] for each in drives)
+    assert np.sum(kicked - plain) == pytest.approx(10.0)
+    struck = np.flatnonzero(kicked != plain)
+    assert len(struck) == 10
+    assert plain[struck[0] - 1] < 2.0 == plain[struck[0]]
 
 
 def test_a_linear_spring_keeps_its_margin_with_the_same_gain() -> None:
-    gentle = _loops("austin2015_soft_spring", {"gains": None}, 1, 1e-3)[0]
+    gentle = loop_of("austin2015_soft_spring")
     found = spread_margins(gentle, GAIN, last=LAST, translate=quickest())
     assert found.kept
     assert found.enough == found.value

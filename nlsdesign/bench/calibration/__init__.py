@@ -4,10 +4,12 @@
 It never adds an effect to a machine: what does not fit is refused, or widens what is known.
 """
 
+from .bench_test import KINDS as KINDS
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, Instruments, LoadCellTest
 from .calibrated_deck import calibrated, read_joint_numbers, shown_numbers, write_calibration
 from .estimate import CalibrationRecords, estimate, load_calibration
-from .plan import CalibrationPlan, what_calibration_buys
+from .estimate import record_findings as record_findings
+from .plan import CalibrationPlan, what_calibration_buys, write_plan
 
 __all__ = [
     "CalibrationPlan",
@@ -24,4 +26,5 @@ __all__ = [
     "shown_numbers",
     "what_calibration_buys",
     "write_calibration",
+    "write_plan",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -69,12 +70,7 @@ class CalibrationTest(ABC):
     instruments: Instruments = Instruments()
 
     def on_bench(self, actuator: Assembly) -> Assembly:
-        """Return the machine as it stands on the bench: everything but the drive is clamped.
-
-        Parameters
-        ----------
-        actuator
-            As declared.
+        """Return the declared machine as it stands on the bench: everything but the drive is clamped.
 
         Raises
         ------
@@ -147,6 +143,14 @@ class FreeRunTest(CalibrationTest):
         for name in removed:
             kept = kept.without_part(name)
         return kept
+
+
+KINDS: Mapping[str, CalibrationTest] = {
+    "hung_weight": HungWeightTest(),
+    "load_cell": LoadCellTest(),
+    "free_run": FreeRunTest(),
+}
+"""The kinds of calibration by the names that commands and files give them."""
 
 
 def moved_end(model: FlatModel) -> str:

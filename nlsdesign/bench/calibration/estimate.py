@@ -190,6 +190,12 @@ def _hangs(finding: Finding, records: RecordSet) -> bool:
     return "constant" in finding.text and any(f"column '{head}'" in finding.place for head in heads)
 
 
+def record_findings(tests: Sequence[CalibrationRecords]) -> list[str]:
+    """Return in sentences what was found in the files: what is suspect, and remarks."""
+    suspect = [f"suspect: {finding}" for test in tests for finding in test.records.findings]
+    return suspect + [str(remark) for test in tests for remark in test.records.remarks]
+
+
 def prior_of(actuator: Assembly, given: Prior | None) -> Prior:
     """Return what is known of a machine: as given, or the declared spreads."""
     model = flatten(actuator)

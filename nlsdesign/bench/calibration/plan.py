@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +14,7 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, InfeasibleError, unknown_name
+from ...foundation.text_files import write_text
 from ...foundation.written_numbers import shared_prefix, without_power
 from ...model import flatten
 from ...model.roles import series_spring
@@ -236,6 +239,21 @@ def what_calibration_buys(
     ranked = sorted(purchases, key=place)
     reach = {b.title: max(float(np.max(np.abs(r.course.motion))) for _, r in b.runs) for b in benches}
     return CalibrationPlan(bought((), known), tuple(ranked), angles, rank_by, left_out, reach)
+
+
+def write_plan(plan: CalibrationPlan, folder: Path) -> Path:
+    """Write the plan as ``plan.json``.
+
+    Parameters
+    ----------
+    plan
+        From :func:`~nlsdesign.bench.calibration.what_calibration_buys`.
+    folder
+        Is made where it does not exist.
+    """
+    file = folder / "plan.json"
+    write_text(file, json.dumps(plan.to_dict(), indent=2, ensure_ascii=False) + "\n")
+    return file
 
 
 def _learned(unknowns: Unknowns) -> Prior:

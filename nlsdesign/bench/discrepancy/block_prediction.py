@@ -137,20 +137,7 @@ def predict(actuator: Assembly, records: RecordSet, name: str) -> Trace:
 
 
 def ranges_left(actuator: Assembly, records: RecordSet) -> tuple[tuple[str, RangeWarning], ...]:
-    """Return the laws that the measured motions take out of their stated range, each with the worst record.
-
-    Parameters
-    ----------
-    actuator
-        Declared, or as a diagnosis has left it.
-    records
-        Measured.
-
-    Raises
-    ------
-    MeasurementError
-        If nothing measured drives the model.
-    """
+    """Return the laws that measured motions take out of their stated range, each with the worst record."""
     model = flatten(actuator)
     if not any(v.bounded for v in model.signals + model.states):
         return ()

@@ -20,7 +20,7 @@ from typing import Any, Literal, Protocol
 from ...components import Assembly
 from ...components.assembly.deck_writer import write_deck
 from ...foundation.errors import ConvergenceError, MeasurementError
-from ...foundation.text_files import make_folder, write_text
+from ...foundation.text_files import discard, make_folder, write_text
 from ...model import flatten
 from ...model.origin import derived
 from ..identification.equation_error.evidence import Bench
@@ -30,7 +30,7 @@ from .effects import Candidate
 from .effects import catalogue as known_effects
 from .effects.effect import EffectFunction
 from .fitting import Key
-from .planning.experiment import Experiment, next_experiment
+from .planning.experiment import Experiment, next_experiment, write_command
 from .reporting.advice import advice, more_excitation, where_they_differ
 from .reporting.named_effect import EffectEvidence
 from .reporting.refit import Refit, sourced
@@ -431,6 +431,11 @@ def _evidence(step: Step, standing: Standing) -> EffectEvidence:
     )
 
 
+NEXT_RECORD = "next_record.csv"
+OF_ONE_VERDICT = (NEXT_RECORD, "regeneration.json")
+"""Files that not every diagnosis leaves behind."""
+
+
 class _Written(Protocol):
     """What is written as a JSON file beside the deck it ends with."""
 
@@ -443,14 +448,27 @@ class _Written(Protocol):
 def write_verdict(verdict: Verdict, folder: Path) -> list[Path]:
     """Write ``verdict.json`` and the deck of the better model, ``model.toml``.
 
+    The command of the next record stands beside them as ``next_record.csv`` where one is proposed. What only
+    another diagnosis in this folder has written is removed: it would contradict the verdict.
+
     Parameters
     ----------
     verdict
         Of a diagnosis.
     folder
         Is made where it does not exist.
+
+    Returns
+    -------
+    list of Path
+        Verdict and deck.
     """
-    return _write(verdict, folder, "verdict.json")
+    for left_over in OF_ONE_VERDICT:
+        discard(folder / left_over)
+    files = _write(verdict, folder, "verdict.json")
+    if verdict.experiment is not None:
+        write_command(verdict.experiment, folder / NEXT_RECORD)
+    return files
 
 
 def write_refit(refit: Refit, folder: Path) -> list[Path]:

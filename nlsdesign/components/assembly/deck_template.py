@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...foundation.deck import Deck, read_deck, template_names
+from ...foundation.deck import Deck, commands_named_in, read_deck, template_text
 from ...foundation.errors import DeckError, NlsError, unknown_name
-from ...foundation.locations import folder
 from ...foundation.quantity import Quantity
 from ..mechanics.bodies import GearedMotor
 from ..mechanics.gear import Gear
@@ -24,7 +23,7 @@ GIVEN = "assumed: given when the deck was made; say here where it is from"
 """Source of a number that was given without one."""
 ROTOR, OUTPUT = PLACES = ("rotor", "output")
 """Where the inertia of a motor may be given: in front of the gear, or behind it."""
-_ASKED, _READY = "# Asked: ", "# Ready for: "
+_ASKED = "# Asked: "
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,7 @@ class DeckTemplate:
     @property
     def ready_for(self) -> tuple[str, ...]:
         """The commands that the template is meant for."""
-        line = next(line for line in self.text.splitlines() if line.startswith(_READY))
-        return tuple(line.removeprefix(_READY).split(", "))
+        return commands_named_in(self.text)
 
     def questions(self) -> list[AskedNumber]:
         """Return the numbers that are asked for, in written order."""
@@ -138,10 +136,7 @@ class DeckTemplate:
 
 def load_template(name: str) -> DeckTemplate:
     """Return a template."""
-    if name not in template_names():
-        raise unknown_name("template", name, template_names())
-    path = folder("models") / "templates" / f"{name}.toml"
-    return DeckTemplate(name, path.read_text(encoding="utf8"))
+    return DeckTemplate(name, template_text(name))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import nnls
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
@@ -132,6 +131,8 @@ def _fewest(columns: Array, stress: Array, *, first: tuple[int, ...]) -> tuple[l
 
     ``columns``: shape (n, m).
     """
+    from scipy.optimize import nnls  # a list of parts needs no SciPy
+
     count = max(1, min(_MOST, len(stress) // 2))
     relative, ones = columns / stress[:, None], np.ones(len(stress))
     rest = [i for i in range(columns.shape[1]) if i not in first]

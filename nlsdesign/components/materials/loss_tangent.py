@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError, unknown_name
@@ -194,6 +193,8 @@ def _loss_tangents(given: Sequence[float]) -> tuple[float, ...]:
 
 
 def _fitted(frequencies: Array, wanted: Array, times: Array) -> Relaxation:
+    from scipy.optimize import nnls  # a list of parts needs no SciPy
+
     turn = 2.0 * np.pi * frequencies[:, None] * times
     lost, stored = turn / (1.0 + turn**2), turn**2 / (1.0 + turn**2)
     # tan δ = Σ gᵢ·lᵢ/(1 + Σ gᵢ·sᵢ) = t  ⇔  Σ gᵢ·(lᵢ − t·sᵢ) = t

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
@@ -171,6 +170,8 @@ def control_values(angles: Array, lever_arms: Array, count: int = 40) -> tuple[f
     ValueRangeError
         If the table does not start at zero or is not ascending.
     """
+    from scipy.interpolate import make_interp_spline  # a list of parts needs no SciPy
+
     if angles[0] != 0.0 or np.any(np.diff(angles) <= 0.0):
         raise ValueRangeError(
             "cam table", "angles must ascend from zero", next_step="sort the table by angle"

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import BSpline
 
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity
@@ -112,6 +111,8 @@ class AnchoredCam(Cam):
     )
 
     def __post_init__(self) -> None:
+        from scipy.interpolate import BSpline  # a list of parts needs no SciPy
+
         super().__post_init__()
         _check_row("support", self.support)
         anchor, values = self.anchor_distance.number, np.array(self.support.values)

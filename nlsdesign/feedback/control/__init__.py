@@ -28,7 +28,8 @@ from .evaluation.responses import (
     tracking,
     zero_torque,
 )
-from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, evaluate_loop
+from .evaluation.whole_evaluation import BIAS as BIAS
+from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, cascade_loops, evaluate_loop
 from .laws.known_drive import check_torque, largest_torque, only_side
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
 from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
@@ -72,6 +73,7 @@ __all__ = [
     "ZeroTorque",
     "bandwidth_against_impedance",
     "best_choices",
+    "cascade_loops",
     "check_torque",
     "coupled_stability",
     "encoder_loop",

@@ -23,6 +23,7 @@ from .certificates import (
     verify,
     write_certificate,
 )
+from .certificates.held_estimate import held_assumptions as held_assumptions
 from .scheduling.angle_form import Minimal, PaperForm, StateForm
 from .scheduling.measured_angle import observe
 from .scheduling.scheduled import ErrorStability, ObserverDesign, design_observer_with_details

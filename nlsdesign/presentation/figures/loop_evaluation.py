@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...feedback.control import LoopEvaluation
 from ...feedback.control.evaluation.margins import CoupledStability, LoopMargins, OutputImpedance
 from ...feedback.control.evaluation.onset import SaturationLine
 from ...feedback.control.evaluation.responses import SineResponse
+from ...foundation.text_files import make_folder
 from .style import (
     DASHES,
     HOLDS,
@@ -25,6 +28,7 @@ from .style import (
     significant,
     styled,
 )
+from .svg import write_figures
 
 
 @styled
@@ -194,3 +198,23 @@ def _response_words(label: str, response: SineResponse, lost: Sequence[float]) -
     low, high = (significant(float(end(response.decibel[good]))) for end in (np.min, np.max))
     tail = f"; does not settle at {len(lost)} frequencies" if lost else ""
     return f"{label}: {low} to {high} dB{tail}."
+
+
+def write_loop_figures(result: LoopEvaluation, folder: Path) -> list[Path]:
+    """Write what is drawn of an evaluated torque loop as SVG files.
+
+    Parameters
+    ----------
+    result
+        Of the evaluation.
+    folder
+        Is made where it does not exist.
+    """
+    make_folder(folder)
+    drawn = {
+        "responses": torque_responses(result.responses, result.line),
+        "impedance": impedance_over_frequency(result.impedance),
+        "margins": margins_over_angle(result.margins),
+        "coupled_stability": coupled_stability_map(result.coupled),
+    }
+    return write_figures(folder, drawn)

@@ -1,8 +1,15 @@
 """Reports: sections composed into one self-contained file of HTML."""
 
-from .command_pages import write_analysis_report, write_fit_report, write_observer_report
+from .command_pages import SIZES as SIZES
+from .command_pages import (
+    write_analysis_report,
+    write_diagnosis_report,
+    write_fit_report,
+    write_observer_report,
+    write_simulation_report,
+)
 from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
-from .diagnosis_sections import regeneration_sections, verdict_sections
+from .diagnosis_sections import verdict_sections
 from .equations_section import EquationsSection
 from .page import write_report
 from .sections import (
@@ -46,13 +53,14 @@ __all__ = [
     "differing_numbers",
     "key_figures",
     "numbers_table",
-    "regeneration_sections",
     "tolerance_sections",
     "verdict_sections",
     "write_analysis_report",
     "write_comparison",
     "write_design_report",
+    "write_diagnosis_report",
     "write_fit_report",
     "write_observer_report",
     "write_report",
+    "write_simulation_report",
 ]

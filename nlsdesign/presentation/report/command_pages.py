@@ -1,26 +1,31 @@
-"""Reports that commands write beside their files: a fit, an analysis over the angle, errors of observers."""
+"""Reports that commands write beside their files: fit, diagnosis, run, analysis over the angle, observer."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...bench.discrepancy.reporting.refit import Refit
+from ...bench.discrepancy.reporting.verdict import Verdict
 from ...feedback.analysis import Chart, RankDrops, SensorRanking
 from ...feedback.observer import SpreadErrors
 from ...foundation.quantity import three_digits, typeset_unit
 from ...foundation.written_numbers import prefixed, shared_prefix, without_power
 from ...model import FlatModel
+from ...simulation import Trace, signal_sizes
 from ..figures import (
     RecordError,
     errors_over_spread,
     gap_bars,
     observability_over_angle,
+    run_over_time,
     stability_over_angle,
+    write_figures,
 )
-from .diagnosis_sections import ROLES, fitted_table
+from .diagnosis_sections import ROLES, fitted_table, regeneration_sections, verdict_sections
 from .page import write_report
 from .sections import (
     FigureSection,
@@ -31,6 +36,9 @@ from .sections import (
     TableSection,
     TextSection,
 )
+
+if TYPE_CHECKING:
+    from ...regeneration import Regeneration
 
 
 def write_fit_report(path: Path, result: Refit, *, facts: Mapping[str, str], files: Sequence[Path]) -> Path:
@@ -46,11 +54,6 @@ def write_fit_report(path: Path, result: Refit, *, facts: Mapping[str, str], fil
         Short texts by name, for instance deck and records.
     files
         Written beside the report.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
@@ -116,11 +119,6 @@ def write_analysis_report(
     files
         Written beside the report.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     ExportError
@@ -178,11 +176,6 @@ def write_observer_report(
     files
         Written beside the report.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     ExportError
@@ -229,3 +222,95 @@ def _files(files: Sequence[Path]) -> FileSection:
              ".h": "C99, interface", ".fmu": "co-simulation FMU"}  # fmt: skip
     named = {each: kinds.get(each.suffix, "file") for each in files}
     return FileSection("Files", named, caption="Written beside this report.")
+
+
+def write_diagnosis_report(
+    path: Path,
+    verdict: Verdict,
+    *,
+    facts: Mapping[str, str],
+    regenerated: tuple[Regeneration, Mapping[Path, str]] | None = None,
+) -> Path:
+    """Write the report on a diagnosis.
+
+    Parameters
+    ----------
+    path
+        File to write, ending in ``.html``.
+    verdict
+        Of the diagnosis.
+    facts
+        Short texts by name, for instance deck and records.
+    regenerated
+        The observer of the better model and its files, where one was designed.
+
+    Raises
+    ------
+    ExportError
+        If the file cannot be written.
+    """
+    chapter = regeneration_sections(*regenerated) if regenerated else []
+    title = f"{verdict.declared.name}: what is missing"
+    return write_report(path, *verdict_sections(verdict), *chapter, title=title, facts=facts)
+
+
+SIZES = ("signal", "smallest", "largest", "rms", "at the end", "unit")
+"""Heads of the table of the sizes of signals."""
+
+
+def write_simulation_report(
+    path: Path,
+    model: FlatModel,
+    run: Trace,
+    signals: Sequence[str],
+    *,
+    facts: Mapping[str, str],
+    warnings: Sequence[str] = (),
+) -> list[Path]:
+    """Write the picture of a run and a page with it; the table of the run stands beside them.
+
+    Parameters
+    ----------
+    path
+        Table of the run; picture and page differ in their ending.
+    model
+        That was simulated.
+    run
+        All signals.
+    signals
+        What is drawn and listed.
+    facts
+        Short texts by name, for instance the deck.
+    warnings
+        Of laws that leave their range and limits that are reached.
+
+    Returns
+    -------
+    list of Path
+        Picture and page.
+
+    Raises
+    ------
+    ExportError
+        If a file cannot be written.
+    """
+    picture = run_over_time(run, signals)
+    (file,) = write_figures(path.parent, {path.stem: picture})
+    sizes: list[tuple[str | float, ...]] = [
+        (n, *signal_sizes(run[n]).values(), typeset_unit(run.units[n])) for n in signals
+    ]
+    sections: list[Section] = [
+        TextSection("Warnings", "\n\n".join(warnings) or "No law leaves its range, no limit is reached."),
+        FigureSection("Signals over time", picture, caption="Signals of one unit share a panel."),
+        TableSection("Sizes", SIZES, tuple(sizes), caption="Over the whole run."),
+    ]
+    if run.events:
+        rows = tuple((f"{event.time:.6g}", event.name, event.what) for event in run.events)
+        caption = "What sticks, slides, strikes or switches, and when."
+        sections.append(
+            TableSection("Events", ("time in s", "part", "what"), rows, caption=caption, folded=True)
+        )
+    files = {path: "all rows", file: "the picture"}
+    sections.append(FileSection("Files", files, caption="Written beside this page."))
+    title = f"{model.name}: simulation"
+    return [file, write_report(path.with_suffix(".html"), *sections, title=title, facts=facts)]

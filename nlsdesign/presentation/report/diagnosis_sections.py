@@ -396,15 +396,7 @@ def _list(heading: str, column: str, texts: Sequence[str], caption: str) -> list
 
 
 def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> list[Section]:
-    """Return the chapter on the observer: torque error before and after, and the files.
-
-    Parameters
-    ----------
-    result
-        From :func:`nlsdesign.regeneration.regenerate`.
-    files
-        What was written, by path.
-    """
+    """Return the chapter on the observer: torque error before and after, and the files."""
     sections: list[Section] = [
         Chapter(
             "Observer from the better model",

@@ -10,11 +10,21 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from nlsdesign.cli.analyse_loop import _loops, loop
-from nlsdesign.feedback.control import LoopVerdict, only_side, sine_response
+from nlsdesign.cli.analyse import loop
+from nlsdesign.components import declare, with_moved_load
+from nlsdesign.feedback.control import ClosedLoop, LoopVerdict, cascade_loops, only_side, sine_response
 from nlsdesign.feedback.control.evaluation.whole_evaluation import stretches
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import flatten
 
 FINGER = str(Path(__file__).parents[3] / "models" / "templates" / "one-sided-finger.toml")
+
+
+def loops(deck: str) -> tuple[ClosedLoop, ClosedLoop]:
+    machine = declare(load_deck(deck))
+    return cascade_loops(
+        flatten(machine), flatten(with_moved_load(machine)), delay=1, sample_time=1e-3, gains=None
+    )
 
 
 def run(out: Path, *options: str) -> tuple[int, dict]:
@@ -88,7 +98,7 @@ def test_bad_input_writes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_spring_of_one_sign_is_swung_about_a_bias_and_silence_is_no_answer() -> None:
-    fixed, _ = _loops(FINGER, {"gains": None}, 1, 1e-3)
+    fixed, _ = loops(FINGER)
     side = only_side(fixed.plant)
     assert abs(side) == 1.0
     size, at = 0.02, [5.0]
@@ -101,7 +111,7 @@ def test_a_spring_of_one_sign_is_swung_about_a_bias_and_silence_is_no_answer() -
 
 
 def test_a_spring_of_both_signs_needs_no_bias() -> None:
-    fixed, _ = _loops("austin2015_soft_spring", {"gains": None}, 1, 1e-3)
+    fixed, _ = loops("austin2015_soft_spring")
     assert only_side(fixed.plant) == 0.0
 
 

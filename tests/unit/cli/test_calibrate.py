@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from nlsdesign.cli.calibrate import calibrate
+from nlsdesign.cli.bench import calibrate
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError
 from tests.calibrated import LINEAR, recorded

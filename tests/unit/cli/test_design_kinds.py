@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nlsdesign.cli.design_kinds import KINDS, design_kinds
+from nlsdesign.cli.design import KINDS, design_kinds
 
 
 @pytest.mark.parametrize("what", KINDS)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.cli.main import main
-from nlsdesign.cli.units import Bytes, parse_number
+from nlsdesign.cli.typed_values import Bytes, parse_number
 from nlsdesign.export import export_fmu
 from nlsdesign.export.c.guarded_step import GuardedModel
 from nlsdesign.foundation.errors import UnitError

@@ -8,7 +8,7 @@ import click
 import pytest
 
 from nlsdesign.cli.main import program
-from nlsdesign.cli.named_paths import NamedPath
+from nlsdesign.cli.typed_values import NamedPath
 from tests.command_line import Run, run
 from tests.unit.cli.test_command_tree import tree
 

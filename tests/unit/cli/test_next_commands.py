@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli.fit import _as_read
+from nlsdesign.cli.bench import as_read
 from nlsdesign.foundation.command_words import typed_command
 from tests.command_line import Run, run
 
@@ -36,11 +36,11 @@ def test_packages_of_this_run_are_those_of_the_next(run: Run) -> None:
 
 
 def test_records_are_read_again_as_they_were() -> None:
-    assert _as_read(Path("columns of bench.toml"), ("last*", "x")) == [
+    assert as_read(Path("columns of bench.toml"), ("last*", "x")) == [
         *("--hold-out", "last*", "--hold-out", "x"),
         *("--mapping", "columns of bench.toml"),
     ]
-    assert _as_read(None, ()) == []
+    assert as_read(None, ()) == []
 
 
 def test_windows_takes_double_quotes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.bench.identification.records.table_files import table_files
-from nlsdesign.cli.driving_signals import read_driving_signal
-from nlsdesign.cli.units import parse_number
+from nlsdesign.cli.typed_signals import read_driving_signal
+from nlsdesign.cli.typed_values import parse_number
 from nlsdesign.components.core.part_numbers import ParameterInfo
 from nlsdesign.design.curves.target_files import read_target
 from nlsdesign.foundation.errors import MeasurementError, NlsError, ValueRangeError

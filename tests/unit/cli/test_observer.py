@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli.observer_kinds import KINDS
+from nlsdesign.cli.options import KINDS
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.feedback.observer import choose_observer, designed_observer
 from nlsdesign.feedback.observer.spread import choice

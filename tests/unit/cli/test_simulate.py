@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nlsdesign.cli.driving_signals import StepAt, read_driving_signal
+from nlsdesign.cli.typed_signals import read_driving_signal
 from nlsdesign.foundation.errors import NlsError
-from nlsdesign.simulation import Sine
+from nlsdesign.simulation import Sine, StepAt
 from tests.command_line import Run, run
 
 __all__ = ["run"]

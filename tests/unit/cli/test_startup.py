@@ -51,6 +51,15 @@ def test_the_program_itself_loads_no_library(loaded: Loaded, option: str) -> Non
     assert not modules & HEAVY
 
 
+@pytest.mark.parametrize("words", [("study", "list"), ("deck", "list")], ids=" ".join)
+def test_a_list_of_what_comes_with_the_project_loads_no_library(
+    loaded: Loaded, words: tuple[str, ...]
+) -> None:
+    modules, shown = loaded(COMMAND.format(words=words))
+    assert "austin2015" in shown
+    assert not modules & HEAVY
+
+
 def test_help_of_every_command_loads_no_library(loaded: Loaded) -> None:
     asked = commands()
     assert {("deck", "check"), ("export", "fmu"), ("study", "run"), ("diagnose",)} <= set(asked)
@@ -80,8 +89,8 @@ def test_completion_in_the_shell_loads_no_library(loaded: Loaded) -> None:
 NOT_NEEDED = {
     ("deck", "check", DECK): {"sympy", "control", "matplotlib", "fmpy", "rich", "jinja2"},
     ("deck", "show", DECK): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
-    ("parts",): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
-    ("materials",): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
+    ("parts",): {"scipy", "sympy", "control", "matplotlib", "fmpy", "jinja2"},
+    ("materials",): {"scipy", "sympy", "control", "matplotlib", "fmpy", "jinja2"},
     ("analyse", "--deck", DECK, "--count", "2", "--out", "out"): {"sympy", "control", "fmpy"},
 }
 

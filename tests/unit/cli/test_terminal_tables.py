@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli.output import show_table
-from nlsdesign.cli.terminal_tables import head_count, table_lines
+from nlsdesign.cli.output import head_count, show_table, table_lines
 
 WORDS = ("rms", "condition", "N·m", "spring.rubber.relaxing", "0.25", "assumed:", "two", "at", "42", "±", "5")
 

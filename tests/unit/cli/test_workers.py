@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from nlsdesign.cli.main import program
-from nlsdesign.cli.workers import workers_option
+from nlsdesign.cli.options import workers_option
 from nlsdesign.foundation.work_sharing import Processes, parallel_map, spread_over
 
 linux = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="processes are forked on Linux only")

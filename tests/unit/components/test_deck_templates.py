@@ -12,7 +12,6 @@ from click.testing import CliRunner
 
 from nlsdesign.cli import deck_new
 from nlsdesign.cli.main import program
-from nlsdesign.cli.readiness import readiness
 from nlsdesign.components import Specimen
 from nlsdesign.components.assembly.deck_reader import component_classes
 from nlsdesign.components.assembly.deck_remarks import deck_remarks
@@ -25,6 +24,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck, read_deck, template_names
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.foundation.spread import RelativeSpread
+from nlsdesign.regeneration import readiness
 from tests.command_line import Run
 from tests.command_line import run as run
 
@@ -50,7 +50,7 @@ def test_a_template_is_ready_for_each_command_that_it_names_and_holds_no_slip(
     claimed = load_template(name).ready_for
     assert [str(commands[each].reason) for each in claimed if not commands[each].ready] == []
     assert claimed == tuple(name for name, each in commands.items() if each.ready), "and no other"
-    shown = ", ".join(each.shown for each in commands.values() if each.ready)
+    shown = ", ".join(deck_new.shown_command(each.command) for each in commands.values() if each.ready)
     assert f"ready for {shown}\n" in out
     assert f"ready for: {shown}\n" in run("deck", "check", "own.toml")[1]
     assert deck_remarks(machine) == []

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli.readiness import readiness
 from nlsdesign.components.assembly.deck_remarks import deck_remarks
 from nlsdesign.components.assembly.deck_template import load_template
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import Deck, deck_names, load_deck, read_deck, template_names
 from nlsdesign.foundation.errors import DeckError
+from nlsdesign.regeneration import readiness
 from tests.command_line import Run
 from tests.command_line import run as run
 

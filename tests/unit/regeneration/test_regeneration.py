@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign import regeneration
+from nlsdesign import export
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.bench.identification.parameters import declared_parameter
@@ -19,7 +19,14 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.presentation import report
-from nlsdesign.regeneration import ObserverChoice, Regeneration, regenerate, write_regeneration
+from nlsdesign.presentation.report.diagnosis_sections import regeneration_sections
+from nlsdesign.regeneration import (
+    ObserverChoice,
+    Regeneration,
+    regenerate,
+    regenerated_observer,
+    write_regeneration,
+)
 from nlsdesign.simulation import Trace
 
 TIME = np.arange(1500) * 0.002
@@ -64,7 +71,7 @@ CHOICE = ObserverChoice(sample_time=2e-3)
 @pytest.fixture(scope="module")
 def result() -> Regeneration:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(regeneration, "DRAWS", 3)
+        patch.setattr(regenerated_observer, "DRAWS", 3)
         better = flatten(machine(TRUE))
         parameter = declared_parameter(better.variable("spring.stiffness"))
         fit = Fit((parameter,), {"spring.stiffness": TRUE}, np.array([[1e-6]]), 0.0, {}, True)
@@ -96,7 +103,7 @@ def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Pat
     assert (len(result.observer.states) > 20) == generated.startswith("Generated is the corrected")
     written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert written["nominal"]["before"] == result.nominal[0]
-    page = report.write_report(tmp_path / "r.html", *report.regeneration_sections(result, {}), title="t")
+    page = report.write_report(tmp_path / "r.html", *regeneration_sections(result, {}), title="t")
     assert nominal.partition(": ")[2].removesuffix(".") in page.read_text(encoding="utf-8")
 
 
@@ -112,7 +119,7 @@ def with_records(*records: tuple[str, float]) -> RecordSet:
 
 def test_held_out_records_decide_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """On the selection the better model is right; the record held out is of the declared machine."""
-    monkeypatch.setattr(regeneration, "DRAWS", 1)
+    monkeypatch.setattr(regenerated_observer, "DRAWS", 1)
     records = with_records(("fit", TRUE), ("selection", TRUE), ("held_out", DECLARED))
     declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
     found = regenerate(declared, better, records, choice=CHOICE)
@@ -124,7 +131,7 @@ def test_held_out_records_decide_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_an_observer_that_would_be_worse_replaces_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(regeneration, "DRAWS", 1)
+    monkeypatch.setattr(regenerated_observer, "DRAWS", 1)
     records = with_records(("fit", TRUE), ("selection", DECLARED), ("held_out", TRUE))
     declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
     found = regenerate(declared, better, records, choice=CHOICE)
@@ -137,10 +144,12 @@ def test_an_observer_that_would_be_worse_replaces_nothing(monkeypatch: pytest.Mo
 def test_observer_and_plant_are_written(
     result: Regeneration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(regeneration, "export_fmu", lambda model, path: path)
-    files, reasons = write_regeneration(result, tmp_path)
+    monkeypatch.setattr(export, "export_fmu", lambda model, path: path)
+    written, files = write_regeneration(result, tmp_path)
     assert {p.name for p in files} >= {"observer.c", "observer.h", "observer.fmu", "plant.fmu"}
-    assert reasons == ()
+    assert written.reasons == ()
+    saved = json.loads((tmp_path / "regeneration.json").read_text(encoding="utf-8"))
+    assert saved["files"] == [str(path) for path in files]
     assert (tmp_path / "c" / "observer.c").is_file()
 
 
@@ -152,7 +161,7 @@ def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:
     assert "spring" in lacking.reasons[0]
     assert lacking.words() == ()
     assert math.isnan(lacking.nominal[0])
-    assert report.regeneration_sections(lacking, {})
+    assert regeneration_sections(lacking, {})
 
 
 def test_without_a_measured_torque_there_is_an_observer_but_no_error() -> None:

@@ -61,13 +61,7 @@ class DiagnosisRun:
 
 
 def records_of_run(records: RecordSet) -> tuple[RecordOfRun, ...]:
-    """Return what there is to say of records.
-
-    Parameters
-    ----------
-    records
-        As read.
-    """
+    """Return what there is to say of records."""
     return tuple(
         RecordOfRun(
             each.name,

@@ -70,19 +70,6 @@ _DECLARED = "; declared: "
 def with_records_named(assembly: Assembly, folder: str, names: Sequence[str], *, day: str) -> Assembly:
     """Return a copy whose fitted numbers name in their source the records that they were fitted to.
 
-    Parameters
-    ----------
-    assembly
-        With numbers that a fit or a diagnosis has marked as fitted.
-    folder
-        Of the records.
-    names
-        Of the records that were fitted to.
-    day
-        Of the fit, ISO 8601.
-
-    Examples
-    --------
     A number that was fitted in March and again in April is then, for instance, from
     ``fitted to bench records sine_2Hz, hold in bench/april, 2026-04-20; declared: data sheet``.
     """

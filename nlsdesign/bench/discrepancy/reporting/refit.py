@@ -35,7 +35,7 @@ from ..selection.hypothesis import Hypothesis
 from ..tearing import blocks_of
 from .advice import more_excitation
 from .fitted_numbers import FittedNumber as FittedNumber
-from .fitted_numbers import fitted_numbers
+from .fitted_numbers import fitted_numbers, with_records_named
 from .verdict import RecordGap, gaps_of
 
 _PHASES = 4
@@ -269,6 +269,12 @@ def refit(
     gaps = gaps_of(Hypothesis(actuator), fitted, comparison)
     better = derived(sourced(fitted), actuator, "refitted")
     return Refit(better, fits, numbers, (*gaps, *window_errors), findings)
+
+
+def refit_of_run(result: Refit, records: RecordSet, *, folder: str, day: str) -> Refit:
+    """Return a fit whose numbers name in their source the records that they were fitted to."""
+    names = [record.name for record in records.of("fit")]
+    return replace(result, actuator=with_records_named(result.actuator, folder, names, day=day))
 
 
 def sourced(hypothesis: Hypothesis) -> Assembly:

@@ -1,12 +1,17 @@
-"""Tables of a verdict as data frames."""
+"""What is made of a verdict after the diagnosis: with its circumstances, in sentences, as data frames."""
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from ....foundation.data_frames import Axis, data_frame
-from .fitted_numbers import FittedNumber, fitted_numbers
+from ....foundation.errors import NlsError
+from ....foundation.locations import version
+from ...identification.records.measurement import RecordSet
+from ..block_prediction import ranges_left
+from .circumstances import DiagnosisRun, records_of_run
+from .fitted_numbers import FittedNumber, fitted_numbers, with_records_named
 from .verdict import RecordGap, Verdict
 
 
@@ -47,3 +52,26 @@ def verdict_frames(verdict: Verdict) -> dict[str, Any]:
             over, units=dict.fromkeys(over, course.unit), index=Axis("time", "s", course.time)
         ),
     }
+
+
+def verdict_of_run(
+    verdict: Verdict, records: RecordSet, *, deck: str, folder: str, command: str, date: str
+) -> Verdict:
+    """Return a diagnosis that says under which circumstances it was made, also in its better model.
+
+    Deck and folder of records as given, the command that repeats it, day and time as ISO 8601.
+    """
+    names = [record.name for record in records.of("fit")]
+    run = DiagnosisRun(deck, folder, date, command, version(), records_of_run(records))
+    better = with_records_named(verdict.actuator, folder, names, day=date[:10])
+    return replace(verdict, run=run, actuator=better)
+
+
+def range_findings(verdict: Verdict, records: RecordSet) -> list[str]:
+    """Return in sentences which laws of the better model the records take out of their stated range."""
+    try:
+        left_ranges = ranges_left(verdict.actuator, records)
+    except NlsError:  # the verdict stands, and says itself what cannot be simulated
+        return []
+    step = "take a law that is stated to hold so far, or leave such motions out of the records"
+    return [f"record {name}: {warning} -> {step}" for name, warning in left_ranges]

@@ -66,29 +66,35 @@ def default_mapping(
 
 
 def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str) -> str | None:
-    everything = {v.name: v for v in model.states + model.inputs + model.signals}
     if unit is None:
         raise MeasurementError(
             f"{file}: column '{head}'",
             "names no unit",
             next_step="write for instance 'force_N', or map it in records.toml",
         )
-    if name in everything:
-        return name
-    for group in ([everything[r.signal] for r in model.readings], list(model.inputs)):
-        fitting = _last_of_chains(model, [v.name for v in group if same_dimension(v.unit, unit)])
-        if len(fitting) == 1:
-            return fitting[0]
-        if fitting:
-            break
+    fitting = signals_for(name, unit, model)
+    if len(fitting) == 1:
+        return fitting[0]
     raise MeasurementError(
         f"{file}: column '{head}'",
         f"could be {' or '.join(fitting)}"
         if fitting
         else f"no sensor of the model reads in {typeset_unit(unit)}",
-        next_step="write a records.toml that maps each column to its signal"
+        next_step="write a records.toml that maps each column to its signal, see 'nlsdesign records'"
         + ("" if fitting else ", or give the deck of the rig that was measured"),
     )
+
+
+def signals_for(name: str, unit: str, model: FlatModel) -> tuple[str, ...]:
+    """Return the signals that a column may hold: that of its name, else readings, else inputs in its unit."""
+    everything = {v.name: v for v in model.states + model.inputs + model.signals}
+    if name in everything:
+        return (name,)
+    for group in ([everything[r.signal] for r in model.readings], list(model.inputs)):
+        fitting = _last_of_chains(model, [v.name for v in group if same_dimension(v.unit, unit)])
+        if fitting:
+            return tuple(fitting)
+    return ()
 
 
 def _last_of_chains(model: FlatModel, signals: Sequence[str]) -> list[str]:

@@ -467,8 +467,7 @@ def held_drive(
     """Return torques that are approached smoothly and then held, as drives of many runs.
 
     The last twentieth comes as a step: a loop that only dry friction keeps quiet is woken by it. A kick is
-    wanted
-    besides for the 10 ms after the step: some loops limit-cycle after a blow alone.
+    wanted besides for the 10 ms after the step.
     """
 
     def drives(time: Array, runs: Indices) -> dict[str, Array | float]:

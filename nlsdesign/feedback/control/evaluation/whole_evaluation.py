@@ -16,10 +16,14 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.text_files import write_table
-from ....model.roles import motor_of
+from ....model import FlatModel
+from ....model.roles import measured_motion, motor_of, series_spring
+from ....model.transform import with_outputs
 from ....simulation.buffered import Translate, as_it_is
-from ..closed_loop import ClosedLoop
+from ...observer import CascadeGain, design_observer
+from ..closed_loop import ClosedLoop, encoder_loop
 from ..laws.known_drive import largest_torque, only_side
+from ..laws.torque_loop import torque_controller
 from .loop_verdict import LoopVerdict
 from .margins import (
     CoupledStability,
@@ -263,6 +267,34 @@ def evaluate_loop(
         responses, held, onsets, line, margins, output_impedance(moved, angles[::5]), coupled, zero,
         torque_resolution(fixed, angles), spread_margins(fixed, gain, last=last, translate=translate),
     )  # fmt: skip
+
+
+def cascade_loops(
+    fixed: FlatModel, moved: FlatModel, *, delay: int, sample_time: float, **law: Any
+) -> tuple[ClosedLoop, ClosedLoop]:
+    """Return the torque loop with its load fixed and with it moved; one observer and controller for both.
+
+    Parameters
+    ----------
+    fixed, moved
+        The machine as declared, and with the motion of its load prescribed.
+    delay
+        Samples between a current's computation and its effect.
+    sample_time
+        In s.
+    **law
+        As for :func:`~nlsdesign.feedback.control.torque_controller`: law, gains, velocity.
+    """
+    plants = [with_outputs(m, [measured_motion(m), series_spring(m).effort]) for m in (fixed, moved)]
+    # What an adaptive observer has learned depends on what went before, so a loop with it has no one figure.
+    observer = design_observer(plants[0], sample_time=sample_time, gain=CascadeGain())
+    controller = torque_controller(plants[0], sample_time=sample_time, **law)
+    substeps = max(1, round(10 * sample_time / 1e-3))
+    first, second = (
+        encoder_loop(plant, observer=observer, controller=controller, delay=delay, substeps=substeps)
+        for plant in plants
+    )
+    return first, second
 
 
 def json_number(value: float) -> float | str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nlsdesign.bench.discrepancy import with_records_named
+from nlsdesign.bench.discrepancy.reporting.fitted_numbers import with_records_named
 from nlsdesign.components import Inertia, assembly
 from nlsdesign.foundation.quantity import quantity
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.cli.range_remarks import range_remarks
 from nlsdesign.components.assembly.deck_template import load_template
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.feedback.analysis import ranges_at_rest
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.model import flatten
+from nlsdesign.regeneration import range_remarks
 from tests.command_line import Run
 from tests.command_line import run as run
 

@@ -1,0 +1,270 @@
+"""What a folder of records holds, as far as files and deck tell, and a mapping to begin with."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ....foundation.arrays import Array
+from ....foundation.errors import NlsError
+from ....foundation.quantity import parse_unit, same_dimension
+from ....foundation.written_numbers import name_and_unit
+from ....model import FlatModel
+from ..residuals import noise_of, quantum_of
+from .column_heads import signals_for, times_among, times_without_unit
+from .mapping import Inputs
+from .measurement import RecordSet, load_records
+from .quality import GAP
+from .table_files import RecordTable, read_table, table_files
+
+_LONGEST_STEP = 0.5
+"""Samples further apart than this, in the numbers of a clock without unit, are taken for milliseconds."""
+
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class DescribedColumn:
+    """One column, by its head, in the file that has the most of them.
+
+    Parameters
+    ----------
+    head, unit
+        As in the file; the unit is empty where the head has none.
+    signals
+        What it may hold; one name where that is certain, none where the deck reads nothing in this unit.
+    clock
+        Head of its time; empty for the clock of most columns.
+    noise, quantum
+        Standard deviation of the white noise and smallest step between two values, in the unit of the file.
+    smallest, largest
+        Ends of its values, in the unit of the file.
+    drives
+        Whether it is an input of the model, or the reading of one.
+    """
+
+    head: str
+    unit: str
+    signals: tuple[str, ...]
+    clock: str
+    noise: float
+    quantum: float
+    smallest: float
+    largest: float
+    drives: bool
+
+
+@dataclass(frozen=True)
+class DescribedFile:
+    """One file.
+
+    Parameters
+    ----------
+    name
+        Of the file.
+    rows
+        Of numbers on the clock of most columns.
+    seconds, rate
+        Length in s and usual samples a second; nan without a clock.
+    gaps
+        Number of steps of the clock longer than 1.5 usual ones.
+    problem
+        Why it cannot be read; empty where it can.
+    """
+
+    name: str
+    rows: int
+    seconds: float
+    rate: float
+    gaps: int
+    problem: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordsDescription:
+    """What a folder of records holds.
+
+    Parameters
+    ----------
+    time, time_unit
+        Head and unit of the clock; the head is empty where none was found.
+    time_is_guessed
+        Whether the unit of the clock is none that the head gives.
+    files, columns
+        What was found.
+    records
+        As :func:`~.measurement.load_records` reads them with this mapping; ``None`` where it cannot.
+    problem
+        Why it cannot; empty where it can.
+    """
+
+    time: str
+    time_unit: str
+    time_is_guessed: bool
+    files: tuple[DescribedFile, ...]
+    columns: tuple[DescribedColumn, ...]
+    records: RecordSet | None = None
+    problem: str = ""
+
+    @property
+    def clocks(self) -> tuple[str, ...]:
+        """Heads of further clocks."""
+        return tuple(dict.fromkeys(c.clock for c in self.columns if c.clock))
+
+    @property
+    def undecided(self) -> tuple[DescribedColumn, ...]:
+        """Columns of which neither head nor deck tell the one signal that they hold."""
+        claims = [column.signals for column in self.columns]
+        return tuple(
+            c for c in self.columns if not c.unit or len(c.signals) != 1 or claims.count(c.signals) > 1
+        )
+
+    def mapping(self) -> str:
+        """Return a ``records.toml`` to begin with; what is not certain is a comment."""
+        lines = [
+            "# What the heads and the deck tell. Lines that begin with # are choices that are left to you."
+        ]
+        if self.records is not None:
+            held = [r.name for r in self.records.records if r.role == "held_out"]
+            lines += [f"# held_out = {json.dumps(held, ensure_ascii=False)}    # the default"]
+        if self.clocks:
+            slowest = min((f.rate for f in self.files if f.rate > 0.0), default=500.0)
+            lines += [f"resample_Hz = {slowest:.4g}    # one clock for all columns"]
+        unit = f"unit = {_quoted(self.time_unit)}"
+        guessed = "    # guessed from the steps: correct it" if self.time_is_guessed else ""
+        lines += ["", "[time]", f"column = {_quoted(self.time or 't_s')}", unit + guessed]
+        for column in self.columns:
+            lines += ["", *self._table(column)]
+        return "\n".join(lines) + "\n"
+
+    def _table(self, column: DescribedColumn) -> list[str]:
+        certain = column not in self.undecided
+        mark = "" if certain else "# "
+        choices = " or ".join(column.signals) or "no sensor of the deck reads in its unit"
+        lines = (
+            [] if certain else [f"# '{column.head}': {choices if column.unit else 'its head names no unit'}"]
+        )
+        signal = _quoted(column.signals[0] if column.signals else "")
+        lines += [f"{mark}[columns.{_quoted(column.head)}]", f"{mark}signal = {signal}"]
+        lines += [f"{mark}unit = {_quoted(column.unit)}"]
+        lines += [f"{mark}time = {_quoted(column.clock)}"] if column.clock else []
+        lines += [f"# noise = {column.noise:.3g}    # as estimated", f"# quantum = {column.quantum:.4g}"]
+        ways = '# between_samples = "held"    # "held", "held_before", "averaged" or "sampled"'
+        return [*lines, ways] if column.drives else lines
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def describe_records(folder: Path, model: FlatModel) -> RecordsDescription:
+    """Look at the files of a folder and tell what they hold, without refusing what is not clear.
+
+    Parameters
+    ----------
+    folder
+        Of records, as for :func:`~.measurement.load_records`; a ``records.toml`` in it is not read.
+    model
+        Whose signals may have been measured.
+
+    Returns
+    -------
+    RecordsDescription
+        Its ``mapping()`` is a ``records.toml``.
+
+    Raises
+    ------
+    MeasurementError
+        If the folder does not exist or holds no table.
+    """
+    tables: dict[str, RecordTable] = {}
+    problems: dict[str, str] = {}
+    for file in table_files(Path(folder)):
+        try:
+            tables[file.name] = read_table(file)
+        except NlsError as error:
+            problems[file.name] = str(error)
+    whole = max(tables.values(), key=lambda table: len(table.heads), default=RecordTable("", {}))
+    time, unit, guessed = _clock(whole)
+    files = [_described(name, table, time, unit) for name, table in tables.items()]
+    files += [DescribedFile(name, 0, np.nan, np.nan, 0, text) for name, text in problems.items()]
+    description = RecordsDescription(
+        time, unit, guessed, tuple(sorted(files, key=lambda f: f.name)), tuple(_columns(whole, time, model))
+    )
+    records, problem = _tried(Path(folder), model, description)
+    return RecordsDescription(time, unit, guessed, description.files, description.columns, records, problem)
+
+
+def _clock(table: RecordTable) -> tuple[str, str, bool]:
+    """Return head and unit of the clock of a table, and whether the unit is guessed from the steps."""
+    for head in table.heads:
+        unit = table.units.get(head)
+        if unit and same_dimension(unit, "s"):
+            return head, unit, False
+    named = times_among(table.heads)
+    if named:
+        return (*named[0], False)
+    for head in times_without_unit(table.heads):
+        step = float(np.median(np.diff(table.given[head])))
+        return head, "ms" if step > _LONGEST_STEP else "s", True
+    return "", "s", True
+
+
+def _described(name: str, table: RecordTable, time: str, unit: str) -> DescribedFile:
+    if time not in table.given:
+        return DescribedFile(name, 0, np.nan, np.nan, 0, f"has no column '{time}'" if time else "has no time")
+    clock = table.given[time] * parse_unit(unit).factor
+    steps = np.diff(clock)
+    usual = float(np.median(steps))
+    if usual <= 0.0:
+        return DescribedFile(name, len(clock), np.nan, np.nan, 0, f"its time '{time}' does not ascend")
+    gaps = int(np.sum(steps > GAP * usual))
+    return DescribedFile(name, len(clock), float(clock[-1] - clock[0]), 1.0 / usual, gaps)
+
+
+def _columns(table: RecordTable, time: str, model: FlatModel) -> list[DescribedColumn]:
+    """Return the columns that are no clocks; each belongs to the last clock before it of its own length."""
+    given = Inputs.of(model)
+    inputs = given.commanded | given.shown
+    clocks = [head for head in table.heads if _is_clock(head, table)] or [time]
+    result = []
+    for place, head in enumerate(table.heads):
+        if head in clocks or head == time:
+            continue
+        values = table.given[head]
+        name, unit = name_and_unit(head)
+        unit = unit or table.units.get(head, "")
+        same = [c for c in clocks if c in table.given and len(table.given[c]) == len(values)]
+        before = [c for c in same if table.heads.index(c) < place] or same or [time]
+        smallest, largest = (float(f(values)) if len(values) else np.nan for f in (np.min, np.max))
+        signals = signals_for(name, unit, model) if unit else ()
+        clock = "" if before[-1] == time else before[-1]
+        drives = any(signal in inputs for signal in signals)
+        # Rounding of sums is no noise.
+        noise = noise_of(values) if noise_of(values) > _ROUNDING * (largest - smallest) else 0.0
+        result.append(
+            DescribedColumn(head, unit, signals, clock, noise, quantum_of(values), smallest, largest, drives)
+        )
+    return result
+
+
+def _is_clock(head: str, table: RecordTable) -> bool:
+    """Tell whether a column is in a unit of time and ascends throughout."""
+    unit = name_and_unit(head)[1] or table.units.get(head)
+    values: Array = table.given[head]
+    return bool(unit and same_dimension(unit, "s") and len(values) > 1 and np.all(np.diff(values) > 0.0))
+
+
+def _tried(folder: Path, model: FlatModel, description: RecordsDescription) -> tuple[RecordSet | None, str]:
+    """Return the records as they are read with the mapping that was found, or why they cannot be."""
+    with tempfile.TemporaryDirectory() as scratch:
+        mapping = Path(scratch) / "records.toml"
+        mapping.write_text(description.mapping(), encoding="utf-8")
+        try:
+            return load_records(folder, model, mapping=mapping), ""
+        except NlsError as error:
+            return None, str(error)

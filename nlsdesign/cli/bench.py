@@ -1,0 +1,337 @@
+"""``nlsdesign fit``, ``diagnose`` and ``observer calibrate``: what records from the bench say of a deck."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..foundation.command_words import typed_command
+from ..foundation.errors import MeasurementError
+from ..foundation.quantity import typeset_unit, with_error
+from .options import (
+    deck_option,
+    export_option,
+    json_option,
+    measured_option,
+    sample_time_option,
+    spring_option,
+    workers_option,
+)
+from .output import examples, next_command, show_json, show_table, warn
+from .overwriting import c_names, out_option
+from .typed_values import NamedPath, Number
+
+if TYPE_CHECKING:
+    from ..bench.calibration import CalibrationPlan
+    from ..bench.discrepancy import Refit
+
+_PARTS = ("plant", "observer", "controller", "torque_loop")
+"""What --export writes; the library that does it is not loaded for an option."""
+CALIBRATIONS = ("hung_weight", "load_cell", "free_run")
+"""As :data:`nlsdesign.bench.calibration.KINDS`, which is not loaded for an option."""
+
+_mapping = click.option(
+    "--mapping", type=NamedPath(dir_okay=False), default=None, help="TOML that maps columns to signals."
+)
+_hold_out = click.option(
+    "--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable."
+)
+
+
+def _part_files(parts: Sequence[str]) -> list[str]:
+    """Return the names of the files of parts of a machine: an FMU of each, C of those that are sampled."""
+    return [
+        name
+        for part in dict.fromkeys(parts)
+        for name in (f"{part}.fmu", *(f"c/{file}" for file in c_names(part) if part != "plant"))
+    ]
+
+
+@click.command(
+    epilog=examples(
+        "nlsdesign fit --deck my.toml --records bench --out out/fit",
+        "nlsdesign fit --deck my.toml --records bench --hold-out 'last*' --window '1 s' --json",
+    )
+)
+@deck_option
+@click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of records.")
+@_hold_out
+@_mapping
+@click.option("--window", type=Number("s", above=0.0), default=None,
+              help="Simulate the whole model over windows instead, for instance '1 s'.")  # fmt: skip
+@export_option
+@sample_time_option
+@spring_option
+@measured_option
+@out_option(
+    "out/fit",
+    writes=lambda given: [
+        *("fit.json", "model.toml", "report.html"),
+        *_part_files(_PARTS if given["exports"] else ()),
+    ],
+)
+@json_option
+def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
+    """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
+    from ..bench.discrepancy import refit, refit_of_run, write_refit
+    from ..bench.identification import load_records
+    from ..components import declare
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
+    from ..model import flatten
+    from ..presentation.report import write_fit_report
+    from ..regeneration import export_machine
+
+    actuator = declare(load_deck(deck_name))
+    mapping, hold_out = options["mapping"], options["hold_out"]
+    measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
+    steps = Steps()
+    with steps.step("fit"):
+        result = refit(actuator, measured, window=options["window"], progress=steps.note)
+    day = datetime.now().astimezone().date().isoformat()
+    result = refit_of_run(result, measured, folder=str(records), day=day)
+    file, deck = write_refit(result, out)
+    facts = {"deck": f"`{deck_name}`", "records": f"`{records}`"}
+    page = write_fit_report(out / "report.html", result, facts=facts, files=(file, deck))
+    machine = None
+    if options["exports"]:
+        with steps.step("export"):
+            machine = export_machine(flatten(result.actuator), out, **_roles(options))
+    if as_json:
+        exported = {} if machine is None else machine.content()
+        show_json({**result.to_dict(str(deck)), "report": page, **exported})
+        return
+    _show_fit(result)
+    for sentence in machine.findings() if machine else ():
+        click.echo(sentence)
+    click.echo(f"report: {page}")
+    following = next_command("diagnose", "--deck", deck, "--records", records, *as_read(mapping, hold_out))
+    click.echo(f"written: {file} and {deck}; next: {following}")
+
+
+def _show_fit(result: Refit) -> None:
+    numbers = [
+        (
+            n.name,
+            f"{n.declared:.4g}",
+            with_error(n.fitted, n.standard_error),
+            typeset_unit(n.unit),
+            f"{n.strain:+.2f}",
+        )
+        for n in result.numbers
+    ]
+    show_table("Numbers", ("name", "declared", "fitted", "unit", "moved, in spreads"), numbers)
+    errors = [
+        (e.block, e.role.replace("_", " "), *(f"{v:.3g}" for v in e[2:5]), typeset_unit(e.unit))
+        for e in result.errors()
+    ]
+    show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
+    for sentence in result.words():
+        click.echo(sentence)
+
+
+def as_read(mapping: Path | None, hold_out: Sequence[str]) -> list[str]:
+    """Return the options with which another command reads the same records in the same way."""
+    options = [item for name in hold_out for item in ("--hold-out", name)]
+    return options if mapping is None else [*options, "--mapping", str(mapping)]
+
+
+def _roles(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what observer and controller are designed for."""
+    return {name: options[name] for name in ("sample_time", "spring", "measured")}
+
+
+def _diagnosis_files(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for, and of what an earlier diagnosis has left."""
+    parts = [*(["observer"] if given["again"] else []), *(_PARTS if given["exports"] else [])]
+    names = ["verdict.json", "model.toml", "report.html", "next_record.csv", "regeneration.json"]
+    return [*names, *_part_files(parts)]
+
+
+@click.command(
+    epilog=examples(
+        "nlsdesign diagnose --deck my.toml --records bench --out out/diagnosis",
+        "nlsdesign diagnose --deck my.toml --records bench --hold-out 'last*' --regenerate --json",
+    )
+)
+@deck_option
+@click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of CSV files.")
+@_hold_out
+@_mapping
+@click.option(
+    "--regenerate",
+    "again",
+    is_flag=True,
+    help="Design the torque observer again from the better model, write it as C and FMU, and compare it.",
+)
+@export_option
+@click.option("--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
+              help="Of the observer.")  # fmt: skip
+@spring_option
+@measured_option
+@workers_option
+@out_option("out/diagnosis", writes=_diagnosis_files)
+@json_option
+def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
+    """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
+    from ..bench.discrepancy import diagnose as find_what_is_missing
+    from ..bench.discrepancy import range_findings, verdict_of_run, write_verdict
+    from ..bench.identification import load_records
+    from ..components import declare
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
+    from ..model import flatten
+    from ..presentation.report import write_diagnosis_report
+    from ..regeneration import ObserverChoice, export_machine, regenerate, write_regeneration
+
+    command = typed_command("nlsdesign", *sys.argv[1:])
+    date = datetime.now().astimezone().isoformat(" ", "minutes")
+    actuator = declare(load_deck(deck_name))
+    plant, roles = flatten(actuator), _roles(options)
+    measured = load_records(records, plant, mapping=options["mapping"], hold_out=options["hold_out"])
+    steps = Steps()
+    with steps.step("diagnosis"):
+        verdict = find_what_is_missing(actuator, measured, progress=steps.note)
+    verdict = verdict_of_run(
+        verdict, measured, deck=deck_name, folder=str(records), command=command, date=date
+    )
+    write_verdict(verdict, out)
+    page, facts = out / "report.html", {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
+    write_diagnosis_report(page, verdict, facts=facts)
+    remarks = range_findings(verdict, measured)
+    content = {**verdict.to_dict(str(out / "model.toml")), "warnings": remarks}
+    sentences, observer = [str(verdict)], None
+    if options["again"]:
+        # The diagnosis stands in its files already, whatever happens to the observer.
+        with steps.step("observer"):
+            better, choice = flatten(verdict.actuator), ObserverChoice(**roles)
+            result = regenerate(plant, better, measured, fits=verdict.fits, choice=choice)
+            result, files = write_regeneration(result, out)
+            write_diagnosis_report(page, verdict, facts=facts, regenerated=(result, files))
+        observer, names = result.observer, [str(path) for path in files]
+        content["regeneration"] = {**result.to_dict(), "files": names}
+        sentences += [*result.words(), *result.reasons, *([f"written: {', '.join(names)}"] if names else [])]
+    if options["exports"]:
+        with steps.step("export"):
+            machine = export_machine(flatten(verdict.actuator), out, observer=observer, **roles)
+        content |= machine.content()
+        sentences += machine.findings()
+    warn(remarks)
+    if as_json:
+        show_json(content)
+        return
+    if verdict.experiment is not None:
+        sentences.append(f"command of the next record: {out / 'next_record.csv'}")
+    click.echo("\n".join([*sentences, f"report: {page}"]))
+
+
+@click.command(
+    epilog=examples(
+        "nlsdesign observer calibrate --deck austin2015_figure_consistent --plan",
+        "nlsdesign observer calibrate --deck my.toml --kind hung_weight --records bench/weights",
+    )
+)
+@deck_option
+@click.option("--kind", "kinds", multiple=True, type=click.Choice(CALIBRATIONS),
+              help="What was done; repeatable, once for each --records.")  # fmt: skip
+@click.option("--records", "folders", multiple=True, type=NamedPath(example="bench/weights"),
+              help="Folder of records of that kind, with its records.toml; repeatable.")  # fmt: skip
+@click.option("--known", type=NamedPath(dir_okay=False), default=None,
+              help="joint_numbers.json of an earlier calibration, as what is known before.")  # fmt: skip
+@click.option("--plan", is_flag=True, help="Rank calibrations by what they would buy; needs no records.")
+@out_option(
+    "out/calibration",  # and the deck, whose name is read
+    writes=lambda given: ["plan.json"] if given["plan"] else ["joint_numbers.json", "calibration.json"],
+)
+@json_option
+def calibrate(
+    deck_name: str,
+    kinds: tuple[str, ...],
+    folders: tuple[Path, ...],
+    known: Path | None,
+    plan: bool,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Turn an afternoon at the bench into smaller spreads in the deck, or plan that afternoon."""
+    from ..bench.calibration import (
+        KINDS,
+        calibrated,
+        estimate,
+        load_calibration,
+        read_joint_numbers,
+        record_findings,
+        shown_numbers,
+        what_calibration_buys,
+        write_calibration,
+        write_plan,
+    )
+    from ..components import declare
+    from ..foundation.deck import load_deck
+    from ..foundation.progress import Steps
+    from ..regeneration import errors_while_running
+
+    _check_calibration(kinds, folders, plan)
+    deck = load_deck(deck_name)
+    actuator = declare(deck)
+    prior = read_joint_numbers(known) if known else None
+    steps = Steps()
+    if plan:
+        chosen = [KINDS[kind] for kind in kinds or KINDS]
+        with steps.step("plan"):
+            errors = errors_while_running(actuator)
+            ranked = what_calibration_buys(actuator, chosen, prior=prior, errors=errors)
+        _show_plan(ranked, write_plan(ranked, out), as_json, deck_name, known)
+        return
+    with steps.step("read"):
+        tests = [
+            load_calibration(actuator, KINDS[kind], folder)
+            for kind, folder in zip(kinds, folders, strict=True)
+        ]
+    with steps.step("estimate"):
+        result = calibrated(actuator, estimate(actuator, tests, prior=prior))
+    paths = write_calibration(result, out, deck=deck.path)
+    if as_json:
+        show_json({**result.to_dict(), "deck": str(paths["deck"]), "joint": str(paths["joint"])})
+        return
+    heads = ("name", "before", "after", "unit", "moved, in spreads", "known from")
+    show_table("Numbers", heads, shown_numbers(result.numbers))
+    for sentence in (*record_findings(tests), *result.words()):
+        click.echo(sentence)
+    click.echo(f"written: {', '.join(map(str, paths.values()))}")
+
+
+def _check_calibration(kinds: tuple[str, ...], folders: tuple[Path, ...], plan: bool) -> None:
+    """Refuse records beside a plan, and folders of records without their kinds."""
+    if plan and folders:
+        raise MeasurementError(
+            "--records", "stands beside --plan, which reads none", next_step="leave one of both out"
+        )
+    if not plan and (not folders or len(kinds) != len(folders)):
+        raise MeasurementError(
+            f"{len(kinds)} --kind and {len(folders)} --records",
+            "each folder of records needs its kind",
+            next_step=f"write --kind {CALIBRATIONS[0]} --records FOLDER, or --plan to see what would help "
+            "most",
+        )
+
+
+def _show_plan(
+    ranked: CalibrationPlan, file: Path, as_json: bool, deck_name: str, known: Path | None
+) -> None:
+    if as_json:
+        show_json(ranked.to_dict())
+        return
+    show_table("What a calibration buys", ranked.heads, ranked.rows())
+    for sentence in ranked.words():
+        click.echo(sentence)
+    for title, reason in ranked.left_out.items():
+        click.echo(f"{title} is left out: {reason}")
+    following = ["--deck", deck_name, "--kind", "KIND", "--records", "FOLDER"]
+    following += ["--known", str(known)] if known else []
+    click.echo(f"written: {file}; next: {next_command('observer', 'calibrate', *following)}")

@@ -1,0 +1,101 @@
+"""``nlsdesign records describe``: the first look at the files of a bench."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..foundation.text_files import write_text
+from .options import deck_option, json_option
+from .output import examples, next_command, show_json, show_table
+from .overwriting import out_file_option
+from .typed_values import NamedPath
+
+if TYPE_CHECKING:
+    from ..bench.identification import RecordsDescription
+
+
+@click.group()
+def records() -> None:
+    """Look at the records of a bench before anything is fitted."""
+
+
+@records.command(
+    epilog=examples(
+        "nlsdesign records describe bench --deck my.toml --out bench/records.toml",
+        "nlsdesign records describe bench --deck my.toml --json",
+    )
+)
+@click.argument("folder", type=NamedPath(example="bench"))
+@deck_option
+@out_file_option("out/records.toml", "File for a mapping to begin with.", ending=".toml")
+@json_option
+def describe(folder: Path, deck_name: str, out: Path, as_json: bool) -> None:
+    """Tell columns, units, clocks, gaps and faults of files, and write a records.toml to edit."""
+    from ..bench.identification import describe_records
+    from ..components import declare
+    from ..foundation.deck import load_deck
+    from ..model import flatten
+
+    description = describe_records(folder, flatten(declare(load_deck(deck_name))))
+    write_text(out, description.mapping())
+    if as_json:
+        show_json({**_content(description), "written": str(out)})
+    else:
+        _show(description)
+        click.echo(f"written: {out}; put it beside the records as records.toml, or name it by --mapping")
+        words = ("fit", "--deck", deck_name, "--records", folder, "--mapping", out)
+        click.echo(f"next: {next_command(*words)}")
+    if description.problem or description.undecided:
+        raise click.exceptions.Exit(1)
+
+
+def _content(description: RecordsDescription) -> dict[str, object]:
+    notes = (*description.records.findings, *description.records.remarks) if description.records else ()
+    roles = {r.name: r.role for r in description.records.records} if description.records else {}
+    return {
+        "time": description.time,
+        "time_unit": description.time_unit,
+        "files": [asdict(file) for file in description.files],
+        "columns": [asdict(column) for column in description.columns],
+        "records": roles,
+        "remarks": [f"{note.place}: {note.text}" for note in notes],
+        "undecided": [column.head for column in description.undecided],
+        "problem": description.problem,
+    }
+
+
+def _show(description: RecordsDescription) -> None:
+    columns = ("file", "rows", "seconds", "samples/s", "gaps", "remark")
+    rows = [
+        (f.name, str(f.rows), *(_number(v) for v in (f.seconds, f.rate)), str(f.gaps), f.problem)
+        for f in description.files
+    ]
+    show_table("Files", columns, rows)
+    heads = ("column", "unit", "signal", "clock", "from", "to", "noise", "count")
+    cells = [
+        (
+            *(c.head, c.unit or "none", " or ".join(c.signals) or "none", c.clock or description.time),
+            *(_number(v) for v in (c.smallest, c.largest, c.noise, c.quantum)),
+        )
+        for c in description.columns
+    ]
+    show_table("Columns, in the units of the files", heads, cells)
+    if description.records is not None:
+        named = [(r.name, str(len(r.trace)), r.role.replace("_", " ")) for r in description.records.records]
+        show_table("Records", ("record", "rows", "used for"), named)
+        for note in (*description.records.findings, *description.records.remarks):
+            click.echo(f"{note.place}: {note.text}")
+    for column in description.undecided:
+        choices = " or ".join(column.signals) or "no sensor of the deck reads in its unit"
+        click.echo(f"undecided: '{column.head}': {choices if column.unit else 'its head names no unit'}")
+    if description.problem:
+        click.echo(f"cannot be read as it stands: {description.problem}")
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else ""

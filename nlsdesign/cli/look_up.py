@@ -1,0 +1,164 @@
+"""``nlsdesign parts``, ``materials`` and ``docs``: what comes with the package to be looked up."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..foundation.bibliography import cited
+from ..foundation.errors import unknown_name
+from ..foundation.locations import folder
+from ..foundation.quantity import typeset_unit
+from .options import json_option
+from .output import examples, show_json, show_table
+
+if TYPE_CHECKING:
+    from ..components import Part
+
+
+@click.command(
+    epilog=examples(
+        "nlsdesign parts", "nlsdesign parts TwoSidedCam", "nlsdesign parts CoulombFriction --json"
+    )
+)
+@click.argument("name", metavar="[PART]", required=False)
+@json_option
+def parts(name: str | None, as_json: bool) -> None:
+    """List the parts that a deck can name, or show one: its law, source and numbers."""
+    from ..components import component_classes, renamed
+
+    known = component_classes()
+    if name is None:
+        laws = {n: (inspect.getdoc(c) or "").split("\n\n")[0].replace("\n", " ") for n, c in known.items()}
+        rows = sorted((_kind(c), n, laws[n]) for n, c in known.items())
+        if as_json:
+            show_json({n: {"kind": kind, "law": law} for kind, n, law in rows})
+        else:
+            show_table("Parts", ("kind", "part", "law"), rows)
+        return
+    if name not in known:
+        raise renamed(name) or unknown_name("part", name, known)
+    infos, law = known[name].parameter_infos(), inspect.getdoc(known[name]) or ""
+    publications = [str(reference) for reference in cited(law)]
+    if as_json:
+        numbers = {
+            n: {
+                "unit": i.unit,
+                "minimum": i.minimum if math.isfinite(i.minimum) else None,  # JSON has no infinity
+                "maximum": i.maximum if math.isfinite(i.maximum) else None,
+                "meaning": i.description,
+                "row": i.row,
+            }
+            for n, i in infos.items()
+        }
+        content = {"law": law, "references": publications, "numbers": numbers}
+        show_json({"kind": _kind(known[name]), **content})
+        return
+    click.echo("\n".join([f"{name} ({_kind(known[name])})", "", law, "", *publications, ""]))
+    columns = ("name", "unit", "from", "to", "meaning")
+    row = " (a row)"
+    limits = [
+        (n, typeset_unit(i.unit), f"{i.minimum:g}", f"{i.maximum:g}", i.description + (row if i.row else ""))
+        for n, i in infos.items()
+    ]
+    show_table("Numbers", columns, limits)
+
+
+def _kind(part: type[Part]) -> str:
+    from ..components import Body, Cam, DrivePart, Element, Sensor, Transmission
+
+    kinds: dict[str, type[Part]] = {
+        "element": Element, "body": Body, "gear": Transmission, "cam": Cam, "sensor": Sensor,
+        "drive": DrivePart,
+    }  # fmt: skip
+    return next(kind for kind, base in kinds.items() if issubclass(part, base))
+
+
+@click.command(
+    epilog=examples("nlsdesign materials", "nlsdesign materials natural_rubber", "nlsdesign materials --json")
+)
+@click.argument("name", metavar="[MATERIAL]", required=False)
+@json_option
+def materials(name: str | None, as_json: bool) -> None:
+    """List the rubbers of the library, or show one: values, conditions, grade of evidence and source."""
+    from .. import components as library
+
+    if name is None:
+        known = library.materials()
+        if as_json:
+            show_json({m.name: {"family": m.family, "grade": m.grade} for m in known.values()})
+            return
+        rows = []
+        for m in known.values():
+            loss = "not known"
+            if "loss_tangent" in m:
+                loss = f"{m['loss_tangent'].shown} ({m['loss_tangent'].evidence})"
+            rows.append((m.name, m.family, m.grade, loss))
+        show_table("Materials", ("material", "family", "grade", "loss tangent"), rows)
+        return
+    chosen = library.material(name)
+    columns = ("property", "value", *library.CONDITIONS, "evidence", "source")
+    if as_json:
+        rows_by_name = {row[0]: dict(zip(columns[1:], row[1:], strict=True)) for row in chosen.rows()}
+        show_json({"family": chosen.family, "grade": chosen.grade, "properties": rows_by_name})
+        return
+    show_table(f"{chosen.name} ({chosen.family}): {chosen.grade}", columns, chosen.rows())
+    if chosen.remark:
+        click.echo(chosen.remark)
+
+
+_SITE = "site"
+"""Folder of what the pages on the web are built from."""
+
+
+@click.command(
+    epilog=examples("nlsdesign docs", "nlsdesign docs design_a_cam", "nlsdesign docs conventions --print"),
+)
+@click.argument("page", required=False)
+@click.option("--print", "whole", is_flag=True, help="Print the page.")
+@json_option
+def docs(page: str | None, whole: bool, as_json: bool) -> None:
+    """Say where the documentation is, list its pages, or name the file of one PAGE.
+
+    Pages are Markdown, which is read in any editor.
+    """
+    pages = dict(_pages(folder("docs")))
+    if page is None:
+        if whole:
+            raise click.UsageError("--print needs a PAGE, for instance: nlsdesign docs conventions --print")
+        if as_json:
+            show_json(
+                {"folder": folder("docs"), "pages": {name: title for name, (_, title) in pages.items()}}
+            )
+            return
+        click.echo(f"{folder('docs')}\n")
+        width = max(map(len, pages))
+        for name, (_, title) in pages.items():
+            click.echo(f"{name:<{width}}  {title}")
+        return
+    name = page.removesuffix(".md")
+    matches = [each for each in pages if each == name or each.rpartition("/")[2] == name]
+    if len(matches) != 1:
+        raise unknown_name("page", page, pages)
+    file, title = pages[matches[0]]
+    if as_json:
+        text = {"text": file.read_text(encoding="utf-8")} if whole else {}
+        show_json({"page": matches[0], "title": title, "file": file, **text})
+    else:
+        click.echo(file.read_text(encoding="utf-8") if whole else str(file))
+
+
+def _pages(place: Path) -> Iterator[tuple[str, tuple[Path, str]]]:
+    """Yield name, file and title of each page, folder by folder; what a site is made of is no page."""
+    files = sorted(place.rglob("*.md"), key=lambda each: (len(each.parts), each.parent, each.name))
+    for file in files:
+        if file.relative_to(place).parts[0] == _SITE:
+            continue
+        with file.open(encoding="utf-8") as stream:
+            title = stream.readline().removeprefix("#").strip()
+        yield file.relative_to(place).with_suffix("").as_posix(), (file, title)

@@ -1,0 +1,30 @@
+"""What takes several rooms: from one declared machine to everything that runs it.
+
+Which commands a deck is ready for, observers that keep a size of flash, the observer designed again from the
+better model of a diagnosis, and all files of a machine. Presentation and commands may import it; it decides
+nothing that a room below can decide alone.
+"""
+
+from .exported_machine import MACHINE as MACHINE
+from .exported_machine import export_machine
+from .flash import require_flash as require_flash
+from .flash import sized_observer
+from .range_remarks import beyond_contour as beyond_contour
+from .range_remarks import range_remarks
+from .range_remarks import swept_angle as swept_angle
+from .range_remarks import usual_last as usual_last
+from .readiness import Readiness as Readiness
+from .readiness import errors_while_running as errors_while_running
+from .readiness import readiness
+from .regenerated_observer import ObserverChoice, Regeneration, regenerate, write_regeneration
+
+__all__ = [
+    "ObserverChoice",
+    "Regeneration",
+    "export_machine",
+    "range_remarks",
+    "readiness",
+    "regenerate",
+    "sized_observer",
+    "write_regeneration",
+]

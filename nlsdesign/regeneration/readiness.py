@@ -1,0 +1,141 @@
+"""What a deck is good for: which commands it is ready for, and how well its torque could be known.
+
+Readiness is found out with what the commands themselves call first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..bench.discrepancy.tearing import blocks_of
+from ..components import Assembly
+from ..components.assembly.changed_copies import with_moved_load
+from ..design import ExponentialTorque
+from ..design.optimisation.solve import GOALS, USUAL, Wanted
+from ..feedback.analysis.rest_points import rest_points
+from ..feedback.control import ScheduledTorque, torque_controller
+from ..feedback.observer import (
+    CascadeGain,
+    FixedGrid,
+    design_observer_with_details,
+    least_torque_error,
+    observer_bench,
+)
+from ..feedback.observer.scheduling.scheduled import whole_contour
+from ..foundation.errors import ArrangementError, NlsError, ValueRangeError
+from ..model import FlatModel, flatten
+from ..model.roles import series_cam, series_spring
+from ..simulation import Prior
+from .range_remarks import swept_angle
+
+_SAMPLE_TIME = 1e-3
+_ANGLES = 5
+_POINTS = 33
+
+
+class Readiness(NamedTuple):
+    """Whether a command takes a deck.
+
+    Parameters
+    ----------
+    command
+        As it is typed, without ``nlsdesign``.
+    reason
+        Why not, with the next step; ``None`` where the deck is ready.
+    """
+
+    command: str
+    reason: NlsError | None
+
+    @property
+    def ready(self) -> bool:
+        """Whether the command takes the deck."""
+        return self.reason is None
+
+
+def readiness(declared: Assembly) -> list[Readiness]:
+    """Return for each command that takes a deck whether it takes this one.
+
+    Parameters
+    ----------
+    declared
+        The machine of the deck.
+    """
+    model = flatten(declared)
+    reach = whole_contour(model).upper
+    readings = [r.signal for r in model.readings if r.sensors]
+    measured = [*(readings or [v.name for v in model.states]), *(v.name for v in model.inputs)]
+
+    def observer() -> None:
+        # Every other kind of observer needs the step of a cascade too, and any size of its table will do.
+        grid = FixedGrid(-reach, reach, points=_POINTS)
+        design_observer_with_details(model, gain=CascadeGain(), sample_time=_SAMPLE_TIME, grid=grid)
+
+    def loop() -> None:
+        flatten(with_moved_load(declared))
+        observer()
+        torque_controller(model, sample_time=_SAMPLE_TIME)
+
+    def over_angle() -> None:
+        series_spring(model)
+        rest_points(model, np.linspace(0.0, reach, _ANGLES), angle=swept_angle(model, None))
+
+    def controller() -> None:
+        torque_controller(model, law=ScheduledTorque(), sample_time=_SAMPLE_TIME)
+
+    def plant() -> None:
+        """Ask for nothing more than the flat model."""
+
+    def records() -> None:
+        blocks_of(model, measured)
+
+    def design() -> None:
+        _begin_design(declared, model)
+
+    asked: dict[str, Callable[[], None]] = {
+        "simulate": plant,
+        "design": design,
+        "analyse angle": over_angle,
+        "analyse loop": loop,
+        "observer": observer,
+        "export c": observer,
+        "export controller": controller,
+        "export fmu": plant,
+        "fit": records,
+        "diagnose": records,
+    }
+    reasons = {check: _refusal(check) for check in dict.fromkeys(asked.values())}
+    return [Readiness(name, reasons[check]) for name, check in asked.items()]
+
+
+def errors_while_running(actuator: Assembly) -> dict[str, Callable[[Prior], float]]:
+    """Return the least error of the torque that any observer could have, for the plan of a calibration.
+
+    Empty without a spring or an encoder: such a plan speaks of the resting spring alone.
+    """
+    try:
+        least = least_torque_error(observer_bench(flatten(actuator)))
+    except (ArrangementError, ValueRangeError):
+        return {}
+    return {"torque while running, best estimate": least}
+
+
+def _begin_design(declared: Assembly, model: FlatModel) -> None:
+    """Do what a design does before its search."""
+    cam = series_cam(model)
+    angle = 0.8 * model.values[cam.last_angle] if cam.last_angle else 0.5
+    target = ExponentialTorque(maximum=1.0, angle=angle, shape=1.0)
+    question, free = Wanted(target, None, (), None, GOALS).question(declared, USUAL)
+    question.search(free)
+
+
+def _refusal(check: Callable[[], None]) -> NlsError | None:
+    """Return why a check fails, ``None`` where it does not."""
+    try:
+        check()
+    except NlsError as error:
+        return error
+    return None

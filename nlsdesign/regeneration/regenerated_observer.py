@@ -1,0 +1,506 @@
+"""The observer of a machine, designed again from the better model of a diagnosis, and what that improves.
+
+The torque that the records show is compared with what two observers make of the measured motion and current:
+one designed from the declared model, one from the better model. Both read the same samples. The same is
+repeated with numbers drawn from what is known of them: the declared spreads before, the covariance of the
+fits after.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ..bench.discrepancy.block_prediction import shown_values
+from ..bench.identification import Record, RecordSet
+from ..bench.identification.least_squares import Fit
+from ..feedback.observer import (
+    CorrectedDesign,
+    FixedGrid,
+    Grid,
+    ObserverDesign,
+    design_corrected_observer,
+    design_observer_with_details,
+    observe,
+)
+from ..feedback.observer.scheduling.scheduled import whole_contour
+from ..foundation.arrays import Array
+from ..foundation.errors import MeasurementError, NlsError
+from ..foundation.quantity import three_digits, with_unit
+from ..foundation.text_files import write_text
+from ..foundation.work_sharing import parallel_map
+from ..model import FlatModel
+from ..model.readings import reading_of
+from ..model.roles import measured_motion, series_spring
+from ..model.structure import SpringNames
+from ..simulation import Trace, declared_prior
+
+DRAWS = 8
+"""Draws of the numbers, before and after each: enough for a root mean square over the spread."""
+_POINTS = 257
+"""Grid points of the observers of the draws, whose tables need no finer error bound than the spread."""
+"""Points of a row of numbers beyond which it is the table of a shape, drawn with one common factor."""
+_SEED = 0
+
+
+@dataclass(frozen=True)
+class ObserverChoice:
+    """What is to be estimated, from what, and how often.
+
+    Parameters
+    ----------
+    sample_time
+        In s.
+    spring
+        Path of the spring whose torque is estimated; decided from the structure if it is ``None``.
+    measured
+        State that is measured; decided from the structure if it is ``None``.
+    """
+
+    sample_time: float = 1e-3
+    spring: str | None = None
+    measured: str | None = None
+
+
+class ObserverTorqueError(NamedTuple):
+    """Root mean square error of the estimated torque on one record, in its unit.
+
+    Parameters
+    ----------
+    record, role
+        Which.
+    before, after
+        Of the observers from the declared and from the better model.
+    torque
+        Root mean square of the measured torque.
+    """
+
+    record: str
+    role: str
+    before: float
+    after: float
+    torque: float
+
+
+@dataclass(frozen=True, eq=False)
+class Regeneration:
+    """The observer of the better model, and the torque error before and after.
+
+    Parameters
+    ----------
+    plant
+        The better model.
+    observer
+        Cascade or corrected, whichever errs less on the records that decide: of the better model, unless one
+        of the declared model errs less there; ``None`` where none can be designed.
+    reasons
+        Why there is no observer, or no comparison; empty if nothing is lacking.
+    quantity, unit
+        What is estimated.
+    errors
+        Of the cascade by record, with the nominal numbers.
+    corrected
+        Of the corrected observer by record, begun at the declared numbers; empty where it cannot be designed
+        for both models or a record lacks an input of it.
+    chosen
+        Which observer was taken, and why.
+    spread_before, spread_after
+        Root mean square error over these records for each draw of the numbers, where an observer could be
+        designed.
+    course
+        Time, measured torque, and both estimates on the first of these records.
+    """
+
+    plant: FlatModel
+    observer: FlatModel | None
+    reasons: tuple[str, ...] = ()
+    quantity: str = ""
+    unit: str = "N*m"
+    errors: tuple[ObserverTorqueError, ...] = ()
+    corrected: tuple[ObserverTorqueError, ...] = ()
+    chosen: str = ""
+    spread_before: tuple[float, ...] = ()
+    spread_after: tuple[float, ...] = ()
+    course: tuple[Array, Array, Array, Array] | None = None
+
+    @property
+    def nominal(self) -> tuple[float, float]:
+        """Error over all records, before and after, with the nominal numbers."""
+        return _over_records(self.errors)
+
+    @property
+    def learning(self) -> tuple[float, float]:
+        """Error of the corrected observer over all records, before and after."""
+        return _over_records(self.corrected)
+
+    @property
+    def over_spread(self) -> tuple[float, float]:
+        """Error over all records and draws, before and after."""
+        return _rms(self.spread_before), _rms(self.spread_after)
+
+    def words(self) -> tuple[str, ...]:
+        """Return the torque error before and after in sentences; none where nothing was compared."""
+        if not self.errors:
+            return ()
+        pairs = {
+            "with the nominal numbers": self.nominal,
+            "over the spread": self.over_spread,
+            "that learns": self.learning,
+        }
+        return tuple(
+            f"Error of the observer of `{self.quantity}` {how}, before → after: "
+            f"{three_digits(pair[0])} → {with_unit(three_digits(pair[1]), self.unit)}."
+            for how, pair in pairs.items()
+            if all(map(math.isfinite, pair))
+        ) + ((f"Generated is the {self.chosen}.",) if self.chosen else ())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``regeneration.json``."""
+        keys = ("before", "after")
+        return {
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "nominal": dict(zip(keys, map(_finite, self.nominal), strict=True)),
+            "over_spread": dict(zip(keys, map(_finite, self.over_spread), strict=True)),
+            "draws": {"before": list(self.spread_before), "after": list(self.spread_after)},
+            "corrected": dict(zip(keys, map(_finite, self.learning), strict=True)),
+            "records": [each._asdict() for each in self.errors],
+            "corrected_records": [each._asdict() for each in self.corrected],
+            "chosen": self.chosen,
+            "reasons": list(self.reasons),
+        }
+
+
+def _over_records(errors: Sequence[ObserverTorqueError]) -> tuple[float, float]:
+    """Return the error over all records, before and after."""
+    return _rms([e.before for e in errors]), _rms([e.after for e in errors])
+
+
+def _rms(values: Sequence[float]) -> float:
+    return math.sqrt(math.fsum(v * v for v in values) / len(values)) if values else math.nan
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+
+
+def regenerate(
+    declared: FlatModel,
+    better: FlatModel,
+    records: RecordSet,
+    *,
+    fits: Sequence[Fit] = (),
+    choice: ObserverChoice | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> Regeneration:
+    """Design the observer again, and compare it with the one from the declared model.
+
+    Parameters
+    ----------
+    declared, better
+        The model as declared, and the one that a diagnosis has left.
+    records
+        From the bench. The observer is chosen on those that selected the better model, or on those that were
+        fitted without them; those held out are compared, or all without them.
+    fits
+        Of the better model; their covariance gives the draws of its numbers.
+    choice
+        What is estimated; by default the torque of the series spring, every millisecond.
+    progress
+        Told what is being done.
+
+    Returns
+    -------
+    Regeneration
+        With reasons in words where no observer can be designed or nothing can be compared.
+    """
+    choice = choice or ObserverChoice()
+    progress("designing the observer of the better model")
+    try:
+        after = _designed(better, choice)
+    except NlsError as error:
+        return Regeneration(better, None, (f"no observer can be designed for the better model: {error}",))
+    spring = series_spring(better, choice.spring)
+    known: dict[str, Any] = {"quantity": spring.effort, "unit": better.variable(spring.effort).unit}
+    try:
+        before = _designed(declared, choice)
+        seen = {r.name: _Watched.of(better, spring, r, choice) for r in records.records}
+    except NlsError as error:
+        return Regeneration(better, after.model, (f"the observers are not compared: {error}",), **known)
+    runs = [seen[r.name] for r in records.of("held_out") or records.records]
+    deciding = [seen[r.name] for r in records.of("selection") or records.of("fit") or records.records]
+    progress("designing the observers that learn")
+    learned = [_learning(model, choice) for model in (declared, better)]
+    both = [each for each in learned if not isinstance(each, str)]
+    generated, chosen = _generated((before, after), both if len(both) == 2 else [], deciding)
+    corrected, lacking = _compared(learned, runs)
+    pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
+    errors = tuple(
+        ObserverTorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
+        for run, (a, b) in zip(runs, pairs, strict=True)
+    )
+    progress("designing observers over the spread of the numbers")
+    draws = [*_draws(declared, ()), *_draws(better, fits)]
+    models = [*[declared] * DRAWS, *[better] * DRAWS]
+    spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
+    return Regeneration(
+        better,
+        generated.model,
+        (*lacking, *_failures(spread)),
+        errors=errors,
+        corrected=corrected,
+        chosen=chosen,
+        spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
+        spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
+        course=(runs[0].trace.time, runs[0].torque, *pairs[0]),
+        **known,
+    )
+
+
+def _designed(model: FlatModel, choice: ObserverChoice, grid: Grid | None = None) -> ObserverDesign:
+    return design_observer_with_details(
+        model,
+        estimate=series_spring(model, choice.spring).effort,
+        measured=measured_motion(model, choice.measured),
+        sample_time=choice.sample_time,
+        grid=grid,
+    )
+
+
+def _learning(model: FlatModel, choice: ObserverChoice) -> CorrectedDesign | str:
+    """Return the corrected observer of a model, or why there is none."""
+    try:
+        return design_corrected_observer(
+            model,
+            estimate=series_spring(model, choice.spring).effort,
+            measured=measured_motion(model, choice.measured),
+            sample_time=choice.sample_time,
+        )
+    except NlsError as error:
+        # The cascade stands already; that nothing learns, and why, is one of the reasons.
+        return str(error)
+
+
+def _compared(
+    learned: Sequence[CorrectedDesign | str], runs: Sequence[_Watched]
+) -> tuple[tuple[ObserverTorqueError, ...], tuple[str, ...]]:
+    """Return the errors of the corrected observers, before and after, or why there are none."""
+    words = "the corrected observer is not compared: "
+    designs = []
+    for which, each in zip(("declared", "better"), learned, strict=True):
+        if isinstance(each, str):
+            return (), (f"{words}none can be designed for the {which} model: {each}",)
+        designs.append(each)
+    lacking = sorted({name for run in runs for design in designs for name in run.lacks(design)})
+    if lacking:
+        return (), (f"{words}a record does not measure {', '.join(lacking)}",)
+    pairs = [[run.error(run.estimate(design)) for design in designs] for run in runs]
+    errors = tuple(
+        ObserverTorqueError(run.record.name, run.record.role, before, after, run.size)
+        for run, (before, after) in zip(runs, pairs, strict=True)
+    )
+    return errors, ()
+
+
+def _generated(
+    cascades: tuple[ObserverDesign, ObserverDesign],
+    corrected: Sequence[CorrectedDesign],
+    deciding: Sequence[_Watched],
+) -> tuple[ObserverDesign | CorrectedDesign, str]:
+    """Return the observer that errs least on the records that decide, and why in words.
+
+    It is one of the declared model where none of the better model errs less: what is worse replaces nothing.
+    ``corrected``: those of the declared and of the better model, or none.
+    """
+    named: list[tuple[str, ObserverDesign | CorrectedDesign, ObserverDesign | CorrectedDesign]] = [
+        ("cascade", *cascades)
+    ]
+    if corrected and not any(run.lacks(each) for run in deciding for each in corrected):
+        named.append(("corrected observer", corrected[0], corrected[1]))
+    errors = [
+        [_rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
+    ]
+    best = min(range(len(named)), key=lambda k: errors[k][1])
+    replaced = min(range(len(named)), key=lambda k: errors[k][0])
+    roles = ", ".join(sorted({run.record.role.replace("_", " ") for run in deciding}))
+    if errors[replaced][0] < errors[best][1]:
+        name = named[replaced][0]
+        return named[replaced][1], (
+            f"{name} of the declared model, which is not replaced: on the records that decide ({roles}) it "
+            "errs less than those of the better model"
+        )
+    name, _, design = named[best]
+    if len(named) == 1:
+        return design, name
+    return design, f"{name}: it errs less on the records that decide ({roles}) than the other"
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched:
+    """A record at the sample time of the observers, with the torque that it shows."""
+
+    record: Record
+    trace: Trace
+    torque: Array
+    readings: Mapping[str, str]
+    motion: str
+    silent: tuple[str, ...]
+
+    @classmethod
+    def of(cls, model: FlatModel, spring: SpringNames, record: Record, choice: ObserverChoice) -> _Watched:
+        """Return a record as an observer sees it, and the torque behind its readings."""
+        motion = measured_motion(model, choice.measured)
+        shown = {reading_of(model.readings, signal).measured: signal for signal in record.trace.signals}
+        if motion not in shown:
+            raise MeasurementError(f"record '{record.name}'", f"does not measure '{motion}'")
+        torque = _shown_torque(model, spring, record, shown)
+        time = np.arange(record.trace.time[0], record.trace.time[-1], choice.sample_time)
+        silent = {v.name: np.full(len(record.trace), v.start) for v in model.inputs if v.name not in shown}
+        trace = record.trace.with_signals({**silent, _TORQUE: torque}, dict.fromkeys([*silent, _TORQUE], "1"))
+        even = trace.at(time)
+        return cls(
+            record, even, even[_TORQUE], {n: s for n, s in shown.items() if n != s}, motion, (*silent,)
+        )
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the torque."""
+        return float(np.sqrt(np.mean(self.torque**2)))
+
+    def lacks(self, design: ObserverDesign | CorrectedDesign) -> list[str]:
+        """Return inputs of an observer that the record does not measure."""
+        return [v.name for v in design.model.inputs if v.name in self.silent]
+
+    def estimate(self, design: ObserverDesign | CorrectedDesign) -> Array:
+        """Return what an observer makes of the record, begun at rest at its first angle."""
+        inputs = {v.name for v in design.model.inputs}
+        wires = {name: signal for name, signal in self.readings.items() if name in inputs}
+        first = float(self.trace[self.readings.get(self.motion, self.motion)][0])
+        run = observe(design.model, self.trace, readings=wires, start=design.start(first))
+        return run[design.step.plant.estimate.name]
+
+    def error(self, estimate: Array) -> float:
+        """Return the root mean square error of an estimate."""
+        return float(np.sqrt(np.mean((estimate - self.torque) ** 2)))
+
+
+_TORQUE = "torque behind the readings"
+
+
+def _shown_torque(model: FlatModel, spring: SpringNames, record: Record, shown: Mapping[str, str]) -> Array:
+    """Return the torque that a record shows: as measured, or a measured force times the lever arm."""
+    if spring.effort in shown:
+        return shown_values(model, record, shown[spring.effort])
+    for cam in spring.cams:
+        force = next((n for n in shown if n == cam.force or n.startswith(f"{cam.element}.")), None)
+        if force is not None and model.variable(force).unit == "N":
+            arm = _along(model, record, shown, cam.lever_arm)
+            elements = model.values[cam.elements]
+            return elements * arm * shown_values(model, record, shown[force])
+    raise MeasurementError(
+        f"record '{record.name}'",
+        f"measures neither the torque '{spring.effort}' nor a force behind its cam",
+        next_step="measure one of them to know the error of the observer",
+    )
+
+
+def _along(model: FlatModel, record: Record, shown: Mapping[str, str], signal: str) -> Array:
+    """Return a signal of the model along the measured states and inputs of a record."""
+    s, count = model.symbols(), len(record.trace)
+    groups = []
+    for variables in (model.states, model.inputs):
+        values = np.repeat(model.start(variables)[:, None], count, axis=1)
+        for place, variable in enumerate(variables):
+            if variable.name in shown:
+                values[place] = shown_values(model, record, shown[variable.name])
+        groups.append(values)
+    place = next(i for i, v in enumerate(model.signals) if v.name == signal)
+    wanted = ca.Function("wanted", [s.state, s.input, s.parameter, s.table], [s.signal[place]])
+    states, inputs = groups
+    result: Array = wanted.map(count)(states, inputs, model.start(model.parameters), np.zeros(0)).full()
+    return result.ravel()
+
+
+def _draws(model: FlatModel, fits: Sequence[Fit]) -> list[dict[str, float]]:
+    """Return draws of the numbers: from the covariance of fits, all others from their declared spreads."""
+    random = np.random.default_rng(_SEED)
+    fitted = {p.name for fit in fits for p in fit.parameters}
+    declared = declared_prior(model)
+    drawn_numbers = declared.only([n for n in declared.names if n not in fitted]).draws(DRAWS, _SEED)
+    result = []
+    for number in range(DRAWS):
+        values = {name: float(column[number]) for name, column in drawn_numbers.items()}
+        for fit in fits:
+            centre = np.array([p.inward(fit.values[p.name]) for p in fit.parameters])
+            drawn = random.multivariate_normal(centre, fit.covariance, method="eigh")
+            for p, x in zip(fit.parameters, drawn, strict=True):
+                if p.name in model.values:
+                    values[p.name] = min(max(p.outward(float(x)), p.lower), p.upper)
+        result.append(values)
+    return result
+
+
+def _drawn_error(
+    model: FlatModel, values: Mapping[str, float], runs: Sequence[_Watched], choice: ObserverChoice
+) -> float:
+    """Return the error over all records of the observer with other numbers; not a number if there is none."""
+    drawn = model.with_values(values)
+    ends = whole_contour(drawn)
+    try:
+        design = _designed(drawn, choice, FixedGrid(ends.lower, ends.upper, _POINTS))
+        return _rms([run.error(run.estimate(design)) for run in runs])
+    except NlsError:
+        return math.nan
+
+
+def _failures(spread: Sequence[float]) -> tuple[str, ...]:
+    count = sum(not math.isfinite(error) for error in spread)
+    words = f"for {count} of {len(spread)} draws of the numbers no observer can be designed"
+    return (words,) if count else ()
+
+
+def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration, dict[Path, str]]:
+    """Write the observer as C and FMU, the plant of the better model as FMU, and ``regeneration.json``.
+
+    Parameters
+    ----------
+    result
+        From :func:`regenerate`.
+    folder
+        C stands in ``c`` in it.
+
+    Returns
+    -------
+    tuple
+        The result, with reasons for what could not be written too; and the files of observer and plant, with
+        a few words on each.
+    """
+    from ..export import export_c, export_fmu  # here, as its libraries take time to load
+
+    written: dict[Path, str] = {}
+    reasons = list(result.reasons)
+    for name, model in {"observer": result.observer, "plant": result.plant}.items():
+        if model is None:
+            continue
+        try:
+            if name == "observer":
+                source = export_c(model, folder / "c", name=name)
+                written |= {source.source: "observer in C99", source.header: "its interface"}
+            written[export_fmu(model, folder / f"{name}.fmu")] = f"{name} of the better model as FMU"
+        except NlsError as error:
+            reasons.append(f"the {name} is not exported: {error}")
+    result = replace(result, reasons=tuple(reasons))
+    content = {**result.to_dict(), "files": [str(path) for path in written]}
+    write_text(folder / "regeneration.json", json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    return result, written
