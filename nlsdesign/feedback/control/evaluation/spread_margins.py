@@ -107,11 +107,11 @@ def spread_margins(
     angles = np.linspace(0.05, 1.0, 11) * last
     plants = _machines(loop)
     value = loop.controller.values[gain]
-    found = _worst(loop, plants, angles)
+    worst = _worst(loop, plants, angles)
     enough = value
     for _ in range(_TRIED):
         changed = replace(loop, controller=loop.controller.with_values({gain: enough}))
-        tried = found if enough == value else _worst(changed, plants, angles)
+        tried = worst if enough == value else _worst(changed, plants, angles)
         have = _kept_by_most(tried)
         if have[0] >= GAIN_MARGIN and have[1] >= PHASE_MARGIN:
             break
@@ -127,8 +127,8 @@ def spread_margins(
             loop, amplitude=side * held, frequency=0.0, draws=KICKED, kick=side * min(KICK, 0.3 * held),
             translate=translate,
         )  # fmt: skip
-    least = (float(found[0, 0]), float(found[0, 1]))
-    return SpreadMargins(gain, value, least, _kept_by_most(found), enough, kicked)
+    least = (float(worst[0, 0]), float(worst[0, 1]))
+    return SpreadMargins(gain, value, least, _kept_by_most(worst), enough, kicked)
 
 
 def _machines(loop: ClosedLoop) -> list[ClosedLoop]:
