@@ -17,7 +17,7 @@ import numpy as np
 
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.live.answers import to_json
-from nlsdesign.live.edits import ChangeLimit, LiveEdit, MovePoint
+from nlsdesign.live.edits import LiveEdit, change_limit, edit, move_point
 from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.live_design import LiveDesign
 
@@ -39,14 +39,15 @@ def edits(live: LiveDesign, draw: np.random.Generator) -> list[LiveEdit]:
     if limits and draw.uniform() < 0.1:
         limit = limits[int(draw.integers(len(limits)))]
         factor = 1.02 if draw.uniform() < 0.5 else 0.98
-        return [ChangeLimit(limit.kind.name, limit.value * factor ** (k + 1)) for k in range(_LENGTH)]
+        return [edit(change_limit, limit.kind.name, limit.value * factor ** (k + 1)) for k in range(_LENGTH)]
     points = question.points
     index = int(draw.integers(1, len(points)))
     room = points[index].angle - points[index - 1].angle
     step, sideways = 0.02 * draw.choice([-1.0, 1.0]), 0.1 * room * draw.uniform(-1.0, 1.0) / _LENGTH
     angle, torque = points[index]
     return [
-        MovePoint(index, angle + sideways * (k + 1), torque * (1.0 + step) ** (k + 1)) for k in range(_LENGTH)
+        edit(move_point, index, angle + sideways * (k + 1), torque * (1.0 + step) ** (k + 1))
+        for k in range(_LENGTH)
     ]
 
 
@@ -57,10 +58,10 @@ def measured(deck: str, drags: int) -> tuple[list[float], list[float], dict[str,
     processor: list[float] = []
     states: dict[str, int] = {}
     while len(wall) < drags:
-        for edit in edits(live, draw):
+        for step in edits(live, draw):
             begin, used = time.perf_counter(), time.process_time()
             try:
-                answer = live.apply(edit, drag="benchmark")
+                answer = live.apply(step, drag="benchmark")
             except NlsError:
                 break
             json.dumps(to_json(answer))

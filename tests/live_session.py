@@ -15,9 +15,8 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.components import ROTATION, Assembly, Spring
-from nlsdesign.live.inbox import Inbox
 from nlsdesign.live.live_design import LiveDesign
-from nlsdesign.live.outbox import Outbox
+from nlsdesign.live.messages import Inbox, Outbox
 from nlsdesign.live.session_design import SessionDesign
 
 Message = dict[str, Any]

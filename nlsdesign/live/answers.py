@@ -6,12 +6,39 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from ..foundation.arrays import Array
 from ..foundation.quantity import parse_unit, with_unit
+
+
+class AnswerState(StrEnum):
+    """Whether there is a design: ``NOT_SOLVED`` where there was no answer in time, or the solver stopped."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    NOT_SOLVED = "not solved"
+
+
+class AnswerSource(StrEnum):
+    """From the previous design, or from several starts with the check on the finished assembly."""
+
+    QUICK = "quick"
+    FULL = "full"
+
+
+class WorkStage(StrEnum):
+    """How far long work is; ``LATER`` is what nobody has asked for yet."""
+
+    NOT_BEGUN = "not begun"
+    LATER = "asked for later"
+    COMPUTING = "computing"
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,13 +211,11 @@ class LiveAnswer:
     revision
         Number of the question; each edit, undo and redo makes a new one.
     state
-        ``"solved"``, ``"infeasible"`` (no design keeps all limits), ``"not solved"`` (no answer in time, or
-        the solver stopped).
+        Whether there is a design of this question.
     message
         In words: why there is no design, or what to know of it.
     source
-        ``"quick"`` for the answer from the previous design, ``"full"`` for several starts and the check on
-        the finished assembly.
+        How it was found.
     design
         The last good design; ``None`` before the first. Where its revision is not that of the answer it
         belongs to an earlier question and must be shown as such.
@@ -203,9 +228,9 @@ class LiveAnswer:
     """
 
     revision: int
-    state: str
+    state: AnswerState
     message: str
-    source: str
+    source: AnswerSource
     design: DesignView | None
     controls: LiveControls
     seconds: float
@@ -323,7 +348,7 @@ class Lazy:
     Parameters
     ----------
     state
-        ``"asked for later"``, ``"computing"``, ``"done"``, ``"failed"`` or ``"cancelled"``.
+        How far it is.
     revision
         Of the design that it holds for.
     value
@@ -332,7 +357,7 @@ class Lazy:
         Why it failed, or how far it is.
     """
 
-    state: str
+    state: WorkStage
     revision: int
     value: Any = None
     message: str = ""

@@ -17,6 +17,7 @@ from typing import Any
 from ..foundation.errors import NlsError
 from ..foundation.extensions import extended_by, extension_names, load_extension
 from ..foundation.processes import signals_held
+from .answers import WorkStage
 
 _ENDED = "its process ended without an answer"
 _PATIENCE = 2.0
@@ -34,7 +35,7 @@ class WorkState:
     revision
         Of the design that it is for.
     state
-        ``"computing"``, ``"done"``, ``"failed"`` or ``"cancelled"``.
+        How far it is.
     message
         Stage, or why it failed.
     seconds
@@ -45,7 +46,7 @@ class WorkState:
 
     name: str
     revision: int
-    state: str
+    state: WorkStage
     message: str
     seconds: float
     value: Any = None
@@ -71,7 +72,7 @@ class BackgroundWork:
     ) -> None:
         self._name, self._revision = name, revision
         self._began, self._took = time.monotonic(), 0.0
-        self._state, self._message, self._value = "computing", "begins", None
+        self._state, self._message, self._value = WorkStage.COMPUTING, "begins", None
         context = _context()
         self._end, other = context.Pipe(duplex=False)
         # Not a daemon: a design has helpers of its own. It ends by itself when its pipe is closed.
@@ -84,17 +85,17 @@ class BackgroundWork:
 
     def state(self) -> WorkState:
         """Return how far it is; never waits."""
-        while self._state == "computing" and self._end.poll():
+        while self._state is WorkStage.COMPUTING and self._end.poll():
             self._hear()
-        if self._state == "computing" and not self._process.is_alive() and not self._end.poll():
-            self._over("failed", _ENDED)
+        if self._state is WorkStage.COMPUTING and not self._process.is_alive() and not self._end.poll():
+            self._over(WorkStage.FAILED, _ENDED)
         took = self._took or time.monotonic() - self._began
         return WorkState(self._name, self._revision, self._state, self._message, took, self._value)
 
     def wait(self, seconds: float) -> WorkState:
         """Return how far it is once it is over, or after that time."""
         last = time.monotonic() + seconds
-        while self._state == "computing" and (left := last - time.monotonic()) > 0.0:
+        while self._state is WorkStage.COMPUTING and (left := last - time.monotonic()) > 0.0:
             if self._end.poll(min(left, 0.2)):
                 self._hear()
             elif not self._process.is_alive():
@@ -103,28 +104,28 @@ class BackgroundWork:
 
     def cancel(self) -> WorkState:
         """End it, with all that it has started, and return what became of it."""
-        if self.state().state == "computing":
-            self._over("cancelled", "cancelled")
+        if self.state().state is WorkStage.COMPUTING:
+            self._over(WorkStage.CANCELLED, "cancelled")
         return self.state()
 
     def _hear(self) -> None:
         try:
             kind, content = self._end.recv()
         except (EOFError, OSError):
-            self._over("failed", _ENDED)
+            self._over(WorkStage.FAILED, _ENDED)
             return
-        if kind == "stage":
+        if kind is WorkStage.COMPUTING:
             self._message = content
-        elif kind == "done":
+        elif kind is WorkStage.DONE:
             self._value = content
-            self._over("done", "")
+            self._over(kind, "")
         else:
-            self._over("failed", content)
+            self._over(kind, content)
 
-    def _over(self, state: str, message: str) -> None:
+    def _over(self, state: WorkStage, message: str) -> None:
         self._took = time.monotonic() - self._began
         self._state, self._message = state, message
-        if state == "cancelled":
+        if state is WorkStage.CANCELLED:
             self._kill()
         self._process.join(_PATIENCE)
         if self._process.is_alive():
@@ -147,7 +148,7 @@ def _context() -> multiprocessing.context.BaseContext:
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([__name__.rpartition(".")[0] + ".exports"])
+    context.set_forkserver_preload([__name__.rpartition(".")[0] + ".work"])
     return context
 
 
@@ -167,18 +168,18 @@ def _run(pipe: Connection, packages: tuple[str, ...], packed: bytes) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def stage(words: str) -> None:
-        pipe.send(("stage", words))
+        pipe.send((WorkStage.COMPUTING, words))
 
     try:
         with extended_by(*map(load_extension, packages)):
             work, arguments = pickle.loads(packed)
-            answer = ("done", work(stage, *arguments))
+            answer = (WorkStage.DONE, work(stage, *arguments))
     except NlsError as error:
-        answer = ("failed", str(error))
+        answer = (WorkStage.FAILED, str(error))
     except MemoryError:
-        answer = ("failed", "there is not enough memory for it")
+        answer = (WorkStage.FAILED, "there is not enough memory for it")
     except Exception as error:
-        answer = ("failed", f"{type(error).__name__}: {error}")
+        answer = (WorkStage.FAILED, f"{type(error).__name__}: {error}")
     with contextlib.suppress(OSError):
         pipe.send(answer)
 

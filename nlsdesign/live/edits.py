@@ -2,309 +2,211 @@
 
 from __future__ import annotations
 
-import dataclasses
+import inspect
 import typing
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from ..components.assembly.library_rubber import with_rubber
-from ..components.materials.library import material
+from ..components.materials import library
 from ..design.optimisation.limits import limit_kinds
-from ..design.parametric.cam_question import ChosenMachine, TargetPoint
+from ..design.parametric.cam_question import TargetPoint
 from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
-from .limit_words import in_words
 from .question import LARGEST_ANGLE, LARGEST_TORQUE, LEAST_STEP, LiveQuestion, finite_in
+from .views import in_words
 
 _LONGEST_NAME = 200
 
 
-@dataclass(frozen=True)
-class LiveEdit(ABC):
-    """Base of the edits; numbers are in SI."""
+class LiveEdit(NamedTuple):
+    """One step: what changes a question, and its fields by name; numbers are in SI."""
 
-    begins_anew: ClassVar[bool] = False
-    """Whether the question has nothing to do with the one before, so that no design is begun beside its."""
+    change: Callable[..., LiveQuestion]
+    fields: Mapping[str, Any]
 
-    @abstractmethod
+    @property
+    def begins_anew(self) -> bool:
+        """Whether the question has nothing to do with the one before, and no design is begun beside its."""
+        return self.change is choose_deck
+
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question after the edit."""
+        """Return the question after the edit; ``shown``: the last good design."""
+        return self.change(question, shown, **self.fields)
 
 
-@dataclass(frozen=True)
-class MovePoint(LiveEdit):
-    """Move a point of the target.
+def edit(change: Callable[..., LiveQuestion], *values: Any, **fields: Any) -> LiveEdit:
+    """Return an edit with its fields, for instance ``edit(move_point, 1, 0.4, 2.0)``."""
+    return LiveEdit(change, {**dict(zip(_fields(change), values, strict=False)), **fields})
 
-    Parameters
-    ----------
-    index
-        Of the point, from 0 at angle zero.
-    angle, torque
-        Where to, in rad and N·m.
+
+def _fields(change: Callable[..., LiveQuestion]) -> dict[str, inspect.Parameter]:
+    """Return the fields of an edit: what its function takes besides the question and the design."""
+    return dict(list(inspect.signature(change).parameters.items())[2:])
+
+
+def move_point(
+    question: LiveQuestion, _: AngleView | None, index: int, angle: float, torque: float
+) -> LiveQuestion:
+    """Move a point of the target, counted from 0 at angle zero, between its neighbours."""
+    points = list(question.points)
+    points[_index(index, len(points))] = TargetPoint(float(angle), float(torque))
+    return question.with_points(tuple(points))
+
+
+def add_point(question: LiveQuestion, _: AngleView | None, angle: float, torque: float) -> LiveQuestion:
+    """Add a point to the target, wherever its angle belongs."""
+    point = TargetPoint(float(angle), float(torque))
+    return question.with_points(tuple(sorted([*question.points, point], key=lambda other: other.angle)))
+
+
+def remove_point(question: LiveQuestion, _: AngleView | None, index: int) -> LiveQuestion:
+    """Remove a point of the target, counted from 1: the first stays."""
+    index = _index(index, len(question.points))
+    return question.with_points(question.points[:index] + question.points[index + 1 :])
+
+
+def scale_target(question: LiveQuestion, _: AngleView | None, angle: float, torque: float) -> LiveQuestion:
+    """Scale the whole target, so that its last point has another angle and torque and its form stays."""
+    last = question.points[-1]
+    if not last.torque > 0.0:
+        raise ValueRangeError(
+            "target", "ends without torque, so that nothing can be scaled to one",
+            next_step="give its last point a torque",
+        )  # fmt: skip
+    least = len(question.points) * LEAST_STEP
+    angle = finite_in("last angle", angle, lowest=least, highest=LARGEST_ANGLE, unit="rad")
+    torque = finite_in("last torque", torque, lowest=1e-6, highest=LARGEST_TORQUE, unit="N*m")
+    across, up = angle / last.angle, torque / last.torque
+    scaled = [TargetPoint(across * point.angle, up * point.torque) for point in question.points[:-1]]
+    return question.with_points((*scaled, TargetPoint(angle, torque)))
+
+
+def change_limit(question: LiveQuestion, _: AngleView | None, limit: str, value: float) -> LiveQuestion:
+    """Set a limit by the name of its kind, or change one that follows from the deck.
+
+    ``value``: in SI; for a stress what is allowed, safety included.
     """
-
-    index: int
-    angle: float
-    torque: float
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with the point there, between its neighbours."""
-        points = list(question.points)
-        points[_index(self.index, len(points))] = TargetPoint(float(self.angle), float(self.torque))
-        return question.with_points(tuple(points))
-
-
-@dataclass(frozen=True)
-class AddPoint(LiveEdit):
-    """Add a point to the target, wherever its angle belongs.
-
-    Parameters
-    ----------
-    angle, torque
-        In rad and N·m.
-    """
-
-    angle: float
-    torque: float
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with one point more."""
-        point = TargetPoint(float(self.angle), float(self.torque))
-        return question.with_points(tuple(sorted([*question.points, point], key=lambda each: each.angle)))
+    if limit not in limit_kinds():
+        raise unknown_name("limit", limit, limit_kinds())
+    kind = limit_kinds()[limit]
+    value = finite_in(kind.title, value, lowest=0.0, highest=1e12, unit=kind.read_unit)
+    try:
+        kind.limit(value)
+    except ValueRangeError as error:
+        # Its advice is for somebody who writes Python, and may have meant another unit.
+        raise ValueRangeError(
+            f"{kind.title} = {kind.shown(value)}", error.rule, next_step="give a number in that range"
+        ) from error
+    return replace(question, limits={**question.limits, limit: value})
 
 
-@dataclass(frozen=True)
-class RemovePoint(LiveEdit):
-    """Remove a point of the target.
-
-    Parameters
-    ----------
-    index
-        Of the point, from 1: the first stays.
-    """
-
-    index: int
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with one point less."""
-        index = _index(self.index, len(question.points))
-        return question.with_points(question.points[:index] + question.points[index + 1 :])
-
-
-@dataclass(frozen=True)
-class ScaleTarget(LiveEdit):
-    """Scale the whole target, so that its last point has another angle and torque and its form stays.
-
-    Parameters
-    ----------
-    angle, torque
-        Of the last point, in rad and N·m.
-    """
-
-    angle: float
-    torque: float
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with all points scaled."""
-        last = question.points[-1]
-        if not last.torque > 0.0:
-            raise ValueRangeError(
-                "target", "ends without torque, so that nothing can be scaled to one",
-                next_step="give its last point a torque",
-            )  # fmt: skip
-        least = len(question.points) * LEAST_STEP
-        angle = finite_in("last angle", self.angle, lowest=least, highest=LARGEST_ANGLE, unit="rad")
-        torque = finite_in("last torque", self.torque, lowest=1e-6, highest=LARGEST_TORQUE, unit="N*m")
-        across, up = angle / last.angle, torque / last.torque
-        scaled = [TargetPoint(across * each.angle, up * each.torque) for each in question.points[:-1]]
-        return question.with_points((*scaled, TargetPoint(angle, torque)))
-
-
-@dataclass(frozen=True)
-class ChangeLimit(LiveEdit):
-    """Set a limit, or change one that follows from the deck.
-
-    Parameters
-    ----------
-    limit
-        Name of its kind, for instance ``"MaximumStrain"``.
-    value
-        In SI; for a stress what is allowed, safety included.
-    """
-
-    limit: str
-    value: float
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that limit."""
-        if self.limit not in limit_kinds():
-            raise unknown_name("limit", self.limit, limit_kinds())
-        kind = limit_kinds()[self.limit]
-        value = finite_in(kind.title, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
-        try:
-            kind.limit(value)
-        except ValueRangeError as error:
-            # Its advice is for somebody who writes Python, and may have meant another unit.
-            raise ValueRangeError(
-                f"{kind.title} = {kind.shown(value)}", error.rule, next_step="give a number in that range"
-            ) from error
-        return replace(question, limits={**question.limits, self.limit: value})
-
-
-@dataclass(frozen=True)
-class DropLimit(LiveEdit):
+def drop_limit(question: LiveQuestion, _: AngleView | None, limit: str) -> LiveQuestion:
     """Take a limit away; where the deck gives one of its kind, that one holds again."""
-
-    limit: str
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question without it."""
-        if self.limit not in question.limits:
-            raise ValueRangeError(
-                f"limit '{in_words(self.limit[:80])}'", "was not set here, so it cannot be dropped",
-                next_step="a limit that follows from the deck can be changed to another number",
-            )  # fmt: skip
-        rest = {name: value for name, value in question.limits.items() if name != self.limit}
-        return replace(question, limits=rest)
+    if limit not in question.limits:
+        raise ValueRangeError(
+            f"limit '{in_words(limit[:80])}'", "was not set here, so it cannot be dropped",
+            next_step="a limit that follows from the deck can be changed to another number",
+        )  # fmt: skip
+    rest = {name: value for name, value in question.limits.items() if name != limit}
+    return replace(question, limits=rest)
 
 
-@dataclass(frozen=True)
-class SetNumber(LiveEdit):
+def set_number(question: LiveQuestion, _: AngleView | None, name: str, value: float) -> LiveQuestion:
     """Give a number, for instance pretension or a size of the rubber; it is held from then on."""
-
-    name: str
-    value: float
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number held."""
-        question.number(self.name)
-        variable = question.machine.model.variable(self.name)
-        value = finite_in(
-            self.name, self.value, lowest=variable.minimum, highest=variable.maximum, unit=variable.unit
-        )
-        held = without_free(question, self.name)
-        return replace(held, given={**question.given, self.name: value})
+    question.number(name)
+    variable = question.machine.model.variable(name)
+    value = finite_in(name, value, lowest=variable.minimum, highest=variable.maximum, unit=variable.unit)
+    return replace(without_free(question, name), given={**question.given, name: value})
 
 
-@dataclass(frozen=True)
-class FreeNumber(LiveEdit):
-    """Let the design choose a number, or the contour.
+def free_number(
+    question: LiveQuestion,
+    _: AngleView | None,
+    name: str,
+    minimum: float | None = None,
+    maximum: float | None = None,
+) -> LiveQuestion:
+    """Let the design choose a number within a range in SI, or the contour.
 
-    Parameters
-    ----------
-    name
-        Full name.
-    minimum, maximum
-        Range in SI; that of the part where it is left out.
+    ``minimum``, ``maximum``: those of the part where they are left out.
     """
-
-    name: str
-    minimum: float | None = None
-    maximum: float | None = None
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number free."""
-        free = (*(each for each in question.free if each != self.name), self.name)
-        if self.name == question.contour:
-            return replace(question, free=free)
-        question.number(self.name)
-        if self.name == question.cam.anchor_distance and question.contour not in free:
-            raise ValueRangeError(
-                f"free '{self.name}'", "the anchor shapes the contour, so it is free only together with it",
-                next_step=f"free '{question.contour}' first",
-            )  # fmt: skip
-        variable = question.machine.model.variable(self.name)
-        low = variable.minimum if self.minimum is None else self.minimum
-        high = variable.maximum if self.maximum is None else self.maximum
-        if self.minimum is None and self.maximum is None:
-            ranges = {name: each for name, each in question.ranges.items() if name != self.name}
-            return replace(question, free=free, ranges=ranges)
-        most, unit = variable.maximum, variable.unit
-        finite_in(f"least {self.name}", low, lowest=variable.minimum, highest=most, unit=unit)
-        finite_in(f"largest {self.name}", high, lowest=low, highest=most, unit=unit)
-        return replace(question, free=free, ranges={**question.ranges, self.name: (low, high)})
+    free = (*(other for other in question.free if other != name), name)
+    if name == question.contour:
+        return replace(question, free=free)
+    question.number(name)
+    if name == question.cam.anchor_distance and question.contour not in free:
+        raise ValueRangeError(
+            f"free '{name}'", "the anchor shapes the contour, so it is free only together with it",
+            next_step=f"free '{question.contour}' first",
+        )  # fmt: skip
+    variable = question.machine.model.variable(name)
+    if minimum is None and maximum is None:
+        ranges = {other: ends for other, ends in question.ranges.items() if other != name}
+        return replace(question, free=free, ranges=ranges)
+    low = variable.minimum if minimum is None else minimum
+    high = variable.maximum if maximum is None else maximum
+    most, unit = variable.maximum, variable.unit
+    finite_in(f"least {name}", low, lowest=variable.minimum, highest=most, unit=unit)
+    finite_in(f"largest {name}", high, lowest=low, highest=most, unit=unit)
+    return replace(question, free=free, ranges={**question.ranges, name: (low, high)})
 
 
-@dataclass(frozen=True)
-class HoldNumber(LiveEdit):
+def hold_number(question: LiveQuestion, shown: AngleView | None, name: str) -> LiveQuestion:
     """Hold a number, or the contour, where the design has it now."""
-
-    name: str
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number held."""
-        held = without_free(question, self.name)
-        if self.name == question.contour:
-            if question.cam.anchor_distance in held.free:
-                raise ValueRangeError(
-                    f"hold '{self.name}'", "the anchor shapes the contour, so it is held first",
-                    next_step=f"hold '{question.cam.anchor_distance}'",
-                )  # fmt: skip
-            return held if shown is None else replace(held, machine=_with_cam_of(question.machine, shown))
-        value = question.number(self.name).value
+    fixed = without_free(question, name)
+    if name != question.contour:
+        value = question.number(name).value
         if shown is not None:
-            value = {each.name: each.value for each in shown.view.numbers}.get(self.name, value)
-        return replace(held, given={**question.given, self.name: value})
+            value = {number.name: number.value for number in shown.view.numbers}.get(name, value)
+        return replace(fixed, given={**question.given, name: value})
+    if question.cam.anchor_distance in fixed.free:
+        raise ValueRangeError(
+            f"hold '{name}'", "the anchor shapes the contour, so it is held first",
+            next_step=f"hold '{question.cam.anchor_distance}'",
+        )  # fmt: skip
+    if shown is None:
+        return fixed
+    # The cam of the design, and the contour that it was fitted to.
+    machine, finished = question.machine, shown.machine.quantities()
+    cam = {number: finished[number] for number in finished if number.startswith(f"{machine.cam.name}.")}
+    changed = replace(machine, assembly=machine.assembly.with_values(cam), designed=shown.contour)
+    return replace(fixed, machine=changed)
 
 
-@dataclass(frozen=True)
-class ChooseMaterial(LiveEdit):
+def choose_material(question: LiveQuestion, _: AngleView | None, material: str) -> LiveQuestion:
     """Take another rubber of the library; sizes stay."""
-
-    material: str
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that rubber."""
-        pieces = question.cam.specimens
-        if not pieces:
-            raise ArrangementError(
-                f"spring '{question.cam.drive}'", "has no piece of rubber", next_step="choose another deck"
-            )
-        changed = question.machine.assembly
-        for piece in pieces:
-            changed = with_rubber(changed, material(self.material), piece=piece.name)
-        machine = ChosenMachine(changed, self.material, question.machine.designed)
-        return kept_names(replace(question, machine=machine))
-
-
-@dataclass(frozen=True)
-class ChooseDeck(LiveEdit):
-    """Begin from another actuator of the gallery.
-
-    Parameters
-    ----------
-    name
-        Of the deck or template.
-    """
-
-    begins_anew: ClassVar[bool] = True
-
-    name: str
-
-    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with which that actuator begins."""
-        return gallery_question(self.name)
-
-
-def kept_names(question: LiveQuestion) -> LiveQuestion:
-    """Return a question without numbers that its machine no longer has."""
-    names = {*question.machine.sizes, question.contour}
+    pieces = question.cam.specimens
+    if not pieces:
+        raise ArrangementError(
+            f"spring '{question.cam.drive}'", "has no piece of rubber", next_step="choose another deck"
+        )
+    changed = question.machine.assembly
+    for piece in pieces:
+        changed = with_rubber(changed, library.material(material), piece=piece.name)
+    machine = replace(question.machine, assembly=changed, material=material)
+    names = {*machine.sizes, question.contour}
     return replace(
         question,
-        free=tuple(name for name in question.free if name in names),
-        ranges={name: each for name, each in question.ranges.items() if name in names},
-        given={name: each for name, each in question.given.items() if name in names},
+        machine=machine,
+        free=tuple(number for number in question.free if number in names),
+        ranges={number: ends for number, ends in question.ranges.items() if number in names},
+        given={number: value for number, value in question.given.items() if number in names},
     )
+
+
+def choose_deck(_question: LiveQuestion, _: AngleView | None, name: str) -> LiveQuestion:
+    """Begin from another actuator of the gallery."""
+    return gallery_question(name)
 
 
 def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
     """Return a question in which a number, or the contour, is not free."""
     if name != question.contour:
         question.number(name)
-    free = tuple(each for each in question.free if each != name)
+    free = tuple(other for other in question.free if other != name)
     if not free:
         raise ValueRangeError(
             f"hold '{name}'", "leaves nothing that may change",
@@ -313,35 +215,37 @@ def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
     return replace(question, free=free)
 
 
-def _with_cam_of(machine: ChosenMachine, shown: AngleView) -> ChosenMachine:
-    """Return the machine with the cam of a design, and the contour that it was fitted to."""
-    cam = machine.cam
-    finished = shown.machine.quantities()
-    names = [name for name in finished if name.startswith(f"{cam.name}.")]
-    changed = machine.assembly.with_values({name: finished[name] for name in names})
-    return replace(machine, assembly=changed, designed=shown.contour)
+EDITS: Mapping[str, Callable[..., LiveQuestion]] = {
+    "MovePoint": move_point,
+    "AddPoint": add_point,
+    "RemovePoint": remove_point,
+    "ScaleTarget": scale_target,
+    "ChangeLimit": change_limit,
+    "DropLimit": drop_limit,
+    "SetNumber": set_number,
+    "FreeNumber": free_number,
+    "HoldNumber": hold_number,
+    "ChooseMaterial": choose_material,
+    "ChooseDeck": choose_deck,
+}
+"""What each edit does, by the name that messages of the page give it."""
 
 
 def edit_from(message: Mapping[str, Any]) -> LiveEdit:
     """Return the edit of a message: ``{"edit": "MovePoint", "index": 1, "angle": 0.4, "torque": 2.0}``."""
-    kinds = {kind.__name__: kind for kind in LiveEdit.__subclasses__()}
     name = message.get("edit")
-    if not isinstance(name, str) or name not in kinds:
-        raise unknown_name("edit", str(name)[:80], kinds)
-    kind = kinds[name]
-    hints = typing.get_type_hints(kind)
-    fields = {each.name: each for each in dataclasses.fields(kind)}
+    if not isinstance(name, str) or name not in EDITS:
+        raise unknown_name("edit", str(name)[:80], EDITS)
+    fields, hints = _fields(EDITS[name]), typing.get_type_hints(EDITS[name])
     given = {key: value for key, value in message.items() if key != "edit"}
     for key, value in given.items():
         if key not in fields:
             raise unknown_name(f"{name}: field", str(key)[:80], fields)
         _require_kind(f"{name}: {key}", value, hints[key])
-    missing = [
-        key for key, each in fields.items() if key not in given and each.default is dataclasses.MISSING
-    ]
+    missing = [key for key, field in fields.items() if key not in given and field.default is field.empty]
     if missing:
         raise ValueRangeError(name, f"lacks {', '.join(missing)}", next_step=f"fields: {', '.join(fields)}")
-    return kind(**given)
+    return LiveEdit(EDITS[name], given)
 
 
 def _require_kind(what: str, value: object, hint: Any) -> None:

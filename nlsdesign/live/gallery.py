@@ -22,7 +22,7 @@ from ..foundation.errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
 from .question import LiveQuestion
-from .stretch import declared_strain
+from .views import declared_strain
 
 MOST_DECK_BYTES = 400_000
 """Largest deck that is read."""

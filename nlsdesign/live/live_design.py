@@ -1,18 +1,244 @@
-"""The session of one designer: state, edits, answers."""
+"""The design of one designer: state, edits, answers, what can be undone, designs kept under a name."""
 
 from __future__ import annotations
 
+import time
+from dataclasses import dataclass, replace
+
+from ..design.parametric.parametric_solver import DesignedNumbers, ParametricDesign, ParametricSolver
 from ..foundation.errors import ValueRangeError
-from .answers import AngleAnswer, LiveAnswer
+from .answers import AngleAnswer, AnswerSource, AnswerState, LiveAnswer
 from .at_angle import AngleView
 from .background import WorkState
 from .edits import LiveEdit
-from .full_design import FullDesign
-from .live_history import LiveHistory
-from .live_snapshots import Snapshot, Snapshots
 from .question import LiveQuestion, finite_in
 from .saved import SavedDesign, saved
-from .work import LiveTask, LiveWork, ToleranceCloud
+from .views import controls_of, holding, not_kept, quick_view_of
+from .work import FullDesign, LiveTask, LiveWork, ToleranceCloud, angle_view_of, full_answer
+
+MOST_SNAPSHOTS = 8
+"""Designs that are kept side by side."""
+_NAME = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A design that was kept under a name."""
+
+    name: str
+    question: LiveQuestion
+    answer: LiveAnswer
+
+
+class Snapshots(dict[str, Snapshot]):
+    """The designs that are kept, by name."""
+
+    def keep(self, name: str, question: LiveQuestion, answer: LiveAnswer) -> Snapshot:
+        """Keep a design under a name; one of that name is replaced."""
+        if answer.design is None or answer.stale:
+            raise ValueRangeError(
+                f"design '{name:.80}'", "is not there: what is shown belongs to an earlier question",
+                next_step="widen a limit until there is a design, or take the edit back",
+            )  # fmt: skip
+        if not 1 <= len(name.strip()) <= _NAME or not name.isprintable():
+            raise ValueRangeError(
+                f"name of a design '{name:.80}'", f"has 1 to {_NAME} printable characters",
+                next_step="take a short name",
+            )  # fmt: skip
+        if name not in self and len(self) >= MOST_SNAPSHOTS:
+            raise ValueRangeError(
+                f"{len(self)} designs kept", f"are the most, {MOST_SNAPSHOTS}",
+                next_step="drop one of them",
+            )  # fmt: skip
+        self[name] = Snapshot(name, question, answer)
+        return self[name]
+
+
+@dataclass(frozen=True, eq=False)
+class LiveMoment:
+    """A question with its answer, and the last good design, which may be that of an earlier question.
+
+    Parameters
+    ----------
+    question
+        What was asked.
+    answer
+        What was answered.
+    solved
+        The last good design; ``None`` before the first, and where its program is not kept.
+    numbers
+        Its numbers, which stay without the program.
+    shown
+        That design angle by angle.
+    """
+
+    question: LiveQuestion
+    answer: LiveAnswer
+    solved: ParametricDesign | None
+    numbers: DesignedNumbers | None
+    shown: AngleView | None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Numbers of that design in SI by name; empty without one."""
+        return {} if self.numbers is None else self.numbers.values
+
+    def without_program(self) -> LiveMoment:
+        """Return the moment without the program of its design, which can be made again."""
+        return replace(self, solved=None)
+
+    def with_controls(self, *, can_undo: bool, can_redo: bool) -> LiveMoment:
+        """Return the moment with controls that offer the steps there are."""
+        controls = controls_of(self.question, can_undo=can_undo, can_redo=can_redo)
+        return replace(self, answer=replace(self.answer, controls=controls))
+
+    def under_revision(self, revision: int) -> LiveMoment:
+        """Return a moment of before as the present one."""
+        design, shown = self.answer.design, self.shown
+        if design is not None and shown is not None and not self.answer.stale:
+            design = replace(design, revision=revision)
+            shown = shown.seen_as(design)
+        answer = replace(self.answer, revision=revision, design=design, seconds=0.0)
+        return replace(self, answer=answer, shown=shown)
+
+
+def first_moment(solver: ParametricSolver, question: LiveQuestion, values: dict[str, float]) -> LiveMoment:
+    """Return the moment with which a session begins.
+
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
+    """
+    return _answered(solver, question, None, None, values)
+
+
+def next_moment(solver: ParametricSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
+    """Return the moment of a changed question, answered from the design of the one before."""
+    return _answered(solver, question, before, before.solved, before.values)
+
+
+def opened_moment(
+    solver: ParametricSolver, question: LiveQuestion, before: LiveMoment, values: dict[str, float]
+) -> LiveMoment:
+    """Return the moment of a question that was opened, answered as if nothing had been before.
+
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
+    """
+    return _answered(solver, question, before, None, values)
+
+
+def settled_moment(solver: ParametricSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
+    """Return the moment with the whole design as its answer, beside which the next drag begins."""
+    question = moment.question
+    quick = moment.solved if moment.answer.state is AnswerState.SOLVED else None
+    answer = full_answer(full, question, moment.answer, quick)
+    if full.design is None:
+        return replace(moment, answer=answer)
+    shown = angle_view_of(answer.design, full.design, question) if answer.design else moment.shown
+    solved = solver.beside_design(question, full.design)
+    numbers = moment.numbers if solved is None else solved.numbers
+    return LiveMoment(question, answer, solved or moment.solved, numbers, shown)
+
+
+def _answered(
+    solver: ParametricSolver,
+    question: LiveQuestion,
+    before: LiveMoment | None,
+    beside: ParametricDesign | None,
+    values: dict[str, float],
+) -> LiveMoment:
+    began = time.perf_counter()
+    revision = before.answer.revision + 1 if before else 1
+    solved, outcome = solver.answer(question, beside, values)
+    shown = before.shown if before else None
+    message = outcome.words
+    if solved is not None:
+        shown = AngleView(
+            quick_view_of(question, revision, solved), solved.contour, question.cam, solved.numbers.machine
+        )
+        sentences = [*shown.view.beyond, *([] if shown.view.met else [missed(question, shown)])]
+        message = "; ".join([*sentences, *not_kept(question, shown.view.margins)])
+    controls = controls_of(question, can_undo=before is not None, can_redo=False)
+    answer = LiveAnswer(
+        revision=revision, state=AnswerState(outcome.state), message=message, source=AnswerSource.QUICK,
+        design=shown.view if shown else None, controls=controls,
+        seconds=time.perf_counter() - began, conflicts=outcome.conflicts,
+    )  # fmt: skip
+    last, numbers = (before.solved, before.numbers) if before else (None, None)
+    return LiveMoment(question, answer, solved or last, solved.numbers if solved else numbers, shown)
+
+
+def missed(question: LiveQuestion, shown: AngleView) -> str:
+    """Return how far a design misses its target, and which limits hold it."""
+    view = shown.view
+    holders = holding(question, view.margins)
+    held = f"held by {', '.join(holders)}" if holders else "no limit holds it"
+    share = f"{100.0 * view.relative_error:.3g} %"
+    return f"misses its target: {share} rms of the largest torque, 1 % allowed; {held}"
+
+
+MOST_UNDO = 200
+"""Steps that can be undone."""
+
+
+class LiveHistory:
+    """The moments of one session; one whose program the solver has dropped goes on without it.
+
+    Parameters
+    ----------
+    question
+        With which it begins.
+    values
+        Numbers in SI of a design to begin beside, by name; empty without one.
+    """
+
+    def __init__(self, question: LiveQuestion, values: dict[str, float]) -> None:
+        self._solver = ParametricSolver()
+        self._grip: str | None = None
+        self.past: list[LiveMoment] = []
+        self.future: list[LiveMoment] = []
+        self.now = first_moment(self._solver, question, values)
+
+    def ask(self, question: LiveQuestion, drag: str | None, *, last: bool = False) -> None:
+        """Make a changed question with its answer the present moment."""
+        moment = next_moment(self._solver, question, self.now)
+        if drag is None or drag != self._grip:
+            self.past = [*self.past, self.now][-MOST_UNDO:]
+        self._grip, self.future = None if last else drag, []
+        self._go_to(moment)
+
+    def open(self, question: LiveQuestion, values: dict[str, float]) -> None:
+        """Make another question with its answer the present moment, one step by itself.
+
+        ``values``: numbers in SI of a design to begin beside; empty without one.
+        """
+        moment = opened_moment(self._solver, question, self.now, values)
+        self.past, self.future, self._grip = [*self.past, self.now][-MOST_UNDO:], [], None
+        self._go_to(moment)
+
+    def undo(self) -> None:
+        """Make the moment before the present one, where there is one."""
+        self._step(self.past, self.future)
+
+    def redo(self) -> None:
+        """Make the moment after the present one, where there is one."""
+        self._step(self.future, self.past)
+
+    def settle(self, full: FullDesign) -> None:
+        """Take the whole design as the answer of the present moment."""
+        self.now = settled_moment(self._solver, self.now, full)
+
+    def _step(self, source: list[LiveMoment], left: list[LiveMoment]) -> None:
+        if source:
+            left.append(self.now)
+            self._grip = None
+            self._go_to(source.pop().under_revision(self.now.answer.revision + 1))
+
+    def _go_to(self, moment: LiveMoment) -> None:
+        for row in (self.past, self.future):
+            for k, each in enumerate(row):
+                if each.solved is not None and not self._solver.keeps(each.solved):
+                    row[k] = each.without_program()
+        self.now = moment.with_controls(can_undo=bool(self.past), can_redo=bool(self.future))
+
 
 _LARGEST_ANGLE = 6.3
 
@@ -91,7 +317,7 @@ class LiveDesign:
         """Return how far all work is; a whole design that is done replaces the quick answer."""
         states = self.work.states()
         for state in states:
-            present = state.revision == self.answer.revision and self.answer.source == "quick"
+            present = state.revision == self.answer.revision and self.answer.source is AnswerSource.QUICK
             if isinstance(state.value, FullDesign) and present:
                 self._history.settle(state.value)
         return states

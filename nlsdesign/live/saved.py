@@ -1,10 +1,12 @@
-"""A live design as text: a deck and a design file that every command reads, and where the search stood."""
+"""A live design as text: a deck and a design file that every command reads, and one archive of all."""
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import tomllib
+import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,12 +18,14 @@ from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_
 from ..design.curves.numbers import plain
 from ..design.optimisation.limits import limit_kinds
 from ..design.parametric.cam_question import ChosenMachine, TargetPoint
+from ..export.files import BROKEN_ARCHIVE
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
 from .question import LiveQuestion
 
-_DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
+MEMBERS = _DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
+"""Names in the archive; the commands take the first two as they are."""
 _MOST_VALUES = 200
 _ROWS = ("directions", "lever_arms", "slopes", "radii_of_curvature")
 _MOST_ROWS = 2000
@@ -187,3 +191,42 @@ def _values(begin: dict[str, Any]) -> dict[str, float]:
         for name, value in list(table.items())[:_MOST_VALUES]
         if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     }
+
+
+_OLD = (1980, 1, 1, 0, 0, 0)
+"""Date of the members, so that the same design gives the same bytes."""
+
+
+def archived(design: SavedDesign) -> bytes:
+    """Return a saved design as an archive."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in zip(MEMBERS, (design.deck, design.job, design.begin), strict=True):
+            archive.writestr(zipfile.ZipInfo(name, _OLD), text)
+    return buffer.getvalue()
+
+
+def unarchived(content: bytes) -> SavedDesign:
+    """Return the design of an archive; only its three members are read, and no more than they may hold."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            texts = [_member(archive, name) for name in MEMBERS]
+    except UnicodeDecodeError:  # one of the errors of value that follow
+        raise DeckError("saved design", "holds what is no text in UTF-8", next_step="save it again") from None
+    except (KeyError, *BROKEN_ARCHIVE) as error:
+        raise DeckError(
+            "saved design", f"is no archive that the live page has written: {error}",
+            next_step=f"take a file with {', '.join(MEMBERS)}, or open a deck",
+        ) from None  # fmt: skip
+    return SavedDesign(*texts)
+
+
+def _member(archive: zipfile.ZipFile, name: str) -> str:
+    # What the archive says of its sizes may be wrong, so no more is unpacked than is taken.
+    with archive.open(name) as stream:
+        content = stream.read(MOST_DECK_BYTES + 1)
+    if len(content) > MOST_DECK_BYTES:
+        raise ValueRangeError(
+            name, f"is larger than {MOST_DECK_BYTES / 1e3:.0f} kB", next_step="give the file that was saved"
+        )
+    return content.decode("utf-8")

@@ -1,24 +1,245 @@
-"""What a session says to its page: answers, what holds at the angle, news of work."""
+"""What a session says to its page: answers, what holds at the angle, news of work, as plain data."""
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import functools
 import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from ..components.materials.library import materials
 from ..components.materials.material_law import missing_law
 from ..design.optimisation.limits import limit_kinds
+from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
-from .answers import LiveAnswer, to_json
+from .answers import AngleAnswer, AnswerSource, DesignView, LiveAnswer, Mechanism, WorkStage, to_json
+from .at_angle import AngleView
+from .background import WorkState
 from .gallery import gallery_cards
-from .limit_words import in_words
 from .live_design import LiveDesign
-from .outbox import Outbox
-from .page_data import angle_data, answer_data, design_data, mechanism_data
-from .work import SettleDesign, TorqueLoop
-from .work_news import WorkNews
+from .messages import Outbox
+from .views import in_words
+from .work import (
+    DiagnoseRecords,
+    ExportDesign,
+    FullDesign,
+    LiveTask,
+    SettleDesign,
+    ToleranceCloud,
+    TorqueLoop,
+)
+
+_DIGITS = 7
+_MOST_POINTS = 140
+"""Of a line in the picture of the mechanism."""
+
+
+def answer_data(answer: LiveAnswer) -> dict[str, Any]:
+    """Return an answer as plain data."""
+    data: dict[str, Any] = to_json(dataclasses.replace(answer, design=None))
+    return {**data, "design": design_data(answer.design), "stale": answer.stale}
+
+
+def design_data(design: DesignView | None) -> dict[str, Any] | None:
+    """Return a design as plain data, without the contour, which the mechanism shows.
+
+    ``design``: what is shown; none before the first.
+    """
+    if design is None:
+        return None
+    columns = [
+        {"name": each.name, "unit": each.unit, "values": short_numbers(each.values)}
+        for each in design.columns
+    ]
+    data: dict[str, Any] = to_json(dataclasses.replace(design, columns=(), contour=np.zeros((0, 2))))
+    return {**data, "columns": columns}
+
+
+def angle_data(answer: AngleAnswer) -> dict[str, Any]:
+    """Return what holds at an angle as plain data, without the mechanism, which is sent before."""
+    return {
+        "angle": answer.angle,
+        "observability": to_json(answer.observability),
+        "poles": to_json(answer.poles),
+        "loop": to_json(answer.loop),
+    }
+
+
+def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, Any]:
+    """Return the mechanism at an angle, or why there is no picture of it.
+
+    ``shown``: design; none before the first.
+    """
+    if shown is None or angle is None:
+        return {"angle": angle, "mechanism": None, "reason": "there is no design yet"}
+    try:
+        mechanism = shown.mechanism(angle)
+    except NlsError as error:
+        # A contour of no radius has no outline; its torque is an answer all the same.
+        return {"angle": angle, "mechanism": None, "reason": in_words(str(error))}
+    return {"angle": angle, "mechanism": _lines(mechanism), "reason": ""}
+
+
+def short_numbers(values: Array) -> list[Any]:
+    """Return numbers with seven digits; those that are not finite are ``None``."""
+    finite = np.isfinite(values)
+    kept = np.where(finite, values, 0.0)
+    size = np.where(kept == 0.0, 1.0, np.abs(kept))
+    # Division by a power of ten, not multiplication by its inverse, which is no decimal number.
+    scale = 10.0 ** np.clip(_DIGITS - 1.0 - np.floor(np.log10(size)), -300.0, 300.0)
+    rounded = np.round(kept * scale) / scale
+    if bool(finite.all()):
+        return list(rounded.tolist())
+    shown = rounded.astype(object)
+    shown[~finite] = None
+    return list(shown.tolist())
+
+
+def _lines(mechanism: Mechanism) -> dict[str, Any]:
+    lines = {
+        name: [short_numbers(_fewer(each)) for each in getattr(mechanism, name)]
+        for name in ("halves", "cables", "contacts", "guides", "rubbers")
+    }
+    extent = short_numbers(np.array(mechanism.extent))
+    return {"angle": mechanism.angle, **lines, "extent": extent, "remark": mechanism.remark}
+
+
+def _fewer(points: Array) -> Array:
+    """Return a line with fewer points; its ends, and every corner of a short one, stay."""
+    if points.ndim < 2 or len(points) <= _MOST_POINTS:
+        return points
+    kept = np.unique(np.round(np.linspace(0, len(points) - 1, _MOST_POINTS)).astype(int))
+    fewer: Array = points[kept]
+    return fewer
+
+
+TASKS: Final[Mapping[str, Callable[[Path], LiveTask]]] = {
+    SettleDesign.__name__: lambda _: SettleDesign(),
+    ToleranceCloud.__name__: lambda _: ToleranceCloud(),
+    TorqueLoop.__name__: lambda _: TorqueLoop(),
+    DiagnoseRecords.__name__: DiagnoseRecords,
+}
+"""The kinds of work that a page may ask for, each made for a folder of records."""
+_MOST_STAGES = 60
+
+
+class WorkNews:
+    """News of the work of one design.
+
+    Parameters
+    ----------
+    live
+        The design.
+    records
+        Folder of the records that were uploaded.
+    """
+
+    def __init__(self, live: LiveDesign, records: Path) -> None:
+        self._live = live
+        self._records = records
+        self._last: dict[str, tuple[Any, ...]] = {}
+        self._stages: dict[str, list[str]] = {}
+        self._states: dict[str, WorkState] = {}
+        self._began_with: dict[str, tuple[Any, ...]] = {}
+
+    @property
+    def running(self) -> bool:
+        """Whether any work runs."""
+        return any(each.state is WorkStage.COMPUTING for each in self._live.work.states())
+
+    def start(self, name: str) -> None:
+        """Start work of a kind."""
+        task = TASKS[name](self._records)
+        if isinstance(task, DiagnoseRecords):
+            self._records.mkdir(parents=True, exist_ok=True)
+        state = self._live.start(task)
+        self._stages[name] = []
+        self._began_with[name] = self._basis(name)
+        self._noted(state)
+
+    def stop(self, name: str) -> None:
+        """End work of a kind."""
+        state = self._live.work.cancel(name)
+        if state is not None:
+            self._noted(state)
+
+    @property
+    def export(self) -> WorkState | None:
+        """How far the file is that was asked for last."""
+        return next((each for each in self._live.work.states() if each.name == ExportDesign.__name__), None)
+
+    def changed(self) -> list[dict[str, Any]]:
+        """Return the news of all work that has changed; a whole design that is done has become the answer."""
+        news = []
+        for state in self._live.poll():
+            if state.name not in TASKS:
+                continue
+            now = self._noted(state)
+            if self._last.get(state.name) != now:
+                self._last[state.name] = now
+                news.append(self.of(state.name))
+        return news
+
+    def all(self) -> list[dict[str, Any]]:
+        """Return the news of all work, as for a page that was loaded just now or showed another design."""
+        return [self.of(name) for name in TASKS]
+
+    def of(self, name: str) -> dict[str, Any]:
+        """Return the news of work of a kind."""
+        state = self._states.get(name)
+        if state is None:
+            return {"name": name, "state": WorkStage.NOT_BEGUN, "message": "", "revision": 0, "seconds": 0.0,
+                    "stages": [], "value": None, "old": False, **self._files(name)}  # fmt: skip
+        # The whole design becomes the answer, and the loop is asked for angle by angle.
+        shown = not isinstance(state.value, FullDesign) and name != TorqueLoop.__name__
+        return {
+            "name": name, "state": state.state, "message": state.message, "revision": state.revision,
+            "seconds": state.seconds, "stages": self._stages.get(name, []),
+            "value": to_json(state.value) if shown else None, "old": self._old(name), **self._files(name),
+        }  # fmt: skip
+
+    def _noted(self, state: WorkState) -> tuple[Any, ...]:
+        """Keep a state and return what of it would be news."""
+        self._states[state.name] = state
+        stages = self._stages.setdefault(state.name, [])
+        if state.state is WorkStage.COMPUTING and state.message and state.message not in stages[-1:]:
+            stages.append(state.message)
+            del stages[:-_MOST_STAGES]
+        return state.state, state.message, state.revision, int(state.seconds), self._old(state.name)
+
+    def _old(self, name: str) -> bool:
+        """Tell whether work of a kind was begun for something else than what is there now."""
+        return name in self._began_with and self._began_with[name] != self._basis(name)
+
+    def _basis(self, name: str) -> tuple[Any, ...]:
+        """Return what work of a kind is about: a diagnosis the records and the machine as it is declared."""
+        live = self._live
+        if name == DiagnoseRecords.__name__:
+            # Points and limits belong to the design, not to the machine.
+            return (_listed(self._records), live.question.machine, dict(live.question.given))
+        design = live.answer.design
+        return live.answer.revision, design is not None and design.checked
+
+    def _files(self, name: str) -> dict[str, Any]:
+        if name != DiagnoseRecords.__name__:
+            return {}
+        return {"files": [each[0] for each in _listed(self._records)]}
+
+
+def _listed(folder: Path) -> list[tuple[str, int, int]]:
+    """Return the records that are there: name, size and time; one that is being replaced is left out."""
+    listed = []
+    for file in sorted(folder.glob("*")):
+        with contextlib.suppress(FileNotFoundError):
+            seen = file.stat()
+            listed.append((file.name, seen.st_size, seen.st_mtime_ns))
+    return listed
+
 
 _REST = 0.4
 """Seconds without an edit after which the whole design is begun: it would be in the way of a hand."""
@@ -107,7 +328,7 @@ class SessionNews:
 
     def settle_soon(self) -> None:
         """Begin the whole design once the hand rests; one that runs is of no use any more."""
-        quick = self.live.answer.source == "quick"
+        quick = self.live.answer.source is AnswerSource.QUICK
         self._settle_at = time.monotonic() + _REST if quick else None
         self.live.work.cancel(SettleDesign.__name__)
 

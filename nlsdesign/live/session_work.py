@@ -11,8 +11,7 @@ import signal
 import sys
 import threading
 
-from .inbox import Inbox
-from .outbox import Outbox
+from .messages import Inbox, Outbox
 
 
 def main() -> None:

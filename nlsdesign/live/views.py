@@ -1,19 +1,114 @@
-"""From designs to what is shown of them."""
+"""What is shown of designs: curves, limits in words, strains beyond what is stated of the rubber."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from ..design import CamDesign, LimitState
+from ..design.optimisation.defaults import StrainEnd
+from ..design.optimisation.limits import limit_kinds
 from ..design.optimisation.result import DesignCurves
+from ..design.parametric.cam_question import LimitNumber
 from ..design.parametric.parametric_solver import ParametricDesign
+from ..design.statics.equilibrium import cam_function, elastic_law
 from ..foundation.arrays import Array
+from ..model import FlatModel
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
-from .limit_words import shown_value
 from .question import LiveQuestion
-from .stretch import smallest, stretched_beyond
+
+_OTHERS = {
+    "MaximumTorqueError": "torque error that is allowed",
+    "NumberRange": "range of a free number",
+    "RestLengthRange": "its rest length",
+}
+"""Classes of limits that the page has no slider for."""
+_NO_LIMITS: Mapping[str, LimitNumber] = {}
+
+
+def in_words(sentence: str, limits: Mapping[str, LimitNumber] = _NO_LIMITS) -> str:
+    """Return a sentence with each limit called what it limits, with its number where it has one."""
+    kinds = limit_kinds()
+    names = "|".join([*kinds, *_OTHERS])
+
+    def read(match: re.Match[str]) -> str:
+        name = match.group()
+        if name not in kinds:
+            return _OTHERS[name]
+        kind = kinds[name]
+        return f"{kind.title} ({kind.shown(limits[name].value)})" if name in limits else kind.title
+
+    # "MaximumStress: stress of rubber <= 2 MPa" says already what it limits.
+    stated = (
+        re.sub(rf"\b(?:{names}): (?=[^;,:]* [<>]= )", "", sentence)
+        .replace(" <= ", " ≤ ")
+        .replace(" >= ", " ≥ ")
+    )
+    return re.sub(rf"\b(?:{names})\b", read, stated)
+
+
+def shown_bound(margin: LimitMargin) -> str:
+    """Return a side of a limit in words: what it bounds, the side, the number with its unit."""
+    return f"{margin.of} {'≤' if margin.upper else '≥'} {shown_value(margin, margin.bound)}"
+
+
+def shown_value(margin: LimitMargin, value: float) -> str:
+    """Return a number of a limit in the unit in which people read it."""
+    return limit_kinds()[margin.limit].shown(value) if margin.limit in limit_kinds() else margin.shown(value)
+
+
+def holding(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
+    """Return what a design sits on in words, without limits that are shown and not kept."""
+    words = [shown_bound(each) for each in margins if each.active and question.keeps(each.limit)]
+    if question.contour not in question.free:
+        words.append("the contour, which is held")
+    return words
+
+
+_BEYOND = 5e-4
+"""Share of the end by which a strain lies beyond it, from which it is stated."""
+_CHANGE = (
+    "limit the largest strain, give it more rest length or less pretension, or take a rubber whose law is "
+    "stated to hold so far"
+)
+
+
+def smallest(ends: Mapping[str, StrainEnd]) -> float:
+    """Return the least strain of several pieces; infinite without any."""
+    return min((each.strain for each in ends.values()), default=math.inf)
+
+
+def stretched_beyond(ends: Mapping[str, StrainEnd], columns: Iterable[LiveColumn]) -> tuple[str, ...]:
+    """Return where rubber is stretched beyond what is stated of it, how far, and what to change."""
+    angle, *others = columns
+    rows = {each.name: each.values for each in others}
+    sentences = []
+    for name, end in ends.items():
+        strains = rows[f"{name}.strain"]
+        beyond = strains > end.strain * (1.0 + _BEYOND)
+        if np.any(beyond):
+            first, last = (math.degrees(angle.values[beyond][k]) for k in (0, -1))
+            sentences.append(
+                f"{name} is stretched to {100.0 * float(strains.max()):.4g} % between {first:.3g}° and "
+                f"{last:.3g}°, but {end.reason}: {_CHANGE}"
+            )
+    return tuple(sentences)
+
+
+def declared_strain(model: FlatModel, angles: Array) -> float | None:
+    """Return the largest strain of rubber of the machine as it is declared; ``None`` without rubber."""
+    law = elastic_law(model)
+    if not law.specimens:
+        return None
+    parameters = model.start(model.parameters)
+    extensions = np.array(cam_function(model)(angles.reshape(1, -1), parameters)[1]).ravel()
+    stretched = model.values[law.cam.pretension] + extensions
+    strains = np.array([np.array(law.function(float(e), parameters)[2]).ravel() for e in stretched])
+    return float(strains.max())
+
 
 ALLOWED = 0.01
 """Rms error over the largest torque above which a design misses its target."""

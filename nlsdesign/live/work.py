@@ -1,24 +1,52 @@
-"""Long work on a design: the whole design, tolerance cloud, torque loop, diagnosis; each in a process."""
+"""Long work on a design: whole design, tolerance cloud, torque loop, diagnosis, files; each in a process."""
 
 from __future__ import annotations
 
+import io
+import tempfile
+import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..components.assembly.deck_writer import deck_text
 from ..components.assembly.named_parts import Assembly
-from ..design import Target, ToleranceResult, tolerance_analysis
+from ..design import (
+    CamDesign,
+    Contour,
+    DesignSettings,
+    Limit,
+    Target,
+    ToleranceResult,
+    design_cam,
+    tolerance_analysis,
+    write_drawings,
+)
+from ..design.jobs.written_design import declared_edge
+from ..design.parametric.parametric_solver import ParametricDesign
 from ..foundation.arrays import Array
-from ..foundation.errors import ValueRangeError
-from .answers import Lazy, LoopResponse
+from ..foundation.errors import ConvergenceError, InfeasibleError, ValueRangeError, unknown_name
+from ..foundation.written_numbers import prefixed
+from ..model import flatten
+from ..model.roles import measured_motion, series_cam, series_spring
+from ..model.transform import with_outputs
+from .answers import (
+    AnswerSource,
+    AnswerState,
+    DesignView,
+    Lazy,
+    LiveAnswer,
+    LoopResponse,
+    WorkStage,
+)
 from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
-from .full_design import whole_design
 from .question import LiveQuestion
+from .views import in_words, not_kept, unkept, view_of
 
 MOST_DRAWS = 2000
 _FEWEST_DRAWS = 20
@@ -39,7 +67,7 @@ class LiveTask(ABC):
 
 @dataclass(frozen=True)
 class SettleDesign(LiveTask):
-    """The whole design of the question: :class:`~.full_design.FullDesign`."""
+    """The whole design of the question: :class:`~.work.FullDesign`."""
 
     def call(
         self, question: LiveQuestion, shown: AngleView | None
@@ -160,14 +188,14 @@ class LiveWork:
         begun = self._designs.get(TorqueLoop.__name__)
         # A checked design has the revision of the quick one whose place it takes, but not its contour.
         if state is None or begun is None or begun.contour is not shown.contour:
-            return Lazy("asked for later", revision)
-        if state.state != "done":
+            return Lazy(WorkStage.LATER, revision)
+        if state.state is not WorkStage.DONE:
             return Lazy(state.state, revision, None, state.message)
         angles: Array = state.value[0]
         responses: list[LoopResponse] = state.value[1]
         nearest = int(np.argmin(np.abs(angles - abs(angle))))
         words = f"at {np.degrees(angles[nearest]):.1f}°, the nearest of {len(angles)} angles"
-        return Lazy("done", revision, responses[nearest], words)
+        return Lazy(WorkStage.DONE, revision, responses[nearest], words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,3 +290,249 @@ def _designed(shown: AngleView | None) -> AngleView:
     if shown is None:
         raise ValueRangeError("design", "there is none yet", next_step="widen a limit first")
     return shown
+
+
+STARTS = 8
+_DEARER = 1e-3
+"""Relative difference of costs, and cost, from which two solutions are different optima."""
+_WEIGHED = " (torque error, rubber and smoothness together)"
+_DIFFERS = 1e-3
+"""Difference of two rms errors relative to the largest torque from which it is stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class FullDesign:
+    """What the whole design came to."""
+
+    state: AnswerState
+    design: CamDesign | None
+    message: str = ""
+
+
+def whole_design(
+    stage: Callable[[str], None],
+    actuator: Assembly,
+    target: Target,
+    free: tuple[str, ...],
+    keep: tuple[Limit, ...],
+    contour: Contour | None = None,
+) -> FullDesign:
+    """Return the whole design.
+
+    ``actuator``, ``target``, ``free``, ``keep``: as for :func:`~nlsdesign.design.design_cam`; the limits are
+    all that hold.
+    """
+    done = 0
+
+    def progress() -> None:
+        nonlocal done
+        done += 1
+        ended = "; then the finish, and what would help where it misses" if done == STARTS else ""
+        stage(f"start {done} of {STARTS} is solved{ended}")
+
+    stage(f"solves from {STARTS} starts")
+    settings = DesignSettings(
+        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress,
+        contour=contour,
+    )  # fmt: skip
+    try:
+        return FullDesign(
+            AnswerState.SOLVED, design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
+        )
+    except InfeasibleError as error:
+        return FullDesign(AnswerState.INFEASIBLE, None, str(error))
+    except ConvergenceError as error:
+        return FullDesign(AnswerState.NOT_SOLVED, None, str(error))
+
+
+def full_answer(
+    full: FullDesign, question: LiveQuestion, quick: LiveAnswer, solved: ParametricDesign | None
+) -> LiveAnswer:
+    """Return the answer that replaces the quick one, with what differs between the two in its message.
+
+    ``solved``: its design; ``None`` where it had none of its own.
+    """
+    limits = question.limit_values
+    if full.design is None and solved is None:
+        return replace(
+            quick, state=full.state, source=AnswerSource.FULL, message=in_words(full.message, limits)
+        )
+    if full.design is None:
+        reason = in_words(full.message, limits)
+        sentence = f"the whole design came to no answer: {reason}; shown is the quick answer, unchecked"
+        return replace(quick, source=AnswerSource.FULL, message=sentence)
+    view = view_of(question, quick.revision, full.design)
+    missed = full.design.miss
+    sentences = [*view.beyond, *([] if missed is None else [f"misses its target: {missed.words}"])]
+    if missed is not None and missed.advice:
+        sentences.append(f"what would help: {', or '.join(missed.advice)}")
+    if solved is not None and quick.design is not None:
+        sentences += _differences(full.design, solved, quick.design)
+    elif quick.state is not AnswerState.SOLVED:
+        sentences.append("the quick answer had no design for this question")
+    if quick.state is AnswerState.SOLVED and quick.design is not None:
+        # The whole search knows nothing of limits that nothing can change; they are shown all the same.
+        view = replace(view, margins=(*view.margins, *unkept(question, quick.design.margins)))
+    sentences += not_kept(question, view.margins)
+    sentences += full.design.remarks
+    message = in_words("; ".join(sentences), limits)
+    return replace(
+        quick, state=AnswerState.SOLVED, source=AnswerSource.FULL, message=message, design=view, conflicts=()
+    )
+
+
+def _differences(design: CamDesign, solved: ParametricDesign, quick: DesignView) -> list[str]:
+    """Return in words where the quick answer was another optimum, or the finished assembly is another."""
+    cost, largest, sentences = design.starts[design.taken].cost, design.target.largest, []
+    was, there = (f"{prefixed(each)} rms" for each in (quick.rms_error, design.predicted_rms))
+    if solved.cost > cost * (1.0 + _DEARER) + _DEARER:
+        sentences.append(
+            f"the quick answer was a worse local optimum{_WEIGHED}: {was} against {there} now, both "
+            "before the finish"
+        )
+    elif cost > solved.cost * (1.0 + _DEARER) + _DEARER:
+        sentences.append(
+            f"the quick answer was a better local optimum{_WEIGHED} that none of {STARTS} starts reaches: "
+            f"{was} against {there} now; undo and redo bring it back"
+        )
+    if abs(design.rms - quick.rms_error) > _DIFFERS * largest:
+        sentences.append(
+            f"the finished assembly gives {prefixed(design.rms)} rms where the quick answer gave "
+            f"{prefixed(quick.rms_error)}: its cam sets in over an angle, and knots of its rubber are "
+            "sharp"
+        )
+    return sentences
+
+
+def angle_view_of(view: DesignView, design: CamDesign, question: LiveQuestion) -> AngleView:
+    """Return a finished design as it is looked at angle by angle."""
+    return AngleView(view, design.contour, question.cam, lambda: design.actuator)
+
+
+_SAMPLE_TIME = 1e-3
+_OLD = (1980, 1, 1, 0, 0, 0)
+"""Date of files in an archive, so that the same design gives the same bytes."""
+
+
+@dataclass(frozen=True)
+class ExportedDesign:
+    """One file."""
+
+    name: str
+    media_type: str
+    content: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class ShownDesign:
+    """The design that is exported: the changed machine, the contour of its cam, and a note for the files."""
+
+    machine: Assembly
+    contour: Contour
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class ExportDesign(LiveTask):
+    """The design as a file: :class:`ExportedDesign`.
+
+    Parameters
+    ----------
+    what
+        ``"deck"``, ``"svg"``, ``"dxf"``, ``"c"`` or ``"fmu"``.
+    note
+        What the head of the file says; empty for nothing.
+    """
+
+    what: str
+    note: str = ""
+
+    def call(
+        self, question: LiveQuestion, shown: AngleView | None
+    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """Return the export of the last good design."""
+        if self.what not in EXPORTS:
+            raise unknown_name("export", self.what[:80], EXPORTS)
+        if shown is None:
+            raise ValueRangeError("export", "there is no design yet", next_step="widen a limit first")
+        return EXPORTS[self.what], (ShownDesign(shown.machine, shown.contour, self.note),)
+
+
+def exported_deck(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the machine as a deck."""
+    text = f"# {design.note}\n{deck_text(design.machine)}" if design.note else deck_text(design.machine)
+    return ExportedDesign(f"{design.machine.name}.toml", "application/toml", text.encode())
+
+
+def exported_svg(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the drawing of the cam as SVG."""
+    return _drawing(design, "svg")
+
+
+def exported_dxf(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the drawing of the cam as DXF."""
+    return _drawing(design, "dxf")
+
+
+def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return cascade observer and PID controller as C, in an archive."""
+    from ..export import export_c
+    from ..feedback.control import joined, torque_controller
+    from ..feedback.observer import CascadeGain, design_observer
+
+    whole = flatten(design.machine)
+    plant = with_outputs(whole, [measured_motion(whole), series_spring(whole).effort])
+    stage("designs observer and controller")
+    observer = design_observer(plant, sample_time=_SAMPLE_TIME, gain=CascadeGain())
+    both = joined(observer, torque_controller(plant, sample_time=_SAMPLE_TIME))
+    stage("writes C")
+    with tempfile.TemporaryDirectory() as folder:
+        files = export_c(both, folder, name="observer_and_controller")
+        head = f"/* {design.note} */\n" if design.note else ""
+        content = _archive([files.header, files.source, files.selftest], head)
+    return ExportedDesign("observer_and_controller.zip", "application/zip", content)
+
+
+def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+    """Return the plant as an FMU for co-simulation."""
+    from ..export import export_fmu
+
+    stage("compiles the plant")
+    with tempfile.TemporaryDirectory() as folder:
+        plant = flatten(design.machine)
+        if design.note:
+            plant = replace(plant, description=f"{design.note}. {plant.description}")
+        file = export_fmu(plant, Path(folder) / "plant.fmu")
+        return ExportedDesign("plant.fmu", "application/zip", file.read_bytes())
+
+
+EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {
+    "deck": exported_deck,
+    "svg": exported_svg,
+    "dxf": exported_dxf,
+    "c": exported_c,
+    "fmu": exported_fmu,
+}
+"""What a design can be saved as."""
+
+
+_MEDIA = {"svg": "image/svg+xml", "dxf": "image/vnd.dxf"}
+
+
+def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
+    kind, radius = declared_edge(design.machine, series_cam(flatten(design.machine)))
+    machined = None if radius is None else kind(cable_radius=radius)
+    centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
+    note = "; ".join(filter(None, (design.note, centre)))
+    with tempfile.TemporaryDirectory() as folder:
+        files = write_drawings(Path(folder), design.contour, machined=machined, note=note, formats=(ending,))
+        content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
+    return ExportedDesign(f"cam.{ending}", _MEDIA[ending], content)
+
+
+def _archive(files: list[Path], head: str) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in files:
+            archive.writestr(zipfile.ZipInfo(file.name, _OLD), head.encode() + file.read_bytes())
+    return buffer.getvalue()

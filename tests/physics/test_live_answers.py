@@ -19,23 +19,22 @@ from nlsdesign.foundation.errors import NlsError, ValueRangeError
 from nlsdesign.live.answers import LiveAnswer
 from nlsdesign.live.background import BackgroundWork
 from nlsdesign.live.edits import (
-    AddPoint,
-    ChangeLimit,
-    ChooseDeck,
-    ChooseMaterial,
-    DropLimit,
-    FreeNumber,
-    HoldNumber,
-    MovePoint,
-    SetNumber,
+    add_point,
+    change_limit,
+    choose_deck,
+    choose_material,
+    drop_limit,
+    edit,
+    free_number,
+    hold_number,
+    move_point,
+    set_number,
 )
-from nlsdesign.live.full_design import full_answer, whole_design
 from nlsdesign.live.gallery import gallery_question, question_of
-from nlsdesign.live.live_design import LiveDesign
-from nlsdesign.live.live_snapshots import MOST_SNAPSHOTS
+from nlsdesign.live.live_design import MOST_SNAPSHOTS, LiveDesign
 from nlsdesign.live.question import LiveQuestion
 from nlsdesign.live.saved import reopened
-from nlsdesign.live.work import SettleDesign
+from nlsdesign.live.work import SettleDesign, full_answer, whole_design
 from tests.renamed import in_words, renamed
 
 SAME = 2e-4
@@ -88,13 +87,13 @@ def drag(live: LiveDesign, draw: np.random.Generator, size: float = 0.03) -> Liv
     room = points[k].angle - points[k - 1].angle
     angle = points[k].angle + 0.1 * room * draw.uniform(-1.0, 1.0)
     torque = points[k].torque * (1.0 + size * draw.standard_normal())
-    return live.apply(MovePoint(k, float(angle), float(max(torque, 0.0))))
+    return live.apply(edit(move_point, k, float(angle), float(max(torque, 0.0))))
 
 
 def test_quick_answer_of_a_template_is_the_whole_design(template: LiveDesign) -> None:
     require_same(template.answer, template.question)
     point = template.question.points[3]
-    answer = template.apply(MovePoint(3, point.angle * 1.02, point.torque * 1.1))
+    answer = template.apply(edit(move_point, 3, point.angle * 1.02, point.torque * 1.1))
     require_same(answer, template.question)
 
 
@@ -154,9 +153,9 @@ def test_fifty_drags_end_where_a_fresh_session_begins(deck: str) -> None:
 def test_undo_and_redo_give_the_same_numbers(template: LiveDesign) -> None:
     before = template.answer
     edits = [
-        MovePoint(2, 0.42, 0.17),
-        ChangeLimit("MaximumStrain", 1.2),
-        SetNumber("spring.rubber.area", 55e-6),
+        edit(move_point, 2, 0.42, 0.17),
+        edit(change_limit, "MaximumStrain", 1.2),
+        edit(set_number, "spring.rubber.area", 55e-6),
     ]
     answers = [template.apply(edit) for edit in edits]
     for expected in (*reversed(answers[:-1]), before):
@@ -177,7 +176,7 @@ def test_undo_and_redo_give_the_same_numbers(template: LiveDesign) -> None:
     assert not there.controls.can_redo
     # Steps of one drag are taken back together.
     for torque in (0.171, 0.172, 0.173):
-        template.apply(MovePoint(2, 0.42, torque), drag="point 2")
+        template.apply(edit(move_point, 2, 0.42, torque), drag="point 2")
     assert template.undo().controls.points == answers[-1].controls.points
     for _ in edits:
         template.undo()
@@ -186,9 +185,9 @@ def test_undo_and_redo_give_the_same_numbers(template: LiveDesign) -> None:
 
 def test_limits_that_contradict_each_other_are_named_and_the_last_design_stays(template: LiveDesign) -> None:
     good = template.answer.design
-    template.apply(ChangeLimit("MaximumCamRadius", 0.03))
+    template.apply(edit(change_limit, "MaximumCamRadius", 0.03))
     good = template.answer.design
-    answer = template.apply(ChangeLimit("MaximumCamRadius", 0.002))
+    answer = template.apply(edit(change_limit, "MaximumCamRadius", 0.002))
     assert answer.state == "infeasible"
     assert answer.stale
     assert answer.design is not None
@@ -200,7 +199,7 @@ def test_limits_that_contradict_each_other_are_named_and_the_last_design_stays(t
     assert answer.message.count("contradict") == 1
     assert "largest cam radius (2 mm) and least radius of curvature (2.25 mm) contradict" in answer.message
     assert answer.message.endswith("least radius of curvature from 2.25 mm to about 2 mm")
-    back = template.apply(DropLimit("MaximumCamRadius"))
+    back = template.apply(edit(drop_limit, "MaximumCamRadius"))
     assert back.state == "solved"
     assert not back.stale
     assert back.design is not None
@@ -209,18 +208,18 @@ def test_limits_that_contradict_each_other_are_named_and_the_last_design_stays(t
 
 @pytest.mark.slow
 def test_another_rubber_and_a_held_contour(template: LiveDesign) -> None:
-    softer = template.apply(ChooseMaterial("Dragon_Skin_30"))
+    softer = template.apply(edit(choose_material, "Dragon_Skin_30"))
     require_same(softer, template.question)
     template.undo()
     contour = template.answer.design.contour if template.answer.design else None
-    held = template.apply(HoldNumber(template.question.contour))
+    held = template.apply(edit(hold_number, template.question.contour))
     assert held.state == "solved"
     assert "is shown and not kept" in held.message
     assert held.design is not None
     assert contour is not None
     assert held.design.rms_error < 1e-3 * template.question.target.largest
     np.testing.assert_allclose(held.design.contour[-1], contour[-1], atol=1e-4)
-    tight = template.apply(ChangeLimit("MinimumRadiusOfCurvature", 6e-3))
+    tight = template.apply(edit(change_limit, "MinimumRadiusOfCurvature", 6e-3))
     question = template.question
     full = whole_design(
         lambda _: None, question.actuator, question.target, question.free, question.keep,
@@ -244,7 +243,7 @@ def test_another_rubber_and_a_held_contour(template: LiveDesign) -> None:
 def test_a_contour_that_was_just_designed_has_the_same_numbers_free_and_held(template: LiveDesign) -> None:
     """The cam that is fitted to it ripples, down to a radius of -1.9 mm; what is cut is the contour."""
     free = template.answer.design
-    held = template.apply(HoldNumber(template.question.contour))
+    held = template.apply(edit(hold_number, template.question.contour))
     texts, designed = template.saved(), template.question.machine.designed
     template.undo()
     again = reopened(texts)[0].held_contour
@@ -274,7 +273,7 @@ def test_a_held_contour_of_other_decks_is_judged_as_it_was_designed(deck: str) -
     """The one whose lever arm jumps at angle zero, and the one that sits on its stress exactly."""
     live = LiveDesign(gallery_question(deck))
     free = live.answer.design
-    held = live.apply(HoldNumber(live.question.contour))
+    held = live.apply(edit(hold_number, live.question.contour))
     assert held.state == "solved", held.message
     assert free is not None
     assert held.design is not None
@@ -293,9 +292,9 @@ def test_a_held_contour_of_other_decks_is_judged_as_it_was_designed(deck: str) -
 def test_each_drag_is_one_step_back_also_two_of_the_same_point(template: LiveDesign) -> None:
     point = template.question.points[3]
     torques = [point.torque * factor for factor in (1.0, 1.01, 1.02, 1.03)]
-    template.apply(MovePoint(3, point.angle, torques[1]), drag="point 3")
-    template.apply(MovePoint(3, point.angle, torques[2]), drag="point 3", last=True)
-    template.apply(MovePoint(3, point.angle, torques[3]), drag="point 3", last=True)
+    template.apply(edit(move_point, 3, point.angle, torques[1]), drag="point 3")
+    template.apply(edit(move_point, 3, point.angle, torques[2]), drag="point 3", last=True)
+    template.apply(edit(move_point, 3, point.angle, torques[3]), drag="point 3", last=True)
     template.undo()
     assert template.question.points[3].torque == torques[2]
     template.undo()
@@ -304,8 +303,8 @@ def test_each_drag_is_one_step_back_also_two_of_the_same_point(template: LiveDes
 
 @pytest.mark.slow
 def test_what_is_saved_is_designed_to_the_same_numbers(template: LiveDesign) -> None:
-    template.apply(FreeNumber("spring.rubber.area", 4e-5, 7e-5))
-    answer = template.apply(AddPoint(0.5, 0.21))
+    template.apply(edit(free_number, "spring.rubber.area", 4e-5, 7e-5))
+    answer = template.apply(edit(add_point, 0.5, 0.21))
     again = LiveDesign(*reopened(template.saved()))
     assert answer.design is not None
     assert again.answer.design is not None
@@ -349,7 +348,7 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A quick answer at a worse optimum is stated with its numbers; the whole design takes its place."""
-    monkeypatch.setattr("nlsdesign.live.full_design.STARTS", 1)
+    monkeypatch.setattr("nlsdesign.live.work.STARTS", 1)
     question, answer, solved = template.question, template.answer, template._history.now.solved
     assert solved is not None
     full = whole_design(lambda _: None, question.actuator, question.target, question.free, question.keep)
@@ -383,7 +382,7 @@ def test_a_whole_design_that_misses_names_what_would_help_and_it_does() -> None:
     (advice,) = missed.design.miss.advice
     length = "spring.cable.rope.rubber.rest_length"
     assert advice.startswith(f"free {length} (to ")
-    helped = FreeNumber(length).applied(question, None)
+    helped = edit(free_number, length).applied(question, None)
     met = whole_design(lambda _: None, helped.actuator, helped.target, helped.free, helped.keep)
     assert met.design is not None
     assert met.design.met
@@ -435,7 +434,7 @@ def _dying(stage: object) -> None:
 
 @pytest.mark.slow
 def test_another_deck_begins_anew(template: LiveDesign) -> None:
-    answer = template.apply(ChooseDeck("one-sided-finger"))
+    answer = template.apply(edit(choose_deck, "one-sided-finger"))
     assert answer.state == "solved"
     assert answer.controls.title == "one-sided-finger"
     assert template.shown is not None
@@ -453,7 +452,7 @@ def test_rubber_without_limits_is_a_finding_or_says_what_cannot_be_solved() -> N
     assert live.answer.design is not None
     assert live.answer.design.met
     assert live.answer.design.column("spring.cable.rubber.strain").values.max() < 2.2
-    answer = live.apply(DropLimit("MaximumStrain"))
+    answer = live.apply(edit(drop_limit, "MaximumStrain"))
     assert answer.design is not None
     (finding,) = answer.design.beyond
     assert answer.message.startswith("spring.cable.rubber is stretched to 4001 % between 0° and 56°")
@@ -485,10 +484,10 @@ def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
     monkeypatch.setattr("nlsdesign.design.parametric.parametric_solver._MOST_PROGRAMS", 1)
     before = template.answer.design
     point = template.question.points[2]
-    template.apply(AddPoint(0.5, 0.21))
+    template.apply(edit(add_point, 0.5, 0.21))
     assert template._history.past[-1].solved is None
     back = template.undo()
     assert back.design is not None
     assert before is not None
     assert back.design.rms_error == before.rms_error
-    require_same(template.apply(MovePoint(2, point.angle, point.torque * 1.01)), template.question)
+    require_same(template.apply(edit(move_point, 2, point.angle, point.torque * 1.01)), template.question)

@@ -10,12 +10,12 @@ from pathlib import Path
 ASKED = """
 import sys
 from nlsdesign.foundation.extensions import load_extension
-from nlsdesign.live.edits import ChangeLimit
+from nlsdesign.live.edits import change_limit, edit
 from nlsdesign.live.gallery import gallery_question
 
 load_extension(sys.argv[1])
 question = gallery_question("cam-actuator")
-asked = ChangeLimit("LeastContourRadius", 0.004).applied(question)
+asked = edit(change_limit, "LeastContourRadius", 0.004).applied(question)
 (row,) = [limit for limit in asked.keep if type(limit).__name__ == "LeastContourRadius"]
 assert row.radius == 0.004
 print(asked.limit_values["LeastContourRadius"].kind.title)

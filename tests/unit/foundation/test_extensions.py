@@ -15,7 +15,7 @@ from nlsdesign.bench.discrepancy.effects import catalogue
 from nlsdesign.components import component_classes, law_of, materials
 from nlsdesign.foundation.errors import ArrangementError, DeckError, NlsError
 from nlsdesign.foundation.extensions import extended_by, load_extension
-from nlsdesign.live.edits import DropLimit
+from nlsdesign.live.edits import drop_limit, edit
 from nlsdesign.live.gallery import question_of_deck
 from nlsdesign.live.live_design import LiveDesign
 from tests.command_line import Run, run
@@ -211,6 +211,6 @@ def test_a_live_design_of_a_law_that_ends_is_solved_and_says_what_it_needs(lab: 
     with extended_by(load_extension("rubber_lab")):
         live = LiveDesign(question_of_deck(text, "jointed.toml"))
         assert live.answer.state == "solved", live.answer.message
-        answer = live.apply(DropLimit("MaximumStrain"))
+        answer = live.apply(edit(drop_limit, "MaximumStrain"))
     assert answer.state == "not solved"
     assert answer.message.endswith("Add a largest strain, or hold spring.pretension")

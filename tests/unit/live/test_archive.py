@@ -7,8 +7,7 @@ import random
 import pytest
 
 from nlsdesign.foundation.errors import DeckError
-from nlsdesign.live.archive import MEMBERS, archived, unarchived
-from nlsdesign.live.saved import SavedDesign
+from nlsdesign.live.saved import MEMBERS, SavedDesign, archived, unarchived
 
 SAVED = SavedDesign(*(f'name = "{name}"\n' * 40 for name in MEMBERS))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from dataclasses import replace
@@ -14,19 +13,21 @@ import pytest
 from nlsdesign.foundation.errors import NlsError, UnknownNameError, ValueRangeError
 from nlsdesign.live.answers import LimitMargin, to_json
 from nlsdesign.live.edits import (
-    AddPoint,
-    ChangeLimit,
-    ChooseDeck,
-    ChooseMaterial,
-    DropLimit,
-    FreeNumber,
-    HoldNumber,
+    EDITS,
     LiveEdit,
-    MovePoint,
-    RemovePoint,
-    ScaleTarget,
-    SetNumber,
+    add_point,
+    change_limit,
+    choose_deck,
+    choose_material,
+    drop_limit,
+    edit,
     edit_from,
+    free_number,
+    hold_number,
+    move_point,
+    remove_point,
+    scale_target,
+    set_number,
 )
 from nlsdesign.live.gallery import gallery_cards, gallery_question, question_of_deck
 from nlsdesign.live.question import MOST_POINTS, LiveQuestion
@@ -49,56 +50,56 @@ def test_gallery_lists_every_deck_and_says_why_some_have_no_cam() -> None:
     with pytest.raises(NlsError, match="no cam spring"):
         gallery_question("austin2015_soft_spring")
     with pytest.raises(UnknownNameError, match="cam-actuator"):
-        ChooseDeck("cam-actuatr").applied(gallery_question("cam-actuator"))
+        edit(choose_deck, "cam-actuatr").applied(gallery_question("cam-actuator"))
 
 
 def test_points_move_between_their_neighbours_only(question: LiveQuestion) -> None:
-    moved = MovePoint(2, 0.4, 0.2).applied(question)
+    moved = edit(move_point, 2, 0.4, 0.2).applied(question)
     assert moved.points[2] == (0.4, 0.2)
     assert moved.target.torque(0.4) == pytest.approx(0.2)
     assert question.points[2] != (0.4, 0.2)
-    for edit in (
-        MovePoint(2, 0.1, 0.2),
-        MovePoint(2, 0.7, 0.2),
-        MovePoint(0, 0.0, 0.1),
-        MovePoint(-1, 0.3, 0.1),
-        MovePoint(9, 0.3, 0.1),
-        MovePoint(2, math.nan, 0.2),
-        MovePoint(2, 0.4, math.inf),
-        MovePoint(2, 0.4, -0.1),
-        MovePoint(5, 9.0, 0.1),
-        AddPoint(question.points[2].angle, 0.1),
-        RemovePoint(0),
+    for step in (
+        edit(move_point, 2, 0.1, 0.2),
+        edit(move_point, 2, 0.7, 0.2),
+        edit(move_point, 0, 0.0, 0.1),
+        edit(move_point, -1, 0.3, 0.1),
+        edit(move_point, 9, 0.3, 0.1),
+        edit(move_point, 2, math.nan, 0.2),
+        edit(move_point, 2, 0.4, math.inf),
+        edit(move_point, 2, 0.4, -0.1),
+        edit(move_point, 5, 9.0, 0.1),
+        edit(add_point, question.points[2].angle, 0.1),
+        edit(remove_point, 0),
     ):
         with pytest.raises(ValueRangeError):
-            edit.applied(question)
+            step.applied(question)
 
 
 @pytest.mark.parametrize(
-    ("edit", "words"),
+    ("step", "words"),
     [
-        (MovePoint(2, 0.4, -5.0), ["torque of point 3 = -5 N·m", "[0, 1e+05] N·m"]),
-        (MovePoint(2, -math.radians(5.0), 0.2), ["angle of point 3 = -5 °", "[0, 359.8] °"]),
-        (MovePoint(2, 0.7, 0.2), ["points 3 and 4 of the target", "0.057°"]),
-        (MovePoint(0, 0.0, 0.1), ["point 1 of the target", "2 to 6"]),
-        (ChangeLimit("MaximumStrain", -0.05), ["largest strain of the rubber = -5 %"]),
-        (ChangeLimit("MaximumStress", -2e6), ["largest nominal stress of the rubber = -2 MPa"]),
-        (ChangeLimit("MinimumRadiusOfCurvature", -3e-3), ["least radius of curvature = -3 mm"]),
-        (SetNumber("spring.rubber.area", -5e-6), ["spring.rubber.area = -5 mm²", "[0.01, 1e+04] mm²"]),
+        (edit(move_point, 2, 0.4, -5.0), ["torque of point 3 = -5 N·m", "[0, 1e+05] N·m"]),
+        (edit(move_point, 2, -math.radians(5.0), 0.2), ["angle of point 3 = -5 °", "[0, 359.8] °"]),
+        (edit(move_point, 2, 0.7, 0.2), ["points 3 and 4 of the target", "0.057°"]),
+        (edit(move_point, 0, 0.0, 0.1), ["point 1 of the target", "2 to 6"]),
+        (edit(change_limit, "MaximumStrain", -0.05), ["largest strain of the rubber = -5 %"]),
+        (edit(change_limit, "MaximumStress", -2e6), ["largest nominal stress of the rubber = -2 MPa"]),
+        (edit(change_limit, "MinimumRadiusOfCurvature", -3e-3), ["least radius of curvature = -3 mm"]),
+        (edit(set_number, "spring.rubber.area", -5e-6), ["spring.rubber.area = -5 mm²", "[0.01, 1e+04] mm²"]),
     ],
 )
 def test_a_refusal_counts_points_and_names_units_as_the_page_does(
-    question: LiveQuestion, edit: LiveEdit, words: list[str]
+    question: LiveQuestion, step: LiveEdit, words: list[str]
 ) -> None:
     with pytest.raises(ValueRangeError) as refused:
-        edit.applied(question)
+        step.applied(question)
     assert all(each in str(refused.value) for each in words), str(refused.value)
     assert "SI" not in str(refused.value)
 
 
 def test_a_whole_curve_is_scaled_to_its_last_point_and_keeps_its_form(question: LiveQuestion) -> None:
     """A curve of 60° is not brought to 40° point by point: each stays between its neighbours."""
-    scaled = ScaleTarget(math.radians(40.0), 0.8).applied(question)
+    scaled = edit(scale_target, math.radians(40.0), 0.8).applied(question)
     assert scaled.points[-1] == (math.radians(40.0), 0.8)
     last = question.points[-1]
     for before, after in zip(question.points, scaled.points, strict=True):
@@ -106,20 +107,20 @@ def test_a_whole_curve_is_scaled_to_its_last_point_and_keeps_its_form(question: 
         assert after.torque / 0.8 == pytest.approx(before.torque / last.torque, rel=1e-12)
     for angle, torque in ((0.0, 0.8), (1e-3, 0.8), (7.0, 0.8), (0.7, 0.0), (0.7, math.nan), (0.7, 1e9)):
         with pytest.raises(ValueRangeError):
-            ScaleTarget(angle, torque).applied(question)
+            edit(scale_target, angle, torque).applied(question)
     flat = question.with_points((*question.points[:-1], last._replace(torque=0.0)))
     with pytest.raises(ValueRangeError, match="ends without torque"):
-        ScaleTarget(0.7, 0.8).applied(flat)
+        edit(scale_target, 0.7, 0.8).applied(flat)
 
 
 def test_a_refused_limit_gives_no_advice_for_python(question: LiveQuestion) -> None:
     with pytest.raises(ValueRangeError, match=r"must lie in \[0, 0\.5\] m -> give a number in that range"):
-        ChangeLimit("MinimumRadiusOfCurvature", 1.0).applied(question)
+        edit(change_limit, "MinimumRadiusOfCurvature", 1.0).applied(question)
 
 
 def test_a_limit_that_a_held_contour_breaks_is_named_with_both_numbers(question: LiveQuestion) -> None:
-    held = ChangeLimit("MinimumRadiusOfCurvature", 6e-3).applied(
-        HoldNumber(question.contour).applied(question)
+    held = edit(change_limit, "MinimumRadiusOfCurvature", 6e-3).applied(
+        edit(hold_number, question.contour).applied(question)
     )
     shape = LimitMargin(
         "MinimumRadiusOfCurvature", "radius of curvature", -1.9e-3, 6e-3, -7.9e-3, "m", "mm", False, False
@@ -143,64 +144,70 @@ def test_rubbers_without_an_elastic_law_are_offered_with_the_reason(question: Li
     for name, reason in offered.items():
         if reason:
             with pytest.raises(NlsError, match=reason):
-                ChooseMaterial(name).applied(question)
+                edit(choose_material, name).applied(question)
 
 
 def test_two_points_are_a_straight_line_and_fifty_are_the_most(question: LiveQuestion) -> None:
     line = question
     while len(line.points) > 2:
-        line = RemovePoint(1).applied(line)
+        line = edit(remove_point, 1).applied(line)
     end = line.points[1]
     angles = np.linspace(0.0, end.angle, 9)
     np.testing.assert_allclose(line.target.torque(angles), end.torque * angles / end.angle, rtol=1e-12)
     with pytest.raises(ValueRangeError, match="2 to 50"):
-        RemovePoint(1).applied(line)
+        edit(remove_point, 1).applied(line)
     for k in range(MOST_POINTS - 2):
-        line = AddPoint(end.angle * (k + 1) / 49.0, end.torque * (k + 1) / 49.0).applied(line)
+        line = edit(add_point, end.angle * (k + 1) / 49.0, end.torque * (k + 1) / 49.0).applied(line)
     assert len(line.points) == MOST_POINTS
     with pytest.raises(ValueRangeError, match="51 points"):
-        AddPoint(end.angle * 0.005, 0.0).applied(line)
+        edit(add_point, end.angle * 0.005, 0.0).applied(line)
 
 
 def test_limits_of_the_deck_are_changed_and_come_back(question: LiveQuestion) -> None:
     given = question.limit_values["MinimumRadiusOfCurvature"]
     assert given.by_default
     assert given.value == pytest.approx(2.25e-3)
-    changed = ChangeLimit("MinimumRadiusOfCurvature", 3e-3).applied(question)
+    changed = edit(change_limit, "MinimumRadiusOfCurvature", 3e-3).applied(question)
     assert not changed.limit_values["MinimumRadiusOfCurvature"].by_default
-    assert DropLimit("MinimumRadiusOfCurvature").applied(changed).limit_values == question.limit_values
+    assert edit(drop_limit, "MinimumRadiusOfCurvature").applied(changed).limit_values == question.limit_values
     with pytest.raises(ValueRangeError, match="not set here"):
-        DropLimit("MinimumRadiusOfCurvature").applied(question)
+        edit(drop_limit, "MinimumRadiusOfCurvature").applied(question)
     with pytest.raises(UnknownNameError, match="MaximumStrain"):
-        ChangeLimit("MaximumStran", 1.0).applied(question)
+        edit(change_limit, "MaximumStran", 1.0).applied(question)
     for value in (math.nan, math.inf, -1.0, 7.0):
         with pytest.raises(ValueRangeError):
-            ChangeLimit("MinimumRadiusOfCurvature", value).applied(question)
+            edit(change_limit, "MinimumRadiusOfCurvature", value).applied(question)
 
 
 def test_a_number_that_is_given_is_held_and_one_that_is_freed_has_a_range(question: LiveQuestion) -> None:
     area = "spring.rubber.area"
-    given = SetNumber(area, 50e-6).applied(question)
+    given = edit(set_number, area, 50e-6).applied(question)
     assert given.actuator.quantities()[area].number == 50e-6
-    free = FreeNumber(area, 40e-6, 60e-6).applied(given)
+    free = edit(free_number, area, 40e-6, 60e-6).applied(given)
     assert area in free.free
     assert free.numbers[area].minimum == 40e-6
-    assert area not in SetNumber(area, 45e-6).applied(free).free
-    for edit in (SetNumber(area, -1.0), SetNumber(area, math.inf), FreeNumber(area, 60e-6, 40e-6)):
+    assert area not in edit(set_number, area, 45e-6).applied(free).free
+    for step in (
+        edit(set_number, area, -1.0),
+        edit(set_number, area, math.inf),
+        edit(free_number, area, 60e-6, 40e-6),
+    ):
         with pytest.raises(ValueRangeError):
-            edit.applied(question)
+            step.applied(question)
     with pytest.raises(UnknownNameError, match=r"spring\.rubber\.area"):
-        SetNumber("spring.rubber.aera", 1.0).applied(question)
-    held = HoldNumber("spring.pretension").applied(question)
+        edit(set_number, "spring.rubber.aera", 1.0).applied(question)
+    held = edit(hold_number, "spring.pretension").applied(question)
     with pytest.raises(ValueRangeError, match="nothing that may change"):
-        HoldNumber(held.contour).applied(held)
+        edit(hold_number, held.contour).applied(held)
     with pytest.raises(ValueRangeError, match="anchor shapes the contour"):
-        HoldNumber(question.contour).applied(FreeNumber("spring.cam.anchor_distance").applied(question))
+        edit(hold_number, question.contour).applied(
+            edit(free_number, "spring.cam.anchor_distance").applied(question)
+        )
 
 
 def test_another_rubber_keeps_the_sizes(question: LiveQuestion) -> None:
-    softer = ChooseMaterial("Dragon_Skin_30").applied(
-        SetNumber("spring.rubber.area", 50e-6).applied(question)
+    softer = edit(choose_material, "Dragon_Skin_30").applied(
+        edit(set_number, "spring.rubber.area", 50e-6).applied(question)
     )
     assert softer.numbers["spring.rubber.area"].value == 50e-6
     sources = [
@@ -208,7 +215,7 @@ def test_another_rubber_keeps_the_sizes(question: LiveQuestion) -> None:
     ]
     assert any("Dragon_Skin_30" in each for each in sources)
     with pytest.raises(UnknownNameError):
-        ChooseMaterial("Dragon_Skin_31").applied(question)
+        edit(choose_material, "Dragon_Skin_31").applied(question)
 
 
 @pytest.mark.parametrize(
@@ -236,22 +243,23 @@ def test_messages_that_are_no_edit_are_refused(message: dict[str, Any]) -> None:
 
 
 def test_every_edit_is_read_from_its_message() -> None:
-    for edit in (
-        MovePoint(1, 0.1, 0.2),
-        AddPoint(0.1, 0.2),
-        RemovePoint(1),
-        ScaleTarget(0.7, 0.8),
-        ChangeLimit("MaximumStrain", 1.0),
-        DropLimit("MaximumStrain"),
-        SetNumber("a.b", 1.0),
-        FreeNumber("a.b"),
-        FreeNumber("a.b", 0.0, 1.0),
-        HoldNumber("a.b"),
-        ChooseMaterial("PMC-770"),
-        ChooseDeck("test_rig"),
+    for step in (
+        edit(move_point, 1, 0.1, 0.2),
+        edit(add_point, 0.1, 0.2),
+        edit(remove_point, 1),
+        edit(scale_target, 0.7, 0.8),
+        edit(change_limit, "MaximumStrain", 1.0),
+        edit(drop_limit, "MaximumStrain"),
+        edit(set_number, "a.b", 1.0),
+        edit(free_number, "a.b"),
+        edit(free_number, "a.b", 0.0, 1.0),
+        edit(hold_number, "a.b"),
+        edit(choose_material, "PMC-770"),
+        edit(choose_deck, "test_rig"),
     ):
-        message = {"edit": type(edit).__name__, **dataclasses.asdict(edit)}
-        assert edit_from(json.loads(json.dumps(message))) == edit
+        names = {change: name for name, change in EDITS.items()}
+        message = {"edit": names[step.change], **step.fields}
+        assert edit_from(json.loads(json.dumps(message))) == step
 
 
 def test_decks_are_bounded_and_read_as_text(question: LiveQuestion) -> None:
@@ -265,13 +273,13 @@ def test_decks_are_bounded_and_read_as_text(question: LiveQuestion) -> None:
 
 def test_a_saved_question_reads_back_to_the_last_digit(question: LiveQuestion) -> None:
     asked = question
-    for edit in (
-        MovePoint(2, 0.41, 0.1701),
-        SetNumber("spring.rubber.rest_length", 0.0411),
-        FreeNumber("spring.rubber.area", 4e-5, 7e-5),
-        ChangeLimit("MaximumCamRadius", 0.0301),
+    for step in (
+        edit(move_point, 2, 0.41, 0.1701),
+        edit(set_number, "spring.rubber.rest_length", 0.0411),
+        edit(free_number, "spring.rubber.area", 4e-5, 7e-5),
+        edit(change_limit, "MaximumCamRadius", 0.0301),
     ):
-        asked = edit.applied(asked)
+        asked = step.applied(asked)
     again, values = reopened(saved(asked, {"spring.pretension": 0.1 + 0.2}))
     assert values == {"spring.pretension": 0.1 + 0.2}
     assert again.points == asked.points

@@ -14,8 +14,8 @@ import pytest
 
 from nlsdesign.foundation.errors import NlsError, ValueRangeError
 from nlsdesign.live.access import Access, loopback
-from nlsdesign.live.inbox import MOST, Inbox
-from nlsdesign.live.uploads import FILES, TooLargeError, Uploads, plain_name
+from nlsdesign.live.messages import MOST, Inbox
+from nlsdesign.live.sessions import FILES, TooLargeError, Uploads, plain_name
 from tests.command_line import Run, run
 from tests.live_server import Server, processes_of, running, start
 
@@ -149,7 +149,7 @@ def kept(uploads: Uploads, name: str, *parts: bytes, announced: int | None = Non
 def test_uploads_are_bounded_in_size_and_number_and_leave_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from nlsdesign.live import uploads as module
+    from nlsdesign.live import sessions as module
 
     monkeypatch.setattr(module, "FILE_BYTES", 100)
     monkeypatch.setattr(module, "ALL_BYTES", 250)

@@ -23,7 +23,7 @@ from nlsdesign.design.statics.equilibrium import equilibrium_torque
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.live.gallery import gallery_question
-from nlsdesign.live.uploads import Uploads
+from nlsdesign.live.sessions import Uploads
 from tests.command_line import Run, run
 from tests.live_session import Message, Session, as_csv, bench_records, session
 from tests.unit.bench.identification.test_tables import WRITERS

@@ -11,12 +11,10 @@ import pytest
 from nlsdesign.design.optimisation.defaults import StrainEnd
 from nlsdesign.design.optimisation.limits import limit_kinds
 from nlsdesign.live.answers import LimitMargin, LiveColumn
-from nlsdesign.live.edits import FreeNumber, HoldNumber
+from nlsdesign.live.edits import edit, free_number, hold_number
 from nlsdesign.live.gallery import gallery_question
-from nlsdesign.live.limit_words import holding, in_words
 from nlsdesign.live.question import LiveQuestion
-from nlsdesign.live.stretch import smallest, stretched_beyond
-from nlsdesign.live.views import not_kept
+from nlsdesign.live.views import holding, in_words, not_kept, smallest, stretched_beyond
 
 
 @pytest.fixture(scope="module")
@@ -67,13 +65,13 @@ def test_what_holds_a_design_has_its_number_and_a_held_contour_is_named_in_place
     rows = (rows[0], replace(rows[1], shown_unit="mm"), rows[2])
     bounds[1] = "radius of curvature ≥ 2.25 mm"
     assert holding(question, rows) == bounds
-    held = HoldNumber(question.contour).applied(question)
+    held = edit(hold_number, question.contour).applied(question)
     assert holding(held, rows) == [bounds[0], "the contour, which is held"]
 
 
 def test_a_range_of_a_free_number_is_a_limit_like_another(question: LiveQuestion) -> None:
     """It is in the margins of a whole design, and has no slider."""
-    asked = FreeNumber("spring.rubber.area", 40e-6, 60e-6).applied(question)
+    asked = edit(free_number, "spring.rubber.area", 40e-6, 60e-6).applied(question)
     row = LimitMargin(
         "NumberRange", "spring.rubber.area", 6e-5, 6e-5, 0.0, "m^2", "mm^2", upper=True, active=True
     )

@@ -1,4 +1,4 @@
-"""What a page has asked for and is not answered yet; of the edits of one drag only the newest is kept."""
+"""Messages of a session: what a page has asked for and is not answered yet, and what the session says."""
 
 from __future__ import annotations
 
@@ -69,3 +69,26 @@ def _drag(message: Mapping[str, Any]) -> str | None:
     inner = message.get("page", {})
     drag = inner.get("drag") if isinstance(inner, dict) else None
     return drag if isinstance(drag, str) else None
+
+
+class Outbox:
+    """Lines to the server: ``P`` for the page, ``S`` for the server itself."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+
+    def page(self, message: Mapping[str, Any]) -> None:
+        """Say something to the page.
+
+        ``message``: plain data; numbers are finite or ``None``.
+        """
+        self._write(b"P", message)
+
+    def server(self, message: Mapping[str, Any]) -> None:
+        """Answer a question of the server."""
+        self._write(b"S", message)
+
+    def _write(self, kind: bytes, message: Mapping[str, Any]) -> None:
+        line = json.dumps(message, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
+        self._stream.write(kind + line.encode() + b"\n")
+        self._stream.flush()
