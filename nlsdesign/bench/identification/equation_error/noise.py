@@ -22,8 +22,10 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ....foundation.arrays import Array
+from ....simulation import Trace
 from ..filters import filter_weights
 from ..records.measurement import Record, RecordSet
+from ..residuals import noise_of
 
 _DEGREE = 4
 """Degree of the polynomial that is taken from a stretch: what is slower is no noise that can be known."""
@@ -47,6 +49,8 @@ _PLAINLY_ONE = 4.0
 its corner to count as seen: it is then seven times as probable."""
 _PLAIN = 1.5
 """Density at the lowest frequency over that of the white part, up to which noise counts as white."""
+_LAGS, _ENOUGH_SAMPLES = 9, 20_000
+"""Samples over which a controller forms its command from counts, and from which that is told."""
 _STILL = 1.5
 """Counts within which a motion is at rest, or comes again."""
 _ELSEWHERE = 10.0
@@ -336,13 +340,18 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     ``records``: those held out are not looked at, unless there are no others; the median over the records is
     taken. ``targets``: signals that blocks predict, whose noise may have a colour: it is told where all
     motions are at rest, and from what is left of a motion that repeats when it is subtracted from itself one
-    period later. What drives a block varies at rest for other reasons than noise.
+    period later. What drives a block varies at rest for other reasons than noise: what a controller makes of
+    the counts that it reads moves the machine, however it looks.
     """
     seen = records.deciding
     level, rounded, quanta = {}, {}, {}
+    counted = _counted(records)
     for column in records.columns:
         resolutions = [r.resolution_of(column.signal) for r in seen]
         white = float(np.median([g.noise for g in resolutions]))
+        if counted and column.signal not in (*targets, *counted):
+            own = [noise_of(_without_chatter(r.trace, column.signal, counted)) for r in seen]
+            white = min(white, float(np.median(own)))
         # The count of a resampled signal is that of its samples before, as it weighs on the new clock.
         kept = any(column.signal in r.resolution for r in seen)
         declared = 0.0 if kept else column.quantum
@@ -370,6 +379,35 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
             level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
             lengths[signal] = tuple(s.step * len(s.samples) for s in at_rest + repeated)
     return Noise(level, rounded, parts, evidence, lengths).read_as(records)
+
+
+def _counted(records: RecordSet) -> list[str]:
+    """Return the signals that are no smoother than their counts, as those of encoders."""
+    found = []
+    for column in records.columns:
+        resolutions = [r.resolution_of(column.signal) for r in records.deciding]
+        quantum = column.quantum or float(np.median([g.quantum for g in resolutions]))
+        whole = all(column.signal not in r.resolution for r in records.deciding)
+        if whole and float(np.median([g.noise for g in resolutions])) < 2.0 * quantum / math.sqrt(12.0):
+            found.append(column.signal)
+    return found
+
+
+def _without_chatter(trace: Trace, signal: str, counted: Sequence[str]) -> Array:
+    """Return the first samples of a signal without what is a weighted sum of the last counts.
+
+    What is smooth decides nothing: the weights are those of fourth differences.
+    """
+    whole = trace[signal][:_ENOUGH_SAMPLES]
+    before = [
+        np.concatenate([np.full(lag, trace[name][0]), trace[name][: len(whole) - lag]])
+        for name in counted
+        for lag in range(_LAGS)
+    ]
+    columns = np.column_stack(before)
+    weights = np.linalg.lstsq(np.diff(columns, 4, axis=0), np.diff(whole, 4), rcond=None)[0]
+    left: Array = whole - columns @ weights
+    return left
 
 
 def _length(stretches: Sequence[Stretch]) -> float:

@@ -53,6 +53,20 @@ def test_the_deviation_of_flicker_noise_is_told_from_rests_that_are_shorter_than
         assert noise.seen[FORCE] == pytest.approx((1.144,) * 7, abs=0.02)
 
 
+@pytest.mark.parametrize("count", [1.5e-3, 4e-5])
+def test_what_a_controller_makes_of_counts_is_no_noise_of_its_current(count: float) -> None:
+    """A PD law on an encoder moves the current by whole steps, from one sample to the next."""
+    time, draw = STEP * np.arange(COUNT), np.random.default_rng(2)
+    angle = count * np.round(0.6 * np.sin(2.0 * np.pi * 0.8 * time) / count)
+    error = 0.62 * np.sin(2.0 * np.pi * 0.8 * time + 0.1) - angle
+    filtered = np.convolve(np.append(0.0, np.diff(error)) / STEP, [0.5, 0.3, 0.2])[:COUNT]
+    current = 40.0 * error + 2.0 * filtered + 0.02 * draw.standard_normal(COUNT)
+    trace = Trace(time, {"angle": angle, "current": current}, {"angle": "rad", "current": "A"}, "run")
+    columns = (Column("angle", "angle", "rad", quantum=count), Column("current", "current", "A"))
+    noise = estimate_noise(RecordSet((Record("run", trace),), columns))
+    assert noise.level["current"] == pytest.approx(0.02, rel=0.1)
+
+
 def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, BlockNoise]:
     """Floors of a bench whose force has noise that remembers, seen in ten rests of 0.1 s."""
     records = RecordSet((record("a", 0.2, 1e-3),), COLUMNS)
