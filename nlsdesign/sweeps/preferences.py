@@ -27,23 +27,11 @@ class Preference(ABC):
 
     @abstractmethod
     def cost(self, values: Array) -> Array:
-        """Return numbers of which the smaller is the better one; not a number stays so.
-
-        Parameters
-        ----------
-        values
-            Of the answer, in SI.
-        """
+        """Return numbers of answers in SI of which the smaller is the better one; not a number stays so."""
 
     @abstractmethod
     def words(self, unit: str) -> str:
-        """Return the direction as text.
-
-        Parameters
-        ----------
-        unit
-            Of the answer.
-        """
+        """Return the direction as text, with the unit of the answer."""
 
 
 @dataclass(frozen=True)
@@ -110,13 +98,7 @@ class Requirement(ABC):
 
     @abstractmethod
     def kept(self, values: Array) -> Mask:
-        """Return which values keep it; one that is not a number does not.
-
-        Parameters
-        ----------
-        values
-            Of the answer, in SI.
-        """
+        """Return which values, in SI, keep it; one that is not a number does not."""
 
     @abstractmethod
     def words(self, unit: str) -> str:

@@ -450,13 +450,6 @@ class DiagnosisQuestion(SweepQuestion):
     def stands_for(self, name: str, text: str) -> str:
         """Return the digest of the records in a folder that an axis lists.
 
-        Parameters
-        ----------
-        name
-            Of the axis.
-        text
-            The folder.
-
         Raises
         ------
         MeasurementError

@@ -129,12 +129,7 @@ class SweepTable:
         return int(rows[0])
 
     def assembly_at(self, point: int) -> Assembly:
-        """Return the assembly behind a point: its deck with the numbers and materials of the point.
-
-        Parameters
-        ----------
-        point
-            Number of the point, from 0.
+        """Return the assembly behind a point, from 0: its deck with the numbers and materials of the point.
 
         Raises
         ------

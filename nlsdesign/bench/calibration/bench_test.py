@@ -70,12 +70,7 @@ class CalibrationTest(ABC):
     instruments: Instruments = Instruments()
 
     def on_bench(self, actuator: Assembly) -> Assembly:
-        """Return the machine as it stands on the bench: everything but the drive is clamped.
-
-        Parameters
-        ----------
-        actuator
-            As declared.
+        """Return the declared machine as it stands on the bench: everything but the drive is clamped.
 
         Raises
         ------

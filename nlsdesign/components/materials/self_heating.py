@@ -28,15 +28,7 @@ class Heat(Reading):
 
     @abstractmethod
     def effort(self, held: Combination, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return the effort of the warm elements.
-
-        Parameters
-        ----------
-        held
-            Holds the elements.
-        scope, motion, rate
-            As for :meth:`Element.effort`.
-        """
+        """Return the effort of the warm elements that are held; the rest as for :meth:`Element.effort`."""
 
 
 @dataclass(frozen=True)

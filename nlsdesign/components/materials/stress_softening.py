@@ -113,10 +113,8 @@ class LargestMotion(SofteningCurve):
         self, held: Combination, scope: Scope, motion: Expression, rate: Expression
     ) -> tuple[Expression, Expression]:
         """Return the share and the effort inside."""
-        domain = held.domain
-        state = ("largest", domain.motion_unit, f"largest {domain.motion} of {scope.path} so far")
         size = ca.fabs(motion)
-        largest = following(scope, state, size, scope.parameter("following"))
+        largest = _largest_so_far(held, scope, size)
         ratio = ca.fmin(ca.fmax(size / ca.fmax(largest, 1e-12), _LEAST_RATIO), 1)
         lost = scope.parameter("softening") * (1 - ratio ** scope.parameter("exponent"))
         return 1 - lost, held.inside(scope, motion, rate)
@@ -148,9 +146,7 @@ class DamageByMotion(SofteningCurve):
         self, held: Combination, scope: Scope, motion: Expression, rate: Expression
     ) -> tuple[Expression, Expression]:
         """Return the share and the effort inside."""
-        domain = held.domain
-        state = ("largest", domain.motion_unit, f"largest {domain.motion} of {scope.path} so far")
-        largest = following(scope, state, ca.fabs(motion), scope.parameter("following"))
+        largest = _largest_so_far(held, scope, ca.fabs(motion))
         broken = -ca.expm1(-largest / scope.parameter("damage_motion"))
         return 1 - scope.parameter("damage") * broken, held.inside(scope, motion, rate)
 
@@ -197,3 +193,10 @@ class StressSoftening(Combination):
         share, effort = self.curve.softened(self, scope, motion, rate)
         scope.signal("softness", share, "1", f"share of the virgin effort that {scope.path} has")
         return share * effort
+
+
+def _largest_so_far(held: Combination, scope: Scope, size: Expression) -> Expression:
+    """Return the state that follows the size of the motion upwards, in the time ``following``."""
+    domain = held.domain
+    state = ("largest", domain.motion_unit, f"largest {domain.motion} of {scope.path} so far")
+    return following(scope, state, size, scope.parameter("following"))

@@ -283,13 +283,7 @@ class Held:
     rolls_back: bool = field(default=False, init=False)
 
     def step(self, system: Steppable, time: float, length: float) -> None:
-        """Take one step with zero slopes.
-
-        Parameters
-        ----------
-        system, time, length
-            See :class:`Coupling`.
-        """
+        """Take one step with zero slopes."""
         for curve in system.curves:
             curve.slope = 0.0
         system.advance()
@@ -303,13 +297,7 @@ class Extrapolated:
     rolls_back: bool = field(default=False, init=False)
 
     def step(self, system: Steppable, time: float, length: float) -> None:
-        """Take one step with the slopes of the last.
-
-        Parameters
-        ----------
-        system, time, length
-            See :class:`Coupling`.
-        """
+        """Take one step with the slopes of the last."""
         for curve in system.curves:
             curve.slope = curve.past_slope()
         system.advance()

@@ -139,15 +139,7 @@ _WARNING = 1
 
 
 class FmuInstance(LoadedFmu):
-    """A loaded FMU whose variables are set and read in place, and which is stepped.
-
-    Parameters
-    ----------
-    description
-        Of the FMU.
-    watch
-        Told what is called, so that a crash can be explained.
-    """
+    """A loaded FMU whose variables are set and read in place, and which is stepped."""
 
     def __init__(self, description: FmuDescription, watch: Watch) -> None:
         super().__init__(description, watch)

@@ -216,7 +216,7 @@ _WIDTH = 110
 
 
 def export_modelica(model: FlatModel, path: str | Path) -> Path:
-    """Write a continuous model as plain Modelica, one flat class without any library.
+    """Write a continuous model as plain Modelica, one flat class without any library; return the file.
 
     Names are those of the deck, between quotation marks: ``'motor.angle'``. Parameters carry their values
     and units, with their sources as comments. Nothing in the text makes events: where a law has a corner,
@@ -228,11 +228,6 @@ def export_modelica(model: FlatModel, path: str | Path) -> Path:
         Continuous and smooth, as ``flatten`` gives it.
     path
         File to write, by custom ``NAME.mo``.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

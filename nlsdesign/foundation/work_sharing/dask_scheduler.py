@@ -81,12 +81,7 @@ class DaskScheduler:
 
     @contextmanager
     def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
-        """Yield the workers of the scheduler; their processes go on after the block, without our work.
-
-        Parameters
-        ----------
-        work
-            Asked of each point; pickled.
+        """Yield the workers of the scheduler, which get the work pickled, and live on without it.
 
         Raises
         ------

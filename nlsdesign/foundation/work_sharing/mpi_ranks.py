@@ -32,12 +32,7 @@ class MpiRanks:
 
     @contextmanager
     def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
-        """Yield the other ranks.
-
-        Parameters
-        ----------
-        work
-            Asked of each point; pickled.
+        """Yield the other ranks; ``work`` is pickled.
 
         Raises
         ------

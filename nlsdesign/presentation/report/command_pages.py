@@ -55,11 +55,6 @@ def write_fit_report(path: Path, result: Refit, *, facts: Mapping[str, str], fil
     files
         Written beside the report.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     ExportError
@@ -124,11 +119,6 @@ def write_analysis_report(
     files
         Written beside the report.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     ExportError
@@ -185,11 +175,6 @@ def write_observer_report(
         What is said of it, one sentence or drawing of several lines each.
     files
         Written beside the report.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------
@@ -258,11 +243,6 @@ def write_diagnosis_report(
         Short texts by name, for instance deck and records.
     regenerated
         The observer of the better model and its files, where one was designed.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

@@ -122,11 +122,6 @@ def write_design_report(
     files
         Written beside the report.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     ExportError

@@ -29,7 +29,7 @@ _PAGE_TONES = {
 def write_report(
     path: Path, *sections: Section, title: str, abstract: str = "", facts: Mapping[str, str] | None = None
 ) -> Path:
-    """Write a report; the file appears whole or not at all.
+    """Write a report and return its file, which appears whole or not at all.
 
     Parameters
     ----------
@@ -43,11 +43,6 @@ def write_report(
         Paragraphs below the heading.
     facts
         Short texts by name for the line below, for instance the deck.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

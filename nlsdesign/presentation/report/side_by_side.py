@@ -53,7 +53,7 @@ class ComparedResult:
 
 
 def write_comparison(path: Path, results: Sequence[ComparedResult]) -> Path:
-    """Write designs or diagnoses side by side as a page.
+    """Write designs or diagnoses side by side as a page, and return its file.
 
     Parameters
     ----------
@@ -61,11 +61,6 @@ def write_comparison(path: Path, results: Sequence[ComparedResult]) -> Path:
         File to write, ending in ``.html``.
     results
         At least two, in the order of the columns; the first is what the others are compared with.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

@@ -68,15 +68,7 @@ class GroupFit:
 
 
 class HypothesisFit:
-    """Fits groups of blocks to the records.
-
-    Parameters
-    ----------
-    bench
-        Records with filters and noise floors.
-    sizes
-        Largest value of each signal of the declared model on the records, by name.
-    """
+    """Fits groups of blocks to the records of a :class:`Comparison`."""
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
         self._bench, self._sizes = bench, sizes

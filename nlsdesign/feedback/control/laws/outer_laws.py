@@ -243,17 +243,7 @@ class DesiredRate(ABC):
 
     @abstractmethod
     def rate(self, writer: LawWriter, drive: KnownDrive, heard: Heard) -> Expression:
-        """Return dT_d/dt in N·m/s.
-
-        Parameters
-        ----------
-        writer
-            Of the controller.
-        drive
-            What is known of the plant.
-        heard
-            Inputs of the controller.
-        """
+        """Return dT_d/dt in N·m/s; it is asked with what :meth:`TorqueLaw.command` gets."""
 
 
 @dataclass(frozen=True)

@@ -261,19 +261,7 @@ class VelocityLoop:
     def current(
         self, writer: LawWriter, drive: KnownDrive, heard: Heard, command: SpeedCommand
     ) -> MotorCurrent:
-        """Write the loop into a controller and return the current.
-
-        Parameters
-        ----------
-        writer
-            Of the controller.
-        drive
-            What is known of the plant.
-        heard
-            Inputs of the controller.
-        command
-            Of the outer law.
-        """
+        """Write the loop into a controller and return the current, for the command of its outer law."""
         raw, speed = self.measured_speed(writer, drive, heard)
         slow = writer.state("velocity_loop.integral", "N*m", "integral part of the motor torque")
         turns, inertia, constant = (

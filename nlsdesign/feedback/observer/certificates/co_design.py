@@ -86,6 +86,36 @@ class GainAndLyapunov(NamedTuple):
     lyapunov: Array
 
 
+def unknown_matrices(n: int, r: int, corrected: Sequence[int], *, unit: float = 1.0) -> tuple[Array, Array]:
+    """Return P (k, n, n) and Y (k, n, r) of each unknown; the last one, in neither, bounds the noise in V.
+
+    ``corrected``: rows of the gain that may differ from zero, in a unit; P joins no other state with these.
+    """
+    pairs = [(i, j) for j in range(n) for i in range(j + 1) if (i in corrected) == (j in corrected)]
+    spots = [(i, j) for i in corrected for j in range(r)]
+    p = np.zeros((len(pairs) + len(spots) + 1, n, n))
+    y = np.zeros((len(p), n, r))
+    for k, (i, j) in enumerate(pairs):
+        p[k, i, j] = p[k, j, i] = 1.0
+    for k, (i, j) in enumerate(spots):
+        y[len(pairs) + k, i, j] = unit
+    return p, y
+
+
+def least_disturbed(p: Array, y: Array, inequalities: Sequence[Inequality]) -> GainAndLyapunov | None:
+    """Return gain and P that let the least of a wrong measurement into V; ``None`` where there are none."""
+    cost = np.zeros(len(p))
+    cost[-1] = 1.0
+    result = minimised(cost, inequalities)
+    if result is None:
+        return None
+    lyapunov = np.tensordot(result, p, 1)
+    if np.min(np.linalg.eigvalsh(lyapunov)) <= 0.5:
+        return None
+    gain = np.linalg.solve(lyapunov, np.tensordot(result, y, 1))
+    return GainAndLyapunov(np.asarray(gain, dtype=np.float64), lyapunov)
+
+
 @dataclass(frozen=True, eq=False)
 class GainProblem:
     """Corners of one sample before the correction, in scaled states, and what is asked of the gain.
@@ -127,22 +157,9 @@ class GainProblem:
     def solved(
         self, decay: float, moving_decay: float, *, corrected: Sequence[int]
     ) -> GainAndLyapunov | None:
-        """Return the gain that lets the least of a wrong measurement into V; ``None`` where there is none.
-
-        ``corrected``: rows of the gain that may differ from zero; P joins no other state with these.
-        """
+        """Return the gain that lets the least of a wrong measurement into V; ``None`` where there is none."""
         n, r = self.corners.shape[1], len(self.output_matrix)
-        pairs = [(i, j) for j in range(n) for i in range(j + 1) if (i in corrected) == (j in corrected)]
-        spots = [(i, j) for i in corrected for j in range(r)]
-        p = np.zeros((len(pairs) + len(spots) + 1, n, n))
-        y = np.zeros((len(p), n, r))
-        for k, (i, j) in enumerate(pairs):
-            p[k, i, j] = p[k, j, i] = 1.0
-        for k, (i, j) in enumerate(spots):
-            y[len(pairs) + k, i, j] = 1.0
-        # The last unknown bounds M'PM, how much of a wrong measurement gets into V.
-        cost = np.zeros(len(p))
-        cost[-1] = 1.0
+        p, y = unknown_matrices(n, r, corrected)
         ends = [np.eye(n), self.condition * np.eye(n)]
         inequalities = [Inequality(-ends[0], p), Inequality(ends[1], -p), noise_inequality(p, y)]
         moving = list(self.moving)
@@ -153,16 +170,13 @@ class GainProblem:
             keep = math.exp(-2.0 * moving_decay * self.sample_time)
             if moving_decay > decay:
                 inequalities.append(_contraction(p[block], moved[block], keep))
-        result = minimised(cost, inequalities)
-        if result is None:
+        solution = least_disturbed(p, y, inequalities)
+        if solution is None:
             return None
-        lyapunov = np.tensordot(result, p, 1)
-        if np.min(np.linalg.eigvalsh(lyapunov)) <= 0.5:
-            return None
-        gain = np.linalg.solve(lyapunov, np.tensordot(result, y, 1))
+        gain, lyapunov = solution.gain, solution.lyapunov
         contracted = self.corners - gain @ self.output_matrix @ self.corners
         holds = contraction(lyapunov, contracted) <= math.exp(-decay * self.sample_time) * (1.0 + 1e-9)
-        return GainAndLyapunov(np.asarray(gain, dtype=np.float64), lyapunov) if holds else None
+        return solution if holds else None
 
 
 def noise_inequality(p: Array, y: Array) -> Inequality:

@@ -23,7 +23,15 @@ from ....model.roles import measured_motion, spring_torque
 from ..scheduling.angle_form import Minimal, PaperForm
 from ..scheduling.scheduled import whole_contour
 from .certificate import FORMAT, Certificate
-from .co_design import MARGIN, GainAndLyapunov, Inequality, fastest, minimised, noise_inequality
+from .co_design import (
+    MARGIN,
+    GainAndLyapunov,
+    Inequality,
+    fastest,
+    least_disturbed,
+    noise_inequality,
+    unknown_matrices,
+)
 from .error_system import ErrorSystem, error_system
 from .exact import combined, exact, is_positive_definite, times, transposed
 
@@ -94,12 +102,7 @@ class ContinuousContraction:
 
     @classmethod
     def read(cls, content: dict[str, Any]) -> ContinuousContraction:
-        """Return the proof that a file holds.
-
-        Parameters
-        ----------
-        content
-            Of the file.
+        """Return the proof that the content of a file holds.
 
         Raises
         ------
@@ -223,19 +226,11 @@ def _solved(
 ) -> GainAndLyapunov | None:
     """Return the gain that lets the least of a wrong measurement into V; L in SI, both rounded."""
     n, r, size = len(system.states), len(system.seen), np.array(system.sizes)
-    pairs = [(i, j) for j in range(n) for i in range(j + 1) if (i in corrected) == (j in corrected)]
-    spots = [(i, j) for i in corrected for j in range(r)]
-    p, y = np.zeros((len(pairs) + len(spots) + 1, n, n)), np.zeros((len(pairs) + len(spots) + 1, n, r))
-    for k, (i, j) in enumerate(pairs):
-        p[k, i, j] = p[k, j, i] = 1.0
     output = np.zeros((r, n))
     output[range(r), system.seen] = 1.0
     # Unknowns of one size: a correction of angle and speed is some hundred times per second.
     unit = max(decay, float(np.max(np.abs(corners))))
-    for k, (i, j) in enumerate(spots):
-        y[len(pairs) + k, i, j] = unit
-    cost = np.zeros(len(p))
-    cost[-1] = 1.0
+    p, y = unknown_matrices(n, r, corrected, unit=unit)
     inequalities = [
         Inequality(-np.eye(n), p),
         Inequality(condition / 1.001 * np.eye(n), -p),
@@ -245,15 +240,11 @@ def _solved(
         moved = p @ a - y @ output
         falling = -(moved + moved.transpose(0, 2, 1)) - 2.0 * decay * MARGIN * p
         inequalities.append(Inequality(np.zeros((n, n)), falling / unit))
-    result = minimised(cost, inequalities)
-    if result is None:
+    least = least_disturbed(p, y, inequalities)
+    if least is None:
         return None
-    lyapunov = np.tensordot(result, p, 1)
-    if np.min(np.linalg.eigvalsh(lyapunov)) <= 0.5:
-        return None
-    gain = np.linalg.solve(lyapunov, np.tensordot(result, y, 1))
-    gain = gain * size[:, None] / size[list(system.seen)][None, :]
-    solution = GainAndLyapunov(_digits(gain, 7), _digits(lyapunov, 10))
+    gain = least.gain * size[:, None] / size[list(system.seen)][None, :]
+    solution = GainAndLyapunov(_digits(gain, 7), _digits(least.lyapunov, 10))
     return solution if _falls(corners, output, solution, size, system.seen, decay) else None
 
 

@@ -127,12 +127,7 @@ class Contraction:
 
     @classmethod
     def read(cls, content: dict[str, Any]) -> Contraction:
-        """Return the proof that a file holds.
-
-        Parameters
-        ----------
-        content
-            Of the file.
+        """Return the proof that the content of a file holds.
 
         Raises
         ------

@@ -45,14 +45,8 @@ class ErrorPolytope:
 
     Parameters
     ----------
-    states
-        Names, in the order of the observer.
-    sizes
-        Typical sizes of the states, shape (n,); V = eᵀPe is written in states over these.
-    moving
-        Places of angle and speed.
-    seen
-        Places of the measured states.
+    states, sizes, moving, seen
+        As of an :class:`~nlsdesign.feedback.observer.certificates.error_system.ErrorSystem`.
     sample_time
         T in s.
     columns
