@@ -41,7 +41,7 @@ def _criterion(default: float, meaning: str) -> Any:
 class Criteria:
     """The numbers of the decision rule; every verdict repeats them.
 
-    They were set on the simulated bench of ``tests/rig``, seeds 200 to 299, and on the labelled practice
+    They were set on the simulated bench of ``tests/rig``, seeds 200 to 289, and on the labelled practice
     records, see ``docs/decision.md``; the meaning of each stands in its field and in ``verdict.json``.
     """
 
