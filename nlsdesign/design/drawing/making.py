@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from ...foundation.errors import NlsError
@@ -65,55 +65,74 @@ def process_of(part: CamPart) -> str:
     return f"edges cut through, {fine}: milling"
 
 
-def torque_remarks(part: CamPart, machined: MachinedCam, contour: Contour, torque: float) -> Iterator[str]:
-    """Yield where nothing carries the torque from the part to its shaft, and bolts that would.
+@dataclass(frozen=True, eq=False)
+class Mounting:
+    """A part on its shaft: what carries the largest torque of a curve from one to the other.
 
-    ``torque``: the largest in N·m.
+    Parameters
+    ----------
+    machined, contour
+        Sizes of the part, and the curve that it is made for.
+    part
+        Made of both.
+    torque
+        In N·m.
     """
-    if machined.bolts is not None:
-        hole = part.number("bolt_hole") * (1.0 + 1e-9)
-        screw = next((each for each in reversed(_SCREWS) if each.hole <= hole), None)
-        force = _FACTOR * torque / (part.number("bolt_count") * part.number("bolt_circle") / 2.0)
-        if screw is None or force > _SHEAR * screw.area:
-            most = (
-                "no screw from M1.6 on passes"
-                if screw is None
-                else f"{screw.name} carries {_SHEAR * screw.area:.3g} N"
+
+    machined: MachinedCam
+    contour: Contour
+    part: CamPart
+    torque: float
+
+    def remarks(self) -> Iterator[str]:
+        """Yield the process of the part, where nothing carries the torque, and bolts that would."""
+        yield f"to be made by: {process_of(self.part)}"
+        if self.machined.bolts is not None:
+            yield from self.bolts_too_weak(self.machined.bolts.count)
+            return
+        bore = "neither bore, bolts, key nor clamp"
+        if self.machined.hub_bore is not None:
+            radius = self.part.number("hub_bore") / 2.0
+            bore = (
+                f"a bore of {2.0 * MM * radius:.3g} mm without bolts, key or clamp, on whose rim it is "
+                f"{self.torque / radius:.3g} N"
             )
-            yield (
-                f"{machined.bolts.count} bolts take {_FACTOR:g} times {torque:.3g} N·m with {force:.3g} N "
-                f"each, {most} in shear (class 8.8, EN 1993-1-8){_bolts_that_do(machined, contour, torque)}"
-            )
-        return
-    bore = "neither bore, bolts, key nor clamp"
-    if machined.hub_bore is not None:
-        radius = part.number("hub_bore") / 2.0
-        bore = (
-            f"a bore of {2.0 * MM * radius:.3g} mm without bolts, key or clamp, on whose rim it is "
-            f"{torque / radius:.3g} N"
+        yield (
+            f"nothing carries the largest torque, {self.torque:.3g} N·m, from the part to its shaft: {bore}"
+            f"{self.bolts_that_do()}"
         )
-    yield (
-        f"nothing carries the largest torque, {torque:.3g} N·m, from the part to its shaft: {bore}"
-        f"{_bolts_that_do(machined, contour, torque)}"
-    )
 
+    def bolts_too_weak(self, count: int) -> Iterator[str]:
+        """Yield how far bolts of the largest screw that passes their holes fall short."""
+        hole = self.part.number("bolt_hole") * (1.0 + 1e-9)
+        screw = next((each for each in reversed(_SCREWS) if each.hole <= hole), None)
+        force = _FACTOR * self.torque / (count * self.part.number("bolt_circle") / 2.0)
+        if screw is None or force > _SHEAR * screw.area:
+            most = "no screw from M1.6 on passes"
+            if screw is not None:
+                most = f"{screw.name} carries {_SHEAR * screw.area:.3g} N"
+            yield (
+                f"{count} bolts take {_FACTOR:g} times {self.torque:.3g} N·m with {force:.3g} N each, "
+                f"{most} in shear (class 8.8, EN 1993-1-8){self.bolts_that_do()}"
+            )
 
-def _bolts_that_do(machined: MachinedCam, contour: Contour, torque: float) -> str:
-    """Return bolts in words that carry a torque in shear and fit the part, each tried; else nothing."""
-    reach = 2.0 * float(contour.radii.max())
-    for count in _COUNTS:
-        for step in range(_CIRCLES, 2, -1):
-            circle = math.floor(1e3 * reach * step / _CIRCLES) * 1e-3
-            needed = _FACTOR * torque / (count * circle / 2.0) / _SHEAR
-            screw = next((each for each in _SCREWS if each.area >= needed), None)
-            if screw is None:
-                continue
-            try:
-                replace(machined, bolts=BoltCircle(count=count, circle=circle, hole=screw.hole)).part(contour)
-            except NlsError:
-                # It does not fit there.
-                continue
-            sizes = f'count = {count}, circle = "{MM * circle:.3g} mm", hole = "{MM * screw.hole:.3g} mm"'
-            held = f"carry {_FACTOR:g} times it in shear ({screw.name}, class 8.8)"
-            return f" -> bolts = {{{sizes}}} fit and {held}"
-    return " -> no bolts that carry it fit: leave room for a key or a clamp, or take a larger body_radius"
+    def bolts_that_do(self) -> str:
+        """Return bolts in words that carry the torque in shear and fit the part, each tried; else nothing."""
+        reach = 2.0 * float(self.contour.radii.max())
+        for count in _COUNTS:
+            for step in range(_CIRCLES, 2, -1):
+                circle = math.floor(1e3 * reach * step / _CIRCLES) * 1e-3
+                needed = _FACTOR * self.torque / (count * circle / 2.0) / _SHEAR
+                screw = next((each for each in _SCREWS if each.area >= needed), None)
+                if screw is None:
+                    continue
+                bolts = BoltCircle(count=count, circle=circle, hole=screw.hole)
+                try:
+                    replace(self.machined, bolts=bolts).part(self.contour)
+                except NlsError:
+                    # It does not fit there.
+                    continue
+                sizes = f'count = {count}, circle = "{MM * circle:.3g} mm", hole = "{MM * screw.hole:.3g} mm"'
+                held = f"carry {_FACTOR:g} times it in shear ({screw.name}, class 8.8)"
+                return f" -> bolts = {{{sizes}}} fit and {held}"
+        return " -> no bolts that carry it fit: leave room for a key or a clamp, or take a larger body_radius"

@@ -17,7 +17,7 @@ from ...model.structure import CamNames
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
-from ..drawing.making import process_of, torque_remarks
+from ..drawing.making import Mounting
 from ..optimisation.result import CamDesign
 from ..statics.declared_cam import declared_cam
 from .job_file import DesignJob, built
@@ -248,5 +248,5 @@ def part_remarks(design: CamDesign, machined: MachinedCam, part: CamPart) -> Ite
         f"the made part reaches {1e3 * part.reach:.4g} mm from its axis, the contour "
         f"{1e3 * float(design.contour.radii.max()):.4g} mm: run-out and corners come on top"
     )
-    yield f"to be made by: {process_of(part)}"
-    yield from torque_remarks(part, machined, design.contour, float(abs(design.check.torques).max()))
+    torque = float(abs(design.check.torques).max())
+    yield from Mounting(machined, design.contour, part, torque).remarks()

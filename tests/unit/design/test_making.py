@@ -12,12 +12,13 @@ import pytest
 from nlsdesign.design import (
     BoltCircle,
     Contour,
+    MachinedCam,
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
     contour_from_curvature,
     contour_from_lever_arm,
 )
-from nlsdesign.design.drawing.making import process_of, torque_remarks
+from nlsdesign.design.drawing.making import Mounting, process_of
 from nlsdesign.foundation.quantity import quantity
 
 CABLE = quantity(0.45, "mm", source="example")
@@ -31,8 +32,8 @@ def contour() -> Contour:
     return contour_from_curvature(nodes, radii, first_slope=8e-3, anchor_distance=30e-3)
 
 
-def remarks(machined: MachinedTwoSidedCam, contour: Contour, torque: float) -> list[str]:
-    return list(torque_remarks(machined.part(contour), machined, contour, torque))
+def remarks(machined: MachinedCam, contour: Contour, torque: float) -> list[str]:
+    return list(Mounting(machined, contour, machined.part(contour), torque).remarks())[1:]
 
 
 def test_a_narrow_deep_channel_names_its_process(contour: Contour) -> None:
@@ -74,5 +75,5 @@ def test_where_no_bolts_fit_that_is_said() -> None:
     angles = np.linspace(0.0, 1.2, 100)
     contour = contour_from_lever_arm(angles, 6e-3 + 3e-3 * angles**2, anchor_distance=math.inf)
     machined = MachinedOneSidedCam(cable_radius=quantity(0.25, "mm"), hub_bore=4e-3)
-    (said,) = torque_remarks(machined.part(contour), machined, contour, 0.5)
+    (said,) = remarks(machined, contour, 0.5)
     assert "no bolts that carry it fit" in said
