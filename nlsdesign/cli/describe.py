@@ -91,8 +91,7 @@ def _show(description: RecordsDescription) -> None:
         for note in (*description.records.findings, *description.records.remarks):
             click.echo(f"{note.place}: {note.text}")
     for column in description.undecided:
-        choices = " or ".join(column.signals) or "no sensor of the deck reads in its unit"
-        click.echo(f"undecided: '{column.head}': {choices if column.unit else 'its head names no unit'}")
+        click.echo(f"undecided: '{column.head}': {description.question(column)}")
     if description.problem:
         click.echo(f"cannot be read as it stands: {description.problem}")
 

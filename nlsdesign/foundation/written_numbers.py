@@ -21,7 +21,8 @@ _FORMS_OF_HEADS = tuple(
         r"\s*\((?P<unit>[^)]+)\)",
         r"_(?P<unit>[^_]+)",
         r"\s+in\s+(?P<unit>\S+)",
-        r"\s*[/,]\s*(?P<unit>\S+)",
+        r"\s+/\s*(?P<unit>\S+)",
+        r"\s*,\s*(?P<unit>\S+)",
     )
 )
 """Forms in which heads of columns give units; what holds no unit belongs to the name."""

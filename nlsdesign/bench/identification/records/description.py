@@ -37,8 +37,10 @@ class DescribedColumn:
         As in the file; the unit is empty where the head has none.
     signals
         What it may hold; one name where that is certain, none where the deck reads nothing in this unit.
-    clock
-        Head of its time; empty for the clock of most columns.
+    clock, clock_unit
+        Head and unit of its time; the head is empty for the clock of most columns.
+    rate
+        Usual samples a second; nan without a clock.
     noise, quantum
         Standard deviation of the white noise and smallest step between two values, in the unit of the file.
     smallest, largest
@@ -51,6 +53,8 @@ class DescribedColumn:
     unit: str
     signals: tuple[str, ...]
     clock: str
+    clock_unit: str
+    rate: float
     noise: float
     quantum: float
     smallest: float
@@ -117,11 +121,19 @@ class RecordsDescription:
 
     @property
     def undecided(self) -> tuple[DescribedColumn, ...]:
-        """Columns of which neither head nor deck tell the one signal that they hold."""
-        claims = [column.signals for column in self.columns]
-        return tuple(
-            c for c in self.columns if not c.unit or len(c.signals) != 1 or claims.count(c.signals) > 1
-        )
+        """Columns that cannot be mapped by what heads and deck tell."""
+        return tuple(column for column in self.columns if self.question(column))
+
+    def question(self, column: DescribedColumn) -> str:
+        """Return what is left to decide on a column of this description; empty where nothing is."""
+        if not column.unit:
+            return "its head names no unit"
+        if column.clock and column.clock_unit != self.time_unit:
+            own = f"its clock '{column.clock}' is in {column.clock_unit or 'no unit'}"
+            return f"{own}, '{self.time}' is in {self.time_unit}: write both in one unit"
+        if len(column.signals) == 1 and [c.signals for c in self.columns].count(column.signals) == 1:
+            return ""
+        return " or ".join(column.signals) or "no sensor of the deck reads in its unit"
 
     def mapping(self) -> str:
         """Return a ``records.toml`` to begin with; what is not certain is a comment."""
@@ -132,7 +144,7 @@ class RecordsDescription:
             held = [r.name for r in self.records.records if r.role == "held_out"]
             lines += [f"# held_out = {json.dumps(held, ensure_ascii=False)}    # the default"]
         if self.clocks:
-            slowest = min((f.rate for f in self.files if f.rate > 0.0), default=500.0)
+            slowest = min(c.rate for c in self.columns if c.rate > 0.0)
             lines += [f"resample_Hz = {slowest:.4g}    # one clock for all columns"]
         unit = f"unit = {_quoted(self.time_unit)}"
         guessed = "    # guessed from the steps: correct it" if self.time_is_guessed else ""
@@ -142,12 +154,9 @@ class RecordsDescription:
         return "\n".join(lines) + "\n"
 
     def _table(self, column: DescribedColumn) -> list[str]:
-        certain = column not in self.undecided
-        mark = "" if certain else "# "
-        choices = " or ".join(column.signals) or "no sensor of the deck reads in its unit"
-        lines = (
-            [] if certain else [f"# '{column.head}': {choices if column.unit else 'its head names no unit'}"]
-        )
+        question = self.question(column)
+        mark = "# " if question else ""
+        lines = [f"# '{column.head}': {question}"] if question else []
         signal = _quoted(column.signals[0] if column.signals else "")
         lines += [f"{mark}[columns.{_quoted(column.head)}]", f"{mark}signal = {signal}"]
         lines += [f"{mark}unit = {_quoted(column.unit)}"]
@@ -192,9 +201,8 @@ def describe_records(folder: Path, model: FlatModel) -> RecordsDescription:
     time, unit, guessed = _clock(whole)
     files = [_described(name, table, time, unit) for name, table in tables.items()]
     files += [DescribedFile(name, 0, np.nan, np.nan, 0, text) for name, text in problems.items()]
-    description = RecordsDescription(
-        time, unit, guessed, tuple(sorted(files, key=lambda f: f.name)), tuple(_columns(whole, time, model))
-    )
+    columns = tuple(_columns(whole, time, unit, model))
+    description = RecordsDescription(time, unit, guessed, tuple(sorted(files, key=lambda f: f.name)), columns)
     records, problem = _tried(Path(folder), model, description)
     return RecordsDescription(time, unit, guessed, description.files, description.columns, records, problem)
 
@@ -226,7 +234,7 @@ def _described(name: str, table: RecordTable, time: str, unit: str) -> Described
     return DescribedFile(name, len(clock), float(clock[-1] - clock[0]), 1.0 / usual, gaps)
 
 
-def _columns(table: RecordTable, time: str, model: FlatModel) -> list[DescribedColumn]:
+def _columns(table: RecordTable, time: str, time_unit: str, model: FlatModel) -> list[DescribedColumn]:
     """Return the columns that are no clocks; each belongs to the last clock before it of its own length."""
     given = Inputs.of(model)
     inputs = given.commanded | given.shown
@@ -242,13 +250,20 @@ def _columns(table: RecordTable, time: str, model: FlatModel) -> list[DescribedC
         before = [c for c in same if table.heads.index(c) < place] or same or [time]
         smallest, largest = (float(f(values)) if len(values) else np.nan for f in (np.min, np.max))
         signals = signals_for(name, unit, model) if unit else ()
-        clock = "" if before[-1] == time else before[-1]
+        own = before[-1]
+        clock_unit = time_unit if own == time else name_and_unit(own)[1] or table.units.get(own) or ""
+        step = np.median(np.diff(table.given[own])) if own in table.given else 0.0
         drives = any(signal in inputs for signal in signals)
         # Rounding of sums is no noise.
         noise = noise_of(values) if noise_of(values) > _ROUNDING * (largest - smallest) else 0.0
         result.append(
-            DescribedColumn(head, unit, signals, clock, noise, quantum_of(values), smallest, largest, drives)
-        )
+            DescribedColumn(
+                head=head, unit=unit, signals=signals, clock="" if own == time else own,
+                clock_unit=clock_unit,
+                rate=float(1.0 / (step * parse_unit(clock_unit).factor)) if step > 0.0 else np.nan,
+                noise=noise, quantum=quantum_of(values), smallest=smallest, largest=largest, drives=drives,
+            )
+        )  # fmt: skip
     return result
 
 

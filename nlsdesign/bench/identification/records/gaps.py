@@ -17,6 +17,8 @@ _LATE = 3.5
 """Up to this many usual steps a sample is late, with at most two missing before it."""
 _LARGEST_SHARE = 1e-3
 """Largest share of late samples that are filled in."""
+_MOST_LEFT_OUT = 0.2
+"""Largest share of rows in parts too short for a record; above it the clock is late throughout, not split."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +64,12 @@ def between_gaps(table: RecordTable, mapping: ColumnMap) -> Pieces:
     seconds = factor * steps
     parts = [range(a, b) for a, b in zip([0, *(gaps + 1)], [*(gaps + 1), len(time)], strict=True)]
     long = [part for part in parts if len(part) >= LEAST_ROWS]
-    if not long:
+    short = len(time) - sum(len(part) for part in long)
+    if short > _MOST_LEFT_OUT * len(time):
         return Pieces((table,))  # refused by the check of time, with its advice
     text = f"a gap of {seconds[gaps[0]]:.3g} s"
     text += f", {len(gaps)} gaps in all" if len(gaps) > 1 else ""
     text += f": split into {len(long)} records" if len(long) > 1 else ": one record is left"
-    short = sum(len(part) for part in parts) - sum(len(part) for part in long)
     text += f"; {short} rows in parts shorter than {LEAST_ROWS} are left out" if short else ""
     text += slower_clock(seconds, factor * usual)
     pieces = (

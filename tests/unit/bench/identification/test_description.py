@@ -74,8 +74,21 @@ def test_a_clock_of_its_own_is_given_to_the_columns_behind_it(tmp_path: Path, mo
     found = describe_records(tmp_path, model)
     assert found.clocks == ("t2_s",)
     assert [c.clock for c in found.columns] == ["", "t2_s"]
-    assert "resample_Hz = " in found.mapping()
+    assert f"resample_Hz = {0.5 / STEP:g}" in found.mapping(), "that of the slowest clock"
     assert found.problem == ""
+
+
+def test_a_clock_of_another_unit_is_left_to_be_decided(tmp_path: Path, model: FlatModel) -> None:
+    """A mapping has one unit of time: with a clock in milliseconds it would be read a thousandfold wrong."""
+    rows = table()
+    lines = ["t_s,theta_deg,t2_ms,torque_N*m"]
+    lines += [f"{row[0]:.6f},{row[1]:.6f},{1e3 * row[0]:.6f},{row[2]:.6f}" for row in rows]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = describe_records(tmp_path, model)
+    assert [c.head for c in found.undecided] == ["torque_N*m"]
+    assert found.question(found.undecided[0]).startswith("its clock 't2_ms' is in ms, 't_s' is in s")
+    assert '# [columns."torque_N*m"]' in found.mapping()
+    assert f"resample_Hz = {1.0 / STEP:g}" in found.mapping()
 
 
 def test_a_time_without_unit_is_guessed_and_said(tmp_path: Path, model: FlatModel) -> None:

@@ -60,3 +60,11 @@ def test_a_record_that_is_asked_for_alone_is_not_split(tmp_path: Path, model: Fl
     folder = folder_with(tmp_path, np.delete(table(), slice(200, 230), axis=0))
     with pytest.raises(MeasurementError, match=r"gap of 0\.062 s.*split the record"):
         load_record(folder / "b.csv", model)
+
+
+def test_a_clock_that_is_late_throughout_is_refused_and_not_cut_to_pieces(
+    tmp_path: Path, model: FlatModel
+) -> None:
+    rows = np.concatenate([table()[:60], table()[60:][np.arange(len(table()) - 60) % 40 < 30]])
+    with pytest.raises(MeasurementError, match=r"b\.csv: column 't_s'.*there is a gap of 0\.022 s"):
+        load_records(folder_with(tmp_path, rows), model)
