@@ -12,6 +12,8 @@ from hypothesis import settings
 os.environ["MPLBACKEND"] = "Agg"
 # Two exports of one test are the same bytes, on either side of a full minute.
 os.environ["SOURCE_DATE_EPOCH"] = "1760000000"
+# FMUs and steps of controllers compile in a fifth of the time; those of users run in test_fmu_agreement.
+os.environ["NLSDESIGN_CFLAGS"] = "-O0"
 
 # The same examples in every run; no time limit (it would test the machine); nothing written to disk.
 settings.register_profile("thorough", derandomize=True, deadline=None, database=None, max_examples=300)

@@ -29,6 +29,14 @@ from tests.hand_built import plant
 STEP = 1e-3
 
 
+@pytest.fixture(scope="module", autouse=True)
+def as_users_compile():
+    """The binaries of this file are optimised, as they are outside of the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("NLSDESIGN_CFLAGS")
+        yield
+
+
 def by_hand(state: np.ndarray, current: float) -> np.ndarray:
     """The equations of the plant, written once more in plain Python."""
     z, theta, omega = state

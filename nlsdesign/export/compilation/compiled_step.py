@@ -29,7 +29,13 @@ from ...simulation.column_runs import ColumnRun
 from ..c.c_text import Real
 from ..c.writer import CSource, CWriter
 from .columns_in_c import WIDTH, ColumnsInC, sampled_run_in_c
-from .cross_compiler import BASELINE, THIS_PROCESSOR, cache_folder, compile_library
+from .cross_compiler import (
+    BASELINE,
+    THIS_PROCESSOR,
+    cache_folder,
+    compile_library,
+    flags_of_environment,
+)
 
 
 class CompiledStep:
@@ -57,8 +63,9 @@ class CompiledStep:
                 source.writer.filled("adapter.c", _conversions(source.writer)), encoding="utf-8"
             )
             library = compile_library(
-                [adapter, source.source], Path(folder) / "step.so", include=[source.header.parent.resolve()]
-            )
+                [adapter, source.source], Path(folder) / "step.so", include=[source.header.parent.resolve()],
+                flags=("-std=c99", *flags_of_environment()),
+            )  # fmt: skip
             self._library = ctypes.CDLL(str(library))
         self._library.adapter_size.restype = ctypes.c_size_t
         for function in ("adapter_init", "adapter_set_parameters", "adapter_step"):

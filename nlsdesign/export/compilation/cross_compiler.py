@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform as machine
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -136,6 +137,11 @@ def run_compiler(arguments: Sequence[str | Path], *, about: str) -> None:
     if done.returncode != 0:
         first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
         raise ExportError(about, f"does not compile: {first}", next_step="report this as a bug of nlsdesign")
+
+
+def flags_of_environment() -> tuple[str, ...]:
+    """Return what ``NLSDESIGN_CFLAGS`` adds to the flags of FMUs and of steps of controllers."""
+    return tuple(shlex.split(os.environ.get("NLSDESIGN_CFLAGS", "")))
 
 
 def compile_library(

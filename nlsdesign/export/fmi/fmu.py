@@ -31,6 +31,7 @@ from ..compilation.cross_compiler import (
     cache_folder,
     chosen_platforms,
     compile_library,
+    flags_of_environment,
 )
 from ..files import shell
 from .authorship import Authorship, with_origin
@@ -70,7 +71,8 @@ def compiled_binaries(
         for file, content in sources.items():
             (place / file).write_bytes(content)
         target = place / f"{name}{platform.extension}"
-        compile_library([place / main], target, platform=platform, include=[fmi_headers()])
+        flags = ("-std=c99", *flags_of_environment())
+        compile_library([place / main], target, platform=platform, include=[fmi_headers()], flags=flags)
         content = target.read_bytes()
         _keep(kept, content)
         return content
@@ -81,7 +83,7 @@ def compiled_binaries(
 
 def _key(sources: Mapping[str, bytes], main: str, name: str, platform: Platform) -> str:
     digest = hashlib.sha256(_compiler())
-    for text in (main, name, platform.target, platform.extension):
+    for text in (main, name, platform.target, platform.extension, *flags_of_environment()):
         digest.update(f"{text}\0".encode())
     for file, content in sorted(sources.items()):
         digest.update(f"{file}\0{len(content)}\0".encode() + content)

@@ -74,7 +74,7 @@ def test_what_is_asked_for_is_written_once_with_its_reference(run: Run, tmp_path
 def test_all_platforms_by_one_word(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from nlsdesign.export.fmi import fmu as compiled_binaries
 
-    def instead(sources, target, *, platform, include):  # type: ignore[no-untyped-def]
+    def instead(sources, target, *, platform, **_):  # type: ignore[no-untyped-def]
         target.write_bytes(platform.name.encode())
 
     monkeypatch.setenv("NLSDESIGN_CACHE", str(tmp_path / "cache"))

@@ -60,6 +60,22 @@ def test_a_changed_model_version_or_compiler_is_compiled_anew(compiled, tmp_path
     assert len(compiled) == 4
 
 
+def test_flags_of_the_environment_come_last_and_are_compiled_anew(compiled, tmp_path, monkeypatch):
+    given, instead = [], cross_compiler.run_compiler
+
+    def noted(arguments, *, about):
+        given.append(arguments)
+        instead(arguments, about=about)
+
+    monkeypatch.setattr(cross_compiler, "run_compiler", noted)
+    for flags in ("", "-O1 -g", "-O1 -g"):
+        monkeypatch.setenv("NLSDESIGN_CFLAGS", flags)
+        export_fmu(controller(), tmp_path / "a.fmu", platforms=PLATFORMS[:1])
+    assert len(compiled) == 2
+    levels = [[word for word in words if str(word) in ("-O1", "-O2", "-g")] for words in given]
+    assert levels == [["-O2"], ["-O2", "-O1", "-g"]]
+
+
 @pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "folder"])
 def test_a_damaged_entry_is_compiled_anew(compiled, tmp_path, damage):
     first = export_fmu(controller(), tmp_path / "a.fmu", platforms=PLATFORMS[:1]).read_bytes()

@@ -305,21 +305,20 @@ class _Bounding:
         edges = np.unique(np.clip(np.concatenate([grid, [low, high]]), low, high))
         first = self.view.cells(edges)
         # Largest slope of the rest values, first roughly, then over the refined cells.
-        self.lead = self._lead(first)
-        rest = self.view.ranges(self.view.rest, first, whole=True)[0]
+        rest, slope, _ = self.view.ranges(self.view.rest, first, whole=True)
+        self.lead = np.max(slope.magnitude, axis=0, initial=0.0)
         least, greatest = (
             np.min(rest.lower, axis=0, initial=np.inf),
             np.max(rest.upper, axis=0, initial=-np.inf),
         )
         self.box = least[None, :, None], greatest[None, :, None]
         self.cells = self._refined(first)
-        self.lead = self._lead(self.cells)
-
-    def _lead(self, cells: Bounds) -> Array:
-        lead: Array = np.max(
-            self.view.ranges(self.view.rest, cells, whole=True)[1].magnitude, axis=0, initial=0.0
-        )
-        return lead
+        # Rest values over the cells: of the numbers of the deck, of all numbers, and in the middle of a cell.
+        middle = (self.cells[0] + self.cells[1]) / 2.0
+        self.rest = self.view.ranges(self.view.rest, self.cells)
+        self.rest_of_all = self.view.ranges(self.view.rest, self.cells, whole=True)
+        self.rest_in_middle = self.view.ranges(self.view.rest, (middle, middle))
+        self.lead = np.max(self.rest_of_all[1].magnitude, axis=0, initial=0.0)
 
     def _refined(self, cells: Bounds) -> Bounds:
         """Return the cells, halved where the slope over the angle is known too badly."""
@@ -343,17 +342,18 @@ class _Bounding:
         return low[order], high[order]
 
     def _steepness(self, cells: Bounds) -> Array:
-        slope = self.view.ranges(self.view.torque, cells, self._carried(cells))[1].magnitude[:, 0]
-        steep: Array = slope + np.sum(self.view.ranges(self.view.rest, cells)[1].magnitude, axis=1)
+        rest = self.view.ranges(self.view.rest, cells)
+        slope = self.view.ranges(self.view.torque, cells, self._carried(rest))[1].magnitude[:, 0]
+        steep: Array = slope + np.sum(rest[1].magnitude, axis=1)
         return steep
 
-    def _carried(self, cells: Bounds, *, whole: bool = False) -> Array:
+    def _carried(self, ranges: tuple[Range, ...]) -> Array:
         """Return where the inner states can be at each angle, shape (cells, inner, 2).
 
         They follow their rest value; it moves no faster than its slope times the largest speed, so they lag
         behind it by no more than that over their rate, and never leave the range of all rest values.
         """
-        rest, _, rate = self.view.ranges(self.view.rest, cells, whole=whole)
+        rest, _, rate = ranges
         slow = self.lead * self.assumed.speed / np.min(rate.lower, axis=0, initial=np.inf)
         box: Array = np.clip(np.stack([rest.lower - slow, rest.upper + slow], axis=2), *self.box)
         return box
@@ -368,7 +368,7 @@ class _Bounding:
     def bound(self) -> TorqueErrorBound:
         """Return the bound; see :func:`torque_bound`."""
         view, assumed, cells = self.view, self.assumed, self.cells
-        z = self._carried(cells, whole=True)
+        z = self._carried(self.rest_of_all)
         table, roundoff = self._step_errors(z)
         shift, lead = _angle_rounding(self.design, assumed.real), self.lead
         causes = {
@@ -413,8 +413,7 @@ class _Bounding:
         """Return how far parameters move each inner state: where it rests, and how fast it goes there."""
         if not self.inner:
             return np.zeros(0)
-        nominal = self.view.ranges(self.view.rest, self.cells)[2].upper[0]
-        spread = self.view.ranges(self.view.rest, self.cells, whole=True)[2]
+        nominal, spread = self.rest[2].upper[0], self.rest_of_all[2]
         ends = np.array([np.min(spread.lower, axis=0), np.max(spread.upper, axis=0)]) / nominal
         slower = np.max([[_lag_difference(float(r)) for r in row] for row in ends], axis=0)
         jump = slower * (np.max(z[:, :, 1], axis=0) - np.min(z[:, :, 0], axis=0))
@@ -428,7 +427,7 @@ class _Bounding:
         if not self.inner:
             return np.zeros(0), np.zeros(0)
         design, time = self.design, self.design.step.sample_time
-        rest, rate = (self.view.ranges(self.view.rest, self.cells)[k] for k in (0, 2))
+        rest, _, rate = self.rest
         kept, n = _kept(self.design, self.inner), len(design.step.plant.names)
         table, rounding = [], []
         for k, name in enumerate(self.inner):
@@ -450,10 +449,8 @@ class _Bounding:
         middle = (self.cells[0] + self.cells[1]) / 2.0
         half = (self.cells[1] - self.cells[0]) / 2.0
         value, slope = _read(self.design, key, middle)
-        rest = self.view.ranges(self.view.rest, (middle, middle))[0]
-        lead = self.view.ranges(self.view.rest, self.cells)[1]
-        at = _distance(value, weight, rest, k)
-        steep = _distance(slope, weight, lead, k)
+        at = _distance(value, weight, self.rest_in_middle[0], k)
+        steep = _distance(slope, weight, self.rest[1], k)
         return float(np.max(at + steep * half))
 
     # --- torque -----------------------------------------------------------------------------------------

@@ -452,6 +452,13 @@ class PlacedEntries:
         kept = np.array([p.column for p in places], dtype=int)
         return factors, kept, self.fine.values[rows], self.allowed[rows][:, None]
 
+    @cached_property
+    def _read(self) -> Array:
+        """Return what the columns give for all entries that are read from them, shape (entries, n)."""
+        factors, kept, _, _ = self._tabled
+        read: Array = np.array([c.values for c in self.columns])[kept] * factors
+        return read
+
     def with_breakpoints(self) -> Compact:
         """Return the table with the longest cells, from the lower end on, that keep what is allowed."""
         count, start, kept = len(self.fine.angles), 0, [0]
@@ -488,13 +495,12 @@ class PlacedEntries:
         return bool(np.all(np.abs(factors * read[kept] - exact) <= allowed))
 
     def _keeps(self, i: int, j: int) -> bool:
-        factors, kept, exact, allowed = self._tabled
+        _, kept, exact, allowed = self._tabled
         if not len(kept):
             return True
-        angles = self.fine.angles
+        angles, first = self.fine.angles, self._read[:, i, None]
         share = (angles[i : j + 1] - angles[i]) / (angles[j] - angles[i])
-        ends = np.array([[c.values[i], c.values[j]] for c in self.columns])[kept] * factors
-        read = ends[:, :1] + share * (ends[:, 1:] - ends[:, :1])
+        read = first + share * (self._read[:, j, None] - first)
         return bool(np.all(np.abs(read - exact[:, i : j + 1]) <= allowed))
 
     def _compact(self, grid: Array, *, uniform: bool) -> Compact:

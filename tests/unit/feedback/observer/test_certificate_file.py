@@ -151,6 +151,27 @@ def test_an_operation_without_range_is_named() -> None:
         enclose(ca.Function("f", [x], [ca.fmod(x, 0.3)]), [[(0.0, 1.0)]])
 
 
+def test_a_bound_goes_outward_to_the_next_number() -> None:
+    """A square root is rounded outward by one unit, a hyperbolic sine by four."""
+    x = ca.SX.sym("x")
+    tiny, huge = np.nextafter(0.0, 1.0), np.finfo(float).max
+    ends = np.array([0.0, -0.0, tiny, 1.0, 2.0, 0.1, huge, np.inf])
+    root = enclose(ca.Function("f", [x], [ca.sqrt(x)]), [[(ends, ends)]]).outputs[0]
+    exact = np.sqrt(ends)
+    np.testing.assert_array_equal(root.upper[:, 0], np.nextafter(exact, np.inf))
+    np.testing.assert_array_equal(root.lower[:, 0], np.maximum(np.nextafter(exact, -np.inf), 0.0))
+    ends = np.array([-np.inf, -2.0, -tiny, -0.0, 0.0, tiny, 0.3, 800.0])
+    with np.errstate(over="ignore"):
+        low, high = np.sinh(ends), np.sinh(ends)
+        for _ in range(4):
+            low, high = np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+    sine = enclose(ca.Function("f", [x], [ca.sinh(x)]), [[(ends, ends)]]).outputs[0]
+    np.testing.assert_array_equal(sine.lower[:, 0], low)
+    np.testing.assert_array_equal(sine.upper[:, 0], high)
+    undefined = enclose(ca.Function("f", [x], [ca.log(x)]), [[(-1.0, -1.0)]]).outputs[0]
+    assert (undefined.lower[0, 0], undefined.upper[0, 0]) == (-np.inf, np.inf)
+
+
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10**6), shift=st.floats(-1.0, 1.0))
 def test_definiteness_is_that_of_the_eigenvalues(seed: int, shift: float) -> None:
