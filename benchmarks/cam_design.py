@@ -5,7 +5,8 @@ found), with the torque errors eliminated. SLSQP and trust-constr get finite dif
 one call; CMA-ES gets an exact penalty, and the equation at the end of the contour solved for it. SLSQP begins
 at each start of ours in turn, the other two at the first, until they end or their time is over. A cost counts
 where no row is missed by more than 1e-6. Times are CPU seconds of one process. Printed, not asserted:
-``python -m benchmarks.cam_design``.
+``python -m benchmarks.cam_design``. With ``--random 100`` the starts of ``design_cam`` stand beside as many
+random starts of the same interior point method.
 """
 
 from __future__ import annotations
@@ -37,8 +38,10 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.design import DesignSettings
 from nlsdesign.design.optimisation.design_search import Search
 from nlsdesign.design.optimisation.limits import Limit
+from nlsdesign.design.optimisation.problem import DesignProblem
 from nlsdesign.design.optimisation.program import Rows
-from nlsdesign.design.optimisation.shape import starts
+from nlsdesign.design.optimisation.several_starts import SAME_COST, SeveralStarts, times_found
+from nlsdesign.design.optimisation.shape import Start, start_values, starts
 from nlsdesign.design.optimisation.solve import GOALS, USUAL, Wanted
 from nlsdesign.export.compilation.cross_compiler import BASELINE
 from nlsdesign.foundation.arrays import Array
@@ -47,6 +50,7 @@ FEASIBLE = 1e-6
 """Largest miss of a row, each scaled to about 1, at which a cost counts."""
 _CLOSE = 1e-3
 """Relative distance to a cost at which a solver counts as being there."""
+_STARTS = 8
 _STEP = 1.5e-8
 _PENALTY = 2.0
 """Penalty of CMA-ES over the largest multiplier at our solution: exact, and no steeper than needed."""
@@ -85,7 +89,7 @@ class Problem:
 
 
 def problems() -> list[Problem]:
-    """Return the problems; the flat one is that of the README without the limits of its cable and rubber."""
+    """Return the problems: the README's call and five more; the flat one has no limits of its rubber."""
     bench = nls.models.cam_rubber_actuator(nls.load_deck("austin2015_figure_consistent"))
     contour, pretension = "spring.cam.contour", "spring.pretension"
     area, rest_length = "spring.rubber.area", "spring.rubber.rest_length"
@@ -93,7 +97,9 @@ def problems() -> list[Problem]:
     usual = (nls.MinimumRadiusOfCurvature(1e-3), nls.MaximumCamRadius(20e-3), nls.MaximumStrain(1.0))
     one_sided = declare(nls.load_deck("one_sided_cable_drive"))
     return [
-        Problem("README", bench, of_2014, (contour, pretension, area), usual),
+        Problem(
+            "README", bench, of_2014, (contour, pretension, area, rest_length), (nls.MaximumCamRadius(20e-3),)
+        ),
         Problem("flat", bench, of_2014, (contour, pretension, area), usual, ()),
         Problem(
             "study", bench, of_2014, (contour, pretension, area, rest_length),
@@ -229,7 +235,7 @@ class PeerProblem:
         self.batch = self.values.map(self.count + 1)
         names = [v.name for v in problem.variables[: self.count]]
         self.last = names.index("last_direction") if self.equal else None
-        self.starts = [problem.at(start)[: self.count] for start in starts(USUAL.starts, USUAL.seed, [])]
+        self.starts = [problem.at(start)[: self.count] for start in starts(_STARTS, USUAL.seed, [])]
 
     def at(self, point: Array) -> Array:
         """Return cost and rows at points, shape (1 + rows,) or (1 + rows, points)."""
@@ -376,7 +382,7 @@ def ours(search: Search, set_up: float) -> Ours:
     """
     begin = time.process_time()
     search.program.prepare()
-    points = [search.problem.at(start) for start in starts(USUAL.starts, USUAL.seed, [])]
+    points = [search.problem.at(start) for start in starts(_STARTS, USUAL.seed, [])]
     set_up += time.process_time() - begin
     costs, seconds, price = [], [], 0.0
     for point in points:
@@ -452,17 +458,74 @@ def compared(problem: Problem, limit: float) -> None:
         )
 
 
+def random_point(problem: DesignProblem, draw: np.random.Generator) -> Array:
+    """Return a point with random sizes, tightness and a random smooth radius of curvature.
+
+    Parameters
+    ----------
+    problem
+        Whose unknowns it has.
+    draw
+        Of all that is random in it.
+    """
+    assert problem.contour is not None
+    sizes = [v.name for v in problem.scalars if v.name != problem.law.cam.pretension]
+    factors = {name: float(np.exp(draw.normal())) for name in sizes}
+    slope, tight, size = draw.uniform(0.05, 1.2), draw.uniform(0.0, 2.0), np.exp(0.6 * draw.normal())
+    start = Start(float(slope), float(tight), factors, float(size))
+    values = start_values(start, scalars=problem.scalars, contour=problem.contour, sizes=problem.sizes)
+    radii = problem.contour.radii_of_curvature
+    share = np.linspace(0.0, 1.0, len(radii))
+    waves = [draw.normal(0.0, 0.5 / k) * np.cos(np.pi * k * share) for k in (1, 2, 3, 4)]
+    for radius, wave in zip(radii, np.exp(np.sum(waves, axis=0)), strict=True):
+        values[radius.name] *= float(wave)
+    return problem.completed(values)
+
+
+def beside_random(problem: Problem, count: int) -> None:
+    """Print what the starts of ``design_cam`` come to, and the best of as many random starts of IPOPT.
+
+    Parameters
+    ----------
+    problem
+        Which one.
+    count
+        Number of random starts.
+    """
+    begin = time.process_time()
+    search = problem.search()
+    outcomes = SeveralStarts(search).outcomes()
+    seconds, found = time.process_time() - begin, times_found(search.problem, outcomes)
+    own = min(outcome.cost for outcome in outcomes if outcome.solved)
+    draw, begin = np.random.default_rng(12345), time.process_time()
+    random = [search.program.solve(random_point(search.problem, draw)) for _ in range(count)]
+    costs = np.array([outcome.cost for outcome in random if outcome.solved])
+    least = float(costs.min(initial=np.inf))
+    theirs = f"{least:.8g} in {time.process_time() - begin:.1f} s"
+    at_best = int(np.sum(costs <= (1 + SAME_COST) * min(own, least)))
+    print(
+        f"{problem.name}: {own:.8g} in {seconds:.2f} s, found {found} times in {len(outcomes)} starts; "
+        f"{count} random starts: {theirs}, {at_best} at the best; ours over theirs {own / least:.6f}",
+        flush=True,
+    )
+
+
 def main() -> None:
     """Print a table of costs and times for each problem."""
     reader = argparse.ArgumentParser(description=__doc__)
     reader.add_argument("--limit", type=float, default=60.0, help="CPU seconds for each peer")
     reader.add_argument("--only", nargs="+", help="names of problems")
+    reader.add_argument("--random", type=int, help="compare with so many random starts of IPOPT instead")
     given = reader.parse_args()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     for problem in problems():
-        if given.only is None or problem.name in given.only:
+        if given.only is not None and problem.name not in given.only:
+            continue
+        if given.random is None:
             compared(problem, given.limit)
+        else:
+            beside_random(problem, given.random)
 
 
 if __name__ == "__main__":

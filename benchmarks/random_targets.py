@@ -1,16 +1,17 @@
-"""Fifty random smooth monotone targets: met at once, met after the advice is followed, or not.
+"""Fifty random targets: met at once, met after the advice is followed, or not.
 
 Each is designed as a new user would: contour, pretension and area of the rubber free, cam radius up to 20 mm,
 all else by default. What misses by more than 1 % rms says what to free or which limit to move; the first
-advice is followed to the letter and the design is made again. Targets know nothing of cam or rubber. Printed,
-not asserted: ``python -m benchmarks.random_targets``.
+advice is followed to the letter and the design is made again. Targets know nothing of cam or rubber: smooth
+monotone ones, or with ``--wild`` curves with a dead zone, a plateau, hills, a maximum or a fall to zero, over
+20 to 100 degrees. Printed, not asserted: ``python -m benchmarks.random_targets``.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,8 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign import design as design_room
 from nlsdesign.design import CamDesign, DesignSettings, Limit
-from nlsdesign.design.optimisation.conflict import Freed, Give
+from nlsdesign.design.optimisation.loosening import Freed, Give
+from nlsdesign.design.optimisation.other_ways import OtherSpring
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import NlsError
 
@@ -80,6 +82,39 @@ def _stiffness(shape: int, share: Array, draw: np.random.Generator) -> Array:
     return np.asarray(0.05 + sum(weights[k] * (k + 1) * share**k for k in range(4)))
 
 
+def wild_target(seed: int) -> design_room.TabulatedTorque:
+    """Return a torque curve of one of five wilder shapes in turn: up to 1 to 8 N·m, over 20 to 100 degrees.
+
+    A dead zone and a steep rise; a plateau between two rises; a line with hills and valleys; a maximum with a
+    fall behind it; a fall to zero at the end.
+
+    Parameters
+    ----------
+    seed
+        Of all that is random in it.
+    """
+    draw = np.random.default_rng(1000 + seed)
+    last, largest = np.radians(draw.uniform(20.0, 100.0)), draw.uniform(1.0, 8.0)
+    share = np.linspace(0.0, 1.0, _POINTS)
+    shape = seed % 5
+    if shape == 0:
+        torque = share ** draw.uniform(2.0, 5.0)
+    elif shape == 1:
+        steps = [np.tanh((share - at) / 0.12) for at in (draw.uniform(0.1, 0.3), draw.uniform(0.7, 0.9))]
+        torque = np.sum(steps, axis=0) - steps[0][0] - steps[1][0]
+    elif shape == 2:
+        torque = share + draw.uniform(0.02, 0.12) * np.sin(2 * np.pi * draw.integers(1, 4) * share)
+    elif shape == 3:
+        torque = np.sin(np.pi * share * draw.uniform(0.5, 0.8))
+    else:
+        torque = np.sin(np.pi * share) * (1.0 + draw.uniform(-0.5, 0.5) * share)
+    torque = np.maximum(largest * (torque - torque[0]) / np.max(torque), 0.0)
+    return design_room.TabulatedTorque(angles=tuple(share * last), torques=tuple(torque))
+
+
+Advice = Freed | tuple[Give, Freed | None] | OtherSpring
+
+
 @dataclass(frozen=True)
 class Try:
     """One design: relative rms error (None for an error message), words, seconds, advice to follow."""
@@ -87,7 +122,7 @@ class Try:
     error: float | None
     words: str
     seconds: float
-    advice: tuple[Freed | tuple[Give, Freed | None], ...]
+    advice: tuple[Advice, ...]
 
 
 def attempt(
@@ -118,30 +153,36 @@ def _words(design: CamDesign) -> str:
     return "" if design.miss is None else "; ".join([str(design.miss), *design.miss.advice])
 
 
-def _advice(design: CamDesign) -> tuple[Freed | tuple[Give, Freed | None], ...]:
+def _advice(design: CamDesign) -> tuple[Advice, ...]:
     if design.miss is None or design.miss.remedies is None:
         return ()
-    return (*design.miss.remedies.enough, *design.miss.remedies.gives)
+    remedies, allowed = design.miss.remedies, SETTINGS.largest_error * design.target.largest
+    others = [one for one in remedies.others if one.error <= allowed]
+    return (*remedies.enough, *remedies.gives, *others)
 
 
 def followed(
-    advice: Freed | tuple[Give, Freed | None], free: Sequence[str], keep: Sequence[Limit]
-) -> tuple[list[str], list[Limit]]:
-    """Return free names and limits after an advice is followed to the letter.
+    actuator: nls.Assembly, advice: Advice, free: Sequence[str], keep: Sequence[Limit]
+) -> tuple[nls.Assembly, list[str], list[Limit]]:
+    """Return actuator, free names and limits after an advice is followed to the letter.
 
     Parameters
     ----------
+    actuator
+        As it was.
     advice
-        Names to free, or a limit to move with names to free besides.
+        Names to free, or a limit to move with names to free besides, or another spring.
     free, keep
         So far.
     """
+    if isinstance(advice, OtherSpring):
+        return advice.machine, list(free), list(keep)
     give, freed = (None, advice) if isinstance(advice, Freed) else advice
     names = [*free, *(freed.names if freed is not None else ())]
     if give is None:
-        return names, list(keep)
+        return actuator, names, list(keep)
     kind = _LIMITS[give.bound.limit]
-    return names, [*(each for each in keep if type(each) is not kind), kind(give.moved)]
+    return actuator, names, [*(each for each in keep if type(each) is not kind), kind(give.moved)]
 
 
 @dataclass(frozen=True)
@@ -155,17 +196,25 @@ class Line:
 
     @property
     def verdict(self) -> str:
-        """One of three."""
+        """One of four."""
         if _met(self.first):
             return "met at once"
-        return "met after the first advice" if self.second is not None and _met(self.second) else "not met"
+        if self.second is not None and _met(self.second):
+            return "met after the first advice"
+        # A miss without a word of what holds it, or of what was tried, would be silent.
+        said = "held by" in self.first.words or " -> " in self.first.words
+        return "not met" if said else "not met, silent"
 
 
 def _met(attempted: Try) -> bool:
     return attempted.error is not None and attempted.error <= SETTINGS.largest_error
 
 
-def lines(decks: Sequence[str], seeds: Sequence[int]) -> Iterator[Line]:
+def lines(
+    decks: Sequence[str],
+    seeds: Sequence[int],
+    made: Callable[[int], design_room.TabulatedTorque] = random_target,
+) -> Iterator[Line]:
     """Yield what becomes of each target.
 
     Parameters
@@ -174,14 +223,17 @@ def lines(decks: Sequence[str], seeds: Sequence[int]) -> Iterator[Line]:
         Names of bundled decks.
     seeds
         Of the targets.
+    made
+        Target of a seed.
     """
     for deck in decks:
         actuator = nls.models.cam_rubber_actuator(nls.load_deck(deck))
         for seed in seeds:
-            target, second = random_target(seed), None
+            target, second = made(seed), None
             first = attempt(actuator, target, FREE, KEEP)
             if first.advice:
-                second = attempt(actuator, target, *followed(first.advice[0], FREE, KEEP))
+                machine, free, keep = followed(actuator, first.advice[0], FREE, KEEP)
+                second = attempt(machine, target, free, keep)
             yield Line(deck, seed, first, second)
 
 
@@ -191,10 +243,12 @@ def main() -> None:
     reader.add_argument("--decks", nargs="+", default=DECKS)
     reader.add_argument("--first", type=int, default=1, help="first seed")
     reader.add_argument("--last", type=int, default=50, help="last seed")
+    reader.add_argument("--wild", action="store_true", help="wilder targets, which need not rise")
     reader.add_argument("--words", action="store_true", help="print the message of each miss")
     given = reader.parse_args()
     counts: dict[tuple[str, str], int] = {}
-    for line in lines(given.decks, range(given.first, given.last + 1)):
+    made = wild_target if given.wild else random_target
+    for line in lines(given.decks, range(given.first, given.last + 1), made):
         counts[line.deck, line.verdict] = counts.get((line.deck, line.verdict), 0) + 1
         shown = [_shown(each) for each in (line.first, line.second) if each is not None]
         print(f"{line.deck} {line.seed:3d}: {line.verdict:27s} {' -> '.join(shown)}", flush=True)

@@ -34,6 +34,7 @@ from .drawing.machined_cam import (
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
 )
+from .drawing.making import process_of as process_of
 from .jobs.job_file import DRAWS as DRAWS
 from .jobs.job_file import DesignJob, job_of, read_job
 from .jobs.job_file import kinds as kinds

@@ -292,7 +292,7 @@ def _designed(shown: AngleView | None) -> AngleView:
     return shown
 
 
-STARTS = 8
+STARTS = 12
 _DEARER = 1e-3
 """Relative difference of costs, and cost, from which two solutions are different optima."""
 _WEIGHED = " (torque error, rubber and smoothness together)"
@@ -327,10 +327,9 @@ def whole_design(
     def progress() -> None:
         nonlocal done
         done += 1
-        ended = "; then the finish, and what would help where it misses" if done == STARTS else ""
-        stage(f"start {done} of {STARTS} is solved{ended}")
+        stage(f"start {done} is solved, of {STARTS} at most; then the finish, and what would help")
 
-    stage(f"solves from {STARTS} starts")
+    stage(f"solves from {STARTS} starts at most, until the best was found twice")
     settings = DesignSettings(
         starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress,
         contour=contour,
@@ -392,8 +391,8 @@ def _differences(design: CamDesign, solved: ParametricDesign, quick: DesignView)
         )
     elif cost > solved.cost * (1.0 + _DEARER) + _DEARER:
         sentences.append(
-            f"the quick answer was a better local optimum{_WEIGHED} that none of {STARTS} starts reaches: "
-            f"{was} against {there} now; undo and redo bring it back"
+            f"the quick answer was a better local optimum{_WEIGHED} that none of {len(design.starts)} starts "
+            f"reaches: {was} against {there} now; undo and redo bring it back"
         )
     if abs(design.rms - quick.rms_error) > _DIFFERS * largest:
         sentences.append(

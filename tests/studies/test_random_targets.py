@@ -7,7 +7,7 @@ import pytest
 
 import nlsdesign as nls
 from benchmarks.random_targets import DECKS, FREE, KEEP, Line, lines, random_target
-from nlsdesign.design.optimisation.conflict import Freed
+from nlsdesign.design.optimisation.loosening import Freed
 
 QUICK = [(DECKS[0], 4), (DECKS[1], 2)]
 SLOW = [(DECKS[0], 3), (DECKS[0], 5), (DECKS[1], 4), (DECKS[1], 5)]

@@ -17,6 +17,7 @@ from ...model.structure import CamNames
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
+from ..drawing.making import Mounting
 from ..optimisation.result import CamDesign
 from ..statics.declared_cam import declared_cam
 from .job_file import DesignJob, built
@@ -242,10 +243,10 @@ def trim_remarks(design: CamDesign) -> Iterator[str]:
 
 
 def part_remarks(design: CamDesign, machined: MachinedCam, part: CamPart) -> Iterator[str]:
-    """Yield how far a made part reaches, and that nothing holds it where neither hub nor bolts are named."""
+    """Yield how far a made part reaches, which process it asks for, and what does not carry its torque."""
     yield (
         f"the made part reaches {1e3 * part.reach:.4g} mm from its axis, the contour "
         f"{1e3 * float(design.contour.radii.max()):.4g} mm: run-out and corners come on top"
     )
-    if machined.hub_bore is None and machined.bolts is None:
-        yield "nothing holds the part yet: name hub_bore, bolts or cable_end under [drawing]"
+    torque = float(abs(design.check.torques).max())
+    yield from Mounting(machined, design.contour, part, torque).remarks()

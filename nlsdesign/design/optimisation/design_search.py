@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from ...foundation.arrays import Array
+from ...components.assembly.named_parts import Assembly
+from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ValueRangeError
 from ...foundation.symbolic import Expression
-from ...model import FlatModel
+from ...model import FlatModel, flatten
+from ...model.roles import series_cam
 from ..curves.target import Target
-from ..statics.equilibrium import elastic_law, has_corners
+from ..statics.equilibrium import elastic_law, has_corners, with_smooth_cables
 from .goals import Goal
-from .limits import Bound, Limit
-from .problem import DesignProblem, design_problem, movable_numbers
-from .program import Program, Rows, Solution
+from .limits import Bound, Limit, MinimumRadiusOfCurvature
+from .problem import DesignProblem, SymbolicRounding, contour_names, design_problem, movable_numbers
+from .program import Program, Rows
 from .settings import DesignSettings
 from .shape import starts
 
@@ -28,6 +30,9 @@ _FINER = 0.1
 """By what the rounding is narrowed where the sharp law does not keep what the rounded one promised."""
 _NO_INFLUENCE = 1e-12
 """Change of any goal or limit, each relative to its scale, per change of a number by its own size."""
+CONVEX = "ConvexContour"
+ANCHOR = "AnchorClearance"
+"""Name of what the rows with words hold: the cam stays clear of the anchor of its cable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +41,10 @@ class Question:
 
     Parameters
     ----------
+    machine
+        The actuator as it is declared.
     model
-        Flat model of the actuator.
+        It, flattened with smooth cables.
     cam
         Its declared cam.
     drive
@@ -52,6 +59,7 @@ class Question:
         How the search is carried out.
     """
 
+    machine: Assembly
     model: FlatModel
     cam: object
     drive: str
@@ -71,6 +79,18 @@ class Question:
             self.model, self.cam, target=self.target, free=free, spring=self.drive, rounding=rounding
         )
         return Search(self, problem, rounding)
+
+    def of(self, machine: Assembly) -> Question:
+        """Return the same question for another machine; the contour of its cam is not known."""
+        model = flatten(with_smooth_cables(machine))
+        names = series_cam(model, self.drive)
+        return replace(self, machine=machine, model=model, cam=machine[names.name])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All names that may be free."""
+        cam = series_cam(self.model, self.drive)
+        return (*contour_names(cam), *movable_numbers(self.model, cam))
 
     @cached_property
     def _has_knots(self) -> bool:
@@ -95,6 +115,29 @@ class Search:
         return tuple(bound for limit in self.question.keep for bound in limit.bounds(self.problem.design))
 
     @cached_property
+    def structural(self) -> tuple[Bound, ...]:
+        """What holds a designed contour besides the limits: a taut cable lies on it and pulls.
+
+        Where a least radius of curvature above zero is kept, convexity is no limit of its own.
+        """
+        problem, design = self.problem, self.problem.design
+        if problem.contour is None:
+            return ()
+        arm, bounds = problem.sizes.arm, []
+        if not any(b.limit == MinimumRadiusOfCurvature.__name__ and b.value > 0.0 for b in self.bounds):
+            bounds.append(_held(CONVEX, "radius of curvature", design.radii_of_curvature, arm))
+        if design.cam.anchor_distance is None or not design.through_centre:
+            bounds.append(_held("PullingCable", "lever arm", design.lever_arms, arm))
+        else:
+            bounds.append(_held("PullingCable", "first slope", problem.contour.first_slope.value, arm))
+        for each in problem.structure:
+            if each.words:
+                upper = bool(np.isfinite(each.upper))
+                end = each.upper if upper else each.lower
+                bounds.append(Bound(ANCHOR, each.words, each.expression, end, upper, "1", 1.0))
+        return tuple(bounds)
+
+    @cached_property
     def cost(self) -> Expression:
         """Sum of the goals."""
         return sum((goal.cost(self.problem.design) for goal in self.question.goals), start=ca.SX(0))
@@ -111,12 +154,17 @@ class Search:
             (*problem.structure, *(row_of(bound) for bound in self.bounds)),
         )
 
-    def outcomes(self) -> list[Solution]:
-        """Return the solution from each start of the settings."""
-        settings = self.question.settings
-        sizes = [v.name for v in self.problem.scalars if v.name != self.problem.law.cam.pretension]
-        points = [self.problem.at(start) for start in starts(settings.starts, settings.seed, sizes)]
-        return self.program.solve_all(points, settings.progress)
+    @cached_property
+    def of_any_rounding(self) -> Program:
+        """The program with the width of rounded knots as a parameter."""
+        question, names = self.question, [v.name for v in self.problem.scalars]
+        shape = contour_names(self.problem.law.cam)[:1] if self.problem.contour is not None else ()
+        width = ca.SX.sym("rounding")
+        problem = design_problem(
+            question.model, question.cam, target=question.target, free=[*shape, *names],
+            spring=question.drive, rounding=SymbolicRounding(self.rounding, width),
+        )  # fmt: skip
+        return replace(Search(question, problem, self.rounding).program, parameters=width)
 
     def require_influence(self) -> None:
         """Refuse numbers that change neither a goal nor a limit."""
@@ -142,6 +190,20 @@ class Search:
                 next_step="leave it out, or ask for a goal or limit that depends on it; what may change: "
                 + ", ".join(others),
             )
+
+
+def _held(limit: str, of: str, expression: Expression, scale: float) -> Bound:
+    return Bound(limit, of, ca.SX(expression), 0.0, False, "mm", scale)
+
+
+def spans_of(angles: Array, where: Mask) -> str:
+    """Return the ranges of the angle in which something holds, in words."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
+    words = []
+    for first, behind in zip(edges[::2], edges[1::2], strict=True):
+        low, high = (f"{np.degrees(angles[i]):.3g}" for i in (first, behind - 1))
+        words.append(f"at {low}°" if low == high else f"from {low}° to {high}°")
+    return " and ".join(words)
 
 
 def row_of(bound: Bound, slack: Expression | float = 0.0) -> Rows:

@@ -22,13 +22,14 @@ from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contou
 from ..statics.equilibrium import cam_function, torque_function, with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
-from .conflict import Remedies, find_remedies
 from .defaults import safe_limits
-from .design_search import Search, carried_over
+from .design_search import Search, carried_over, spans_of
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Solution
+from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
+from .several_starts import same_design
 from .size_ranges import size_ranges
 
 _ACTIVE = 1e-3
@@ -77,13 +78,14 @@ class SolvedSearch:
     @cached_property
     def predicted_rms(self) -> float:
         """Torque error in N·m that the optimiser saw."""
-        return self.rms(self.best)
+        return self.search.problem.rms(self.best.point)
 
-    def rms(self, outcome: Solution) -> float:
-        """Return the torque error in N·m at a solution."""
+    def start_outcome(self, outcome: Solution) -> StartOutcome:
+        """Return where a start came to, beside the one that was taken."""
         problem = self.search.problem
-        square = problem.evaluate(problem.design.mean_square_error, outcome.point)[0]
-        return float(np.sqrt(max(square, 0.0)))
+        same = same_design(problem, self.outcomes[self.taken], outcome)
+        error = problem.rms(outcome.point)
+        return StartOutcome(outcome.solved, outcome.status, outcome.iterations, outcome.cost, error, same)
 
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
@@ -168,6 +170,8 @@ def finished(solved: SolvedSearch) -> CamDesign:
     contour, fit = solved.contour_fit
     settings, design = search.question.settings, problem.design
     limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
+    held = [limit_state(problem, bound, best.point) for bound in search.structural]
+    limits += tuple(state for state in held if state.active)
     tolerance, remarks = _tolerance(solved)
     cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
     sentences = []
@@ -191,9 +195,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         tolerance=tolerance,
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
-        starts=tuple(
-            StartOutcome(o.solved, o.status, o.iterations, o.cost, solved.rms(o)) for o in solved.outcomes
-        ),
+        starts=tuple(solved.start_outcome(outcome) for outcome in solved.outcomes),
         taken=solved.taken,
         cam=cam,
         size_ranges=size_ranges(search, best.point, solved.predicted_rms)
@@ -232,7 +234,7 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
     allowed = settings.largest_error * target.largest
     if check.rms <= allowed:
         return None
-    binding = [i for i, state in enumerate(limits) if state.active]
+    binding = [i for i, state in enumerate(limits[: len(solved.search.bounds)]) if state.active]
     remedies: Remedies | None = None
     advice: tuple[str, ...] = ()
     if solved.predicted_rms <= allowed:
@@ -241,7 +243,7 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
         remedies = find_remedies(
             solved.search, solved.free, solved.best.point, allowed=allowed, error=check.rms, binding=binding
         )
-        advice = tuple(remedies.sentences(target.largest))
+        advice = tuple(remedies.sentences(target.largest, allowed))
         if check.rms - solved.predicted_rms > _SHARE_OF_CAM * allowed:
             advice += (_made_otherwise(solved),)
     worst = int(np.argmax(np.abs(check.errors)))
@@ -381,7 +383,11 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
-    return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active)
+    angles = problem.evaluate(problem.design.angles, point)
+    where = ""
+    if active and len(values) == len(angles):
+        where = spans_of(angles, np.abs(values - bound.value) <= _ACTIVE * bound.scale)
+    return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active, where)
 
 
 _ANGLES = 801

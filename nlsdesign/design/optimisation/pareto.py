@@ -184,6 +184,8 @@ class ParetoFront:
 
 _UNBOUNDED = 1e6
 """Bound, relative to the scale of a goal, that never binds."""
+_STARTS = 8
+"""Starts at most of each end of a front."""
 _OTHERS = 1e-3
 """Weight of the other goals, so that what costs the first goal nothing is not given away."""
 _BETTER = 1e-3
@@ -291,7 +293,7 @@ class _Ladder:
     def _points(self) -> list[Array]:
         settings, problem = self.search.question.settings, self.search.problem
         sizes = [v.name for v in problem.scalars if v.name != problem.law.cam.pretension]
-        return [problem.at(start) for start in starts(settings.starts, settings.seed, sizes)]
+        return [problem.at(start) for start in starts(min(settings.starts, _STARTS), settings.seed, sizes)]
 
     @cached_property
     def scales(self) -> Array:

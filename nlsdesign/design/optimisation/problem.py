@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -38,6 +38,13 @@ class SymbolicTarget(NamedTuple):
 
     sized_for: Target
     last_angle: Expression
+
+
+class SymbolicRounding(NamedTuple):
+    """A width of rounded knots that is a symbol for the torque over the contour; goals see the number."""
+
+    share: float
+    width: Expression
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +107,10 @@ class DesignProblem:
         ).ravel()
         return result
 
+    def rms(self, point: Array) -> float:
+        """Return the rms torque error in N·m at a point."""
+        return float(np.sqrt(max(self.evaluate(self.design.mean_square_error, point)[0], 0.0)))
+
     def at(self, start: Start) -> Array:
         """Return the point where a search begins."""
         values = start_values(start, scalars=self.scalars, contour=self.contour, sizes=self.sizes)
@@ -125,7 +136,7 @@ def design_problem(
     target: Target,
     free: Sequence[str],
     spring: str | None = None,
-    rounding: float = 0.0,
+    rounding: float | SymbolicRounding = 0.0,
     symbols: SymbolicTarget | None = None,
 ) -> DesignProblem:
     """Write the design problem of a cam spring.
@@ -134,12 +145,13 @@ def design_problem(
     ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     made = declared_cam(cam)
-    law = elastic_law(model, spring)
+    sharp = law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
     arm, stretch = _sizes(law, target if symbols is None else symbols.sized_for)
     end = ca.SX(target.last_angle) if symbols is None else symbols.last_angle
-    if rounding > 0.0:
-        law = law.without_knots(2.0 * stretch, rounding)
+    share, width = rounding if isinstance(rounding, SymbolicRounding) else (rounding, None)
+    if share > 0.0:
+        law = law.without_knots(2.0 * stretch, share)
     scalars = {number.name: scalar(number, 0.3 * stretch) for number in numbers}
     parameters = {
         v.name: scalars[v.name].value if v.name in scalars else ca.SX(v.start) for v in model.parameters
@@ -153,11 +165,18 @@ def design_problem(
         contour, shape = parallel(end, arm)
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
     sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
+    called = law if width is None else sharp.without_knots(2.0 * stretch, width)
+    everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
+
+    def stretched(extension: Expression) -> Stretched:
+        more = [] if width is None else [width]
+        return Stretched(*called.function.call([extension, everything, *more]))
+
     return _lifted(
         DesignProblem(
             law=law,
             variables=(*scalars.values(), *(contour.all() if contour else ()), *shape.states),
-            design=_design(model, law, target, shape, parameters),
+            design=_design(model, law, target, shape, parameters, stretched),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
@@ -249,14 +268,14 @@ def _lifted(problem: DesignProblem) -> DesignProblem:
 
 
 def _design(
-    model: FlatModel, law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]
+    model: FlatModel,
+    law: ElasticLaw,
+    target: Target,
+    shape: Shape,
+    parameters: dict[str, Expression],
+    element: Callable[[Expression], Stretched],
 ) -> DesignPoint:
     cam = law.cam
-    everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
-
-    def element(extension: Expression) -> Stretched:
-        return Stretched(*law.function.call([extension, everything]))
-
     stretched = parameters[cam.pretension] + shape.extensions
     columns = [element(stretched[i]) for i in range(stretched.shape[0])]
     strains = ca.horzcat(*[column.strains for column in columns])

@@ -83,13 +83,28 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
+_BESIDE: dict[str, Any] = {
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.mu_init": 1e-6,
+    "ipopt.mu_strategy": "adaptive",
+    **{
+        f"ipopt.warm_start_{each}": 1e-8
+        for each in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+    },
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Constraints lower ≤ expression ≤ upper on a column, scaled to about 1."""
+    """Constraints lower ≤ expression ≤ upper on a column, scaled to about 1.
+
+    ``words``: what is held, where a designer is told of it.
+    """
 
     expression: Expression
     lower: float
     upper: float
+    words: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +125,8 @@ class Solution:
         Number of iterations.
     prices
         Multiplier of each group of rows, the largest magnitude in it.
+    multipliers
+        Of the bounds of the unknowns, and of all rows.
     """
 
     solved: bool
@@ -118,6 +135,7 @@ class Solution:
     cost: float
     iterations: int
     prices: tuple[float, ...]
+    multipliers: tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,23 +183,29 @@ class Program:
         lower: Array | None = None,
         upper: Array | None = None,
         parameters: Array | None = None,
+        beside: tuple[Array, Array] | None = None,
     ) -> Solution:
         """Solve from a starting point.
 
         ``lower``, ``upper``: other bounds of the unknowns, shape (n,); an unknown is held where they are
-        equal.
+        equal. ``beside``: multipliers of a solution of nearly the same program, to which the search keeps.
         """
         sizes = [r.expression.shape[0] for r in self.rows]
-        answer = self._solver(
+        solver, known = self._solver, {}
+        if beside is not None:
+            solver, known = self._warm, {"lam_x0": beside[0], "lam_g0": beside[1]}
+        answer = solver(
             x0=start,
             p=[] if parameters is None else parameters,
             lbx=self.lower if lower is None else lower,
             ubx=self.upper if upper is None else upper,
             lbg=np.repeat([r.lower for r in self.rows], sizes),
             ubg=np.repeat([r.upper for r in self.rows], sizes),
+            **known,
         )
-        stats = self._solver.stats()
-        groups = np.split(np.abs(np.array(answer["lam_g"]).ravel()), np.cumsum(sizes)[:-1])
+        stats = solver.stats()
+        multipliers = (np.array(answer["lam_x"]).ravel(), np.array(answer["lam_g"]).ravel())
+        groups = np.split(np.abs(multipliers[1]), np.cumsum(sizes)[:-1])
         finite = bool(np.all(np.isfinite(np.array(answer["x"]))) and np.isfinite(float(answer["f"])))
         return Solution(
             finite and stats["return_status"] in _SOLVED,
@@ -190,11 +214,16 @@ class Program:
             float(answer["f"]),
             int(stats["iter_count"]),
             tuple(float(np.max(group, initial=0.0)) for group in groups),
+            multipliers,
         )
 
     def prepare(self) -> None:
         """Make the derivatives once, before the work is shared out to other processes."""
         _ = self._solver
+
+    def prepare_beside(self) -> None:
+        """Make the derivatives of searches beside a solution."""
+        _ = self._warm
 
     def solve_all(
         self, starts: Sequence[Array], progress: Callable[[], None] = lambda: None
@@ -209,6 +238,13 @@ class Program:
 
     @cached_property
     def _solver(self) -> ca.Function:
+        return self._interior_point()
+
+    @cached_property
+    def _warm(self) -> ca.Function:
+        return self._interior_point(**_BESIDE)
+
+    def _interior_point(self, **options: Any) -> ca.Function:
         problem: dict[str, Any] = {
             "x": self.unknowns,
             "f": ca.densify(ca.SX(self.cost)),  # no limit that could give leaves a zero without an entry
@@ -216,4 +252,6 @@ class Program:
         }
         if self.parameters is not None:
             problem["p"] = self.parameters
-        return ca.nlpsol("design", "ipopt", problem, {"ipopt.max_iter": self.iterations, **_OPTIONS})
+        return ca.nlpsol(
+            "design", "ipopt", problem, {"ipopt.max_iter": self.iterations, **_OPTIONS, **options}
+        )

@@ -18,7 +18,8 @@ from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from ..tolerance.tolerance_result import ToleranceResult
-from .conflict import Remedies
+from .design_search import spans_of
+from .remedies import Remedies
 from .size_ranges import SizeRange
 
 
@@ -40,6 +41,8 @@ class LimitState:
         Unit in which it is shown.
     active
         Whether the design sits on the bound.
+    where
+        In which ranges of the angle it does, in words; empty for a limit on a single number.
     """
 
     limit: str
@@ -49,11 +52,12 @@ class LimitState:
     upper: bool
     unit: str
     active: bool
+    where: str = ""
 
     def __str__(self) -> str:
         factor = parse_unit(self.unit).factor
         sign = "<=" if self.upper else ">="
-        mark = "  ACTIVE" if self.active else ""
+        mark = f"  ACTIVE {self.where}".rstrip() if self.active else ""
         value, bound = (with_unit(f"{number / factor:.4g}", self.unit) for number in (self.value, self.bound))
         return f"{self.limit}: {self.of} {value} {sign} {bound}{mark}"
 
@@ -136,6 +140,8 @@ class StartOutcome:
         It took.
     cost, rms
         Sum of the goals, and torque error in N·m.
+    same
+        Whether it is the design that was taken, by cost and shape.
     """
 
     solved: bool
@@ -143,6 +149,7 @@ class StartOutcome:
     iterations: int
     cost: float
     rms: float
+    same: bool = False
 
 
 @dataclass(frozen=True)
@@ -368,7 +375,7 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
 
 def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     """Return what a design prints: pairs of text."""
-    target, check, curves, rho = design.target, design.check, design.curves, design.contour.radii_of_curvature
+    target, check, curves = design.target, design.check, design.curves
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"
     fit = f", contour held to {1e6 * design.fit_error:.2g} µm" if design.fit_error > 0.0 else ""
@@ -392,7 +399,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
         ("energy from angle zero", f"{curves.energy:.4g} J, without that of the pretension"),
         *([("rubber", f"{1e6 * design.rubber_volume:.4g} cm³")] if design.rubber_volume > 0.0 else []),
-        ("radius of curvature", f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"),
+        ("radius of curvature", _curvature(design)),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
         ("lever arm", f"up to {1e3 * design.contour.lever_arms.max():.4g} mm"),
         (
@@ -409,17 +416,35 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     return rows if inside is None else [*rows, ("within tolerance", f"{100 * inside:.3g} % of the angles")]
 
 
+_SURE = 2
+"""Starts from which a design was found where nothing more is said."""
+_EDGE = 1e-3
+"""Radius of curvature, relative to the largest lever arm, up to which a contour is an edge."""
+
+
+def _curvature(design: CamDesign) -> str:
+    """Return the range of the radius of curvature; where it is zero the contour is an edge, as of a bar."""
+    curves = design.curves
+    edge = curves.radii_of_curvature <= _EDGE * curves.lever_arms.max()
+    if not edge.any():
+        rho = design.contour.radii_of_curvature
+        return f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"
+    where = f"an edge {spans_of(curves.angles, edge)}, where ConvexContour binds"
+    return where if edge.all() else f"{where}; up to {1e3 * curves.radii_of_curvature.max():.3g} mm elsewhere"
+
+
 def _starts(design: CamDesign) -> str:
-    solved = [s for s in design.starts if s.solved]
-    text = f"{len(solved)} of {len(design.starts)} came to a solution"
-    best = design.starts[design.taken]
-    others = sorted((s for i, s in enumerate(design.starts) if s.solved and i != design.taken), key=_cost)
+    """Return from how many starts the design was found, and what the next best of another shape is."""
+    solved = [start for start in design.starts if start.solved]
+    times = sum(start.same for start in solved)
+    text = f"found from {times} of {len(design.starts)}"
+    if times < _SURE:
+        text = f"found once only in {len(design.starts)}: another may be better, ask for more starts"
+    others = sorted((start for start in solved if not start.same), key=lambda start: start.cost)
     if not others:
-        return text + "; no second one to compare with"
-    ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
-    if ratio < 1.001:
-        return text + "; the next best is as good, within 0.1 % of the cost"
-    return text + f"; the next best has {ratio:.4g} times the cost, {prefixed(others[0].rms)} rms"
+        return text
+    ratio = others[0].cost / design.starts[design.taken].cost
+    return text + f"; the next best design has {ratio:.4g} times the cost, {prefixed(others[0].rms)} rms"
 
 
 def _spread_rows(design: CamDesign) -> list[tuple[str, str]]:
@@ -441,10 +466,6 @@ def _alternative(design: CamDesign, each: Alternative) -> str:
         return f"{each.choice}: no design, {each.reason}"
     share = 100.0 * each.rms / design.target.largest
     return f"{each.choice}: {share:.2g} % rms, cost {each.cost:.4g}" + ("" if each.met else ", a miss")
-
-
-def _cost(outcome: StartOutcome) -> float:
-    return outcome.cost
 
 
 def _read(torque: float) -> str:

@@ -26,7 +26,8 @@ class DesignSettings:
     Parameters
     ----------
     starts
-        Number of starting points; the first four are always the same.
+        Most starting points; the first four are always the same. Eight are taken, and eight more each time
+        until the best design has been found from two of them.
     seed
         Of the starting points after the fourth.
     largest_error
@@ -57,7 +58,7 @@ class DesignSettings:
     0.01
     """
 
-    starts: int = 8
+    starts: int = 24
     seed: int = 1
     largest_error: float = 0.01
     defaults: Sequence[Limit] | None = None

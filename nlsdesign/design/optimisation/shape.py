@@ -22,6 +22,7 @@ _LARGEST_RADIUS = 0.5
 """Largest radius of curvature and first slope in m."""
 _LEAST_CLEARANCE = 0.02
 """Free length of the cable and clearance between cam and anchor, relative to the anchor distance."""
+_FARTHEST = (1.0 - _LEAST_CLEARANCE) ** 2
 
 
 class Shape(NamedTuple):
@@ -91,8 +92,10 @@ def through_centre(
     rows = (
         support.rows,
         Rows(angles[-1] - end, 0.0, 0.0),
-        Rows((root - slope) / anchor, _LEAST_CLEARANCE, ca.inf),
-        Rows((p**2 + slope**2) / anchor**2, -ca.inf, (1.0 - _LEAST_CLEARANCE) ** 2),
+        Rows((root - slope) / anchor, _LEAST_CLEARANCE, ca.inf, "free cable over anchor distance"),
+        Rows(
+            (p**2 + slope**2) / anchor**2, -ca.inf, _FARTHEST, "square of radius over distance of the anchor"
+        ),
     )
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     return variables, Shape(

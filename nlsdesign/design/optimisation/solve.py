@@ -24,6 +24,7 @@ from .problem import contour_names
 from .program import Solution
 from .result import Alternative, CamDesign
 from .settings import DesignSettings, no_progress
+from .several_starts import SeveralStarts
 from .stock import StockChoice, combinations, require_once
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
@@ -137,6 +138,7 @@ class Wanted:
         names = series_cam(model, self.spring)
         defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
         question = Question(
+            machine=actuator,
             model=model,
             cam=with_contour(actuator[names.name], settings.contour),
             drive=names.drive,
@@ -152,7 +154,7 @@ class Wanted:
         question, free = self.question(actuator, settings)
         search = question.search(free)
         search.require_influence()
-        outcomes = search.outcomes()
+        outcomes = SeveralStarts(search).outcomes()
         if not any(outcome.solved for outcome in outcomes):
             # Whether there is any cam at all is found out with softened limits.
             outcomes.append(search.program.solve(feasible_point(search, free)))

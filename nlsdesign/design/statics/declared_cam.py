@@ -279,6 +279,12 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
     )  # fmt: skip
 
 
+def one_sided(part: Any, last_angle: float) -> OneSidedCam:
+    """Return a one-sided cam up to an angle in rad, with the elements and the cable of another."""
+    arms, end = Quantity((0.01,) * 8, "m"), Quantity(last_angle, "rad")
+    return OneSidedCam(lever_arm=arms, last_angle=end, elements=part.elements, cable=part.cable)
+
+
 def with_contour(part: object, contour: Contour | None) -> object:
     """Return a part as what the design sees of it: with its contour where that was designed.
 

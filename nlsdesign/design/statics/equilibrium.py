@@ -31,7 +31,7 @@ def has_corners(function: ca.Function) -> bool:
     return any(step.operation in _CORNERS for step in read_graph(function).steps)
 
 
-def rounded(function: ca.Function, samples: list[Array], share: float) -> ca.Function:
+def rounded(function: ca.Function, samples: list[Array], share: float | Expression) -> ca.Function:
     """Return a function of SX with all corners rounded: Newton's method goes in circles at a knot.
 
     The instructions of the function are written again, with
@@ -39,7 +39,8 @@ def rounded(function: ca.Function, samples: list[Array], share: float) -> ca.Fun
         max(a, b) = (a + b + |a − b|)/2,  min(a, b) = (a + b − |a − b|)/2,  |v| ≈ √(v² + w²),
 
     where w is a share of the largest |v| that occurs. Everything else stays as it is.
-    ``samples``: for each argument typical values, shape (argument, samples) or (argument,).
+    ``samples``: for each argument typical values, shape (argument, samples) or (argument,). ``share``: a
+    symbol becomes one more argument of the result.
     """
     arguments = [ca.SX.sym(function.name_in(i), function.size1_in(i)) for i in range(function.n_in())]
     _, distances = _rewritten(function, arguments, [])
@@ -48,11 +49,15 @@ def rounded(function: ca.Function, samples: list[Array], share: float) -> ca.Fun
     sampled = np.array(ca.Function("distances", arguments, [ca.vertcat(*distances)])(*samples))
     widths = [share * float(np.max(np.abs(row))) for row in sampled]
     results, _ = _rewritten(function, arguments, widths)
-    return ca.Function(function.name(), arguments, results)
+    return ca.Function(function.name(), [*arguments, *_symbols(share)], results)
+
+
+def _symbols(share: float | Expression) -> list[Expression]:
+    return [share] if isinstance(share, ca.SX) else []
 
 
 def _rewritten(
-    function: ca.Function, arguments: list[Expression], widths: list[float]
+    function: ca.Function, arguments: list[Expression], widths: list[float | Expression]
 ) -> tuple[list[Expression], list[Expression]]:
     """Return the results, with corners rounded where widths are given, and the distances from the corners."""
     distances: list[Expression] = []
@@ -69,9 +74,10 @@ def _rewritten(
     return as_results(function, values), distances
 
 
-def _corner(code: int, a: Expression, b: Expression, width: float) -> Expression:
+def _corner(code: int, a: Expression, b: Expression, width: float | Expression) -> Expression:
     away = a - b
-    size = ca.sqrt(away**2 + width**2) if width > 0.0 else ca.fabs(away)
+    sharp = not isinstance(width, ca.SX) and width <= 0.0
+    size = ca.fabs(away) if sharp else ca.sqrt(away**2 + width**2)
     if code == ca.OP_FABS:
         return size
     return (a + b + size) / 2 if code == ca.OP_FMAX else (a + b - size) / 2
@@ -125,16 +131,17 @@ class ElasticLaw:
         """
         return self._evaluated(extension, 1)
 
-    def without_knots(self, longest: float, share: float) -> ElasticLaw:
-        """Return the law with rounded knots."""
+    def without_knots(self, longest: float, share: float | Expression) -> ElasticLaw:
+        """Return the law with rounded knots; a symbol as share becomes one more argument of its function."""
         places = np.linspace(0.0, longest, 101).reshape(1, -1)
         numbers = np.repeat(self.numbers[:, None], places.size, axis=1)
         extension, parameters = ca.SX.sym("extension"), ca.SX.sym("parameters", len(self.parameters))
         old = self.function.call([extension, parameters])
         smooth = rounded(ca.Function("force", [extension, parameters], old[:1]), [places, numbers], share)
-        force = smooth.call([extension, parameters])[0]
+        given = [extension, parameters, *_symbols(share)]
+        force = smooth.call(given)[0]
         results = [force, ca.jacobian(force, extension), *old[2:]]
-        return replace(self, function=ca.Function("law", [extension, parameters], results))
+        return replace(self, function=ca.Function("law", given, results))
 
     def _evaluated(self, extension: ArrayLike, which: int) -> Array:
         given = np.asarray(extension, dtype=float)

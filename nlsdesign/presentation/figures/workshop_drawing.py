@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from ...design import CamPart
+from ...design import CamPart, process_of
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, Quantity, with_unit
@@ -29,6 +30,8 @@ _AXIS = (0, (10, 2, 1.5, 2))
 """Dashes of an axis."""
 _SCALES = (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05)
 _MOST_ROWS = 16
+_NOTE = 96
+"""Letters in a line of the notes."""
 _SIZES = (
     ("cable_radius", "Cable radius"),
     ("thickness", "Plate thickness"),
@@ -125,7 +128,7 @@ def workshop_drawing(part: CamPart, *, title: TitleBlock, rows: Sequence[Inspect
     _side_view(page, view)
     if "mouth_width" in part.numbers:
         _mouth_detail(page, part)
-    _notes(page, part, title)
+    _notes(page, part, title, max((row.torque for row in rows), default=0.0))
     _column(page, part, rows, title, view.scale)
     return described(
         page.figure,
@@ -322,7 +325,7 @@ def _mouth_detail(page: Sheet, part: CamPart) -> None:
     page.text(x, y - radius - 3.6, text=f"Mouths of the channel, {scale_text(scale)}", ha="center")
 
 
-def _notes(page: Sheet, part: CamPart, title: TitleBlock) -> None:
+def _notes(page: Sheet, part: CamPart, title: TitleBlock, torque: float) -> None:
     tolerance = MM * part.number("edge_tolerance")
     lines = [
         f"1  Edge under the cable: lines and arcs of {title.file}, profile ± {tolerance:.3g} mm over the",
@@ -338,8 +341,12 @@ def _notes(page: Sheet, part: CamPart, title: TitleBlock) -> None:
     lines += [
         f"4  Holes: places as in {title.file}, ± 0.05 mm; else ISO 2768-1 m (both assumed).",
         "5  Coloured: centre line of the cable at zero and at the last angle.",
-        "*  Size assumed, or without a source.",
+        *textwrap.wrap(f"6  Process: {process_of(part)}.", _NOTE, subsequent_indent="    "),
     ]
+    if "bolt_count" not in part.numbers:
+        what = f" of {torque:.3g} N·m" if torque else ""
+        lines.append(f"7  Nothing drawn here carries the torque{what}: no bolts, key or clamp.")
+    lines.append("*  Size assumed, or without a source.")
     x = 84.0 if "mouth_width" in part.numbers else 14.0
     page.text(x, 13.0, text="\n".join(lines), va="bottom", linespacing=1.45)
 
