@@ -264,9 +264,10 @@ def loop(
 
     The load is fixed for responses, moved for the impedance. Where the spring gives torque of one sign only,
     each sine of the torque swings about 1.25 amplitudes, and 2.25 are held. Exit status 1 if the loop
-    limit-cycles or is unstable anywhere in the range that is looked at, with the gain where that begins, or
-    if a sine moves no torque. The observer is the cascade, with the numbers of the deck for the machine
-    as well.
+    limit-cycles or is unstable anywhere in the range that is looked at, with the gain where that begins, if
+    a sine moves no torque, or if the gain has less than 6 dB and 30 degrees in 95 % of the spread of the
+    deck, with the gain that has them. The observer is the cascade, with the numbers of the deck for the
+    machine as well.
     """
     from ..components import declare, with_moved_load
     from ..export import quickest
@@ -363,8 +364,8 @@ def _show_loop(result: LoopEvaluation) -> None:
         f"coupled at {math.degrees(result.coupled.angle):.3g}°: stable on {int(np.sum(stable_loads))} of "
         f"{stable_loads.size} loads"
     )
-    for sentence in result.findings():
-        click.echo(f"finding: {sentence}")
+    for sentence in [*result.spread.words(), *(f"finding: {each}" for each in result.findings())]:
+        click.echo(sentence)
     if result.stable:
         for onset in result.onsets:
             click.echo(str(onset))

@@ -22,11 +22,11 @@ from ..bench.discrepancy.block_prediction import shown_values
 from ..bench.identification import Record, RecordSet
 from ..bench.identification.least_squares import Fit
 from ..feedback.observer import (
-    AdaptiveDesign,
+    CorrectedDesign,
     FixedGrid,
     Grid,
     ObserverDesign,
-    design_adaptive_observer,
+    design_corrected_observer,
     design_observer_with_details,
     observe,
 )
@@ -98,16 +98,16 @@ class Regeneration:
     plant
         The better model.
     observer
-        Of the better model, cascade or adaptive, whichever errs less on these records; ``None`` where none
-        can be designed.
+        Cascade or corrected, whichever errs less on the records that decide: of the better model, unless one
+        of the declared model errs less there; ``None`` where none can be designed.
     reasons
         Why there is no observer, or no comparison; empty if nothing is lacking.
     quantity, unit
         What is estimated.
     errors
         Of the cascade by record, with the nominal numbers.
-    adaptive
-        Of the adaptive observer by record, begun at the declared numbers; empty where it cannot be designed
+    corrected
+        Of the corrected observer by record, begun at the declared numbers; empty where it cannot be designed
         for both models or a record lacks an input of it.
     chosen
         Which observer was taken, and why.
@@ -124,7 +124,7 @@ class Regeneration:
     quantity: str = ""
     unit: str = "N*m"
     errors: tuple[ObserverTorqueError, ...] = ()
-    adaptive: tuple[ObserverTorqueError, ...] = ()
+    corrected: tuple[ObserverTorqueError, ...] = ()
     chosen: str = ""
     spread_before: tuple[float, ...] = ()
     spread_after: tuple[float, ...] = ()
@@ -137,8 +137,8 @@ class Regeneration:
 
     @property
     def learning(self) -> tuple[float, float]:
-        """Error of the adaptive observer over all records, before and after."""
-        return _over_records(self.adaptive)
+        """Error of the corrected observer over all records, before and after."""
+        return _over_records(self.corrected)
 
     @property
     def over_spread(self) -> tuple[float, float]:
@@ -159,7 +159,7 @@ class Regeneration:
             f"{three_digits(pair[0])} → {with_unit(three_digits(pair[1]), self.unit)}."
             for how, pair in pairs.items()
             if all(map(math.isfinite, pair))
-        ) + ((f"Generated is the {self.chosen}.",) if self.adaptive else ())
+        ) + ((f"Generated is the {self.chosen}.",) if self.chosen else ())
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``regeneration.json``."""
@@ -170,9 +170,9 @@ class Regeneration:
             "nominal": dict(zip(keys, map(_finite, self.nominal), strict=True)),
             "over_spread": dict(zip(keys, map(_finite, self.over_spread), strict=True)),
             "draws": {"before": list(self.spread_before), "after": list(self.spread_after)},
-            "adaptive": dict(zip(keys, map(_finite, self.learning), strict=True)),
+            "corrected": dict(zip(keys, map(_finite, self.learning), strict=True)),
             "records": [each._asdict() for each in self.errors],
-            "adaptive_records": [each._asdict() for each in self.adaptive],
+            "corrected_records": [each._asdict() for each in self.corrected],
             "chosen": self.chosen,
             "reasons": list(self.reasons),
         }
@@ -211,7 +211,8 @@ def regenerate(
     declared, better
         The model as declared, and the one that a diagnosis has left.
     records
-        From the bench; those that no fit has seen are compared, or all where there are none.
+        From the bench. The observer is chosen on those that selected the better model, or on those that were
+        fitted without them; those held out are compared, or all without them.
     fits
         Of the better model; their covariance gives the draws of its numbers.
     choice
@@ -234,18 +235,21 @@ def regenerate(
     known: dict[str, Any] = {"quantity": spring.effort, "unit": better.variable(spring.effort).unit}
     try:
         before = _designed(declared, choice)
-        runs = [_Watched.of(better, spring, r, choice) for r in records.of("held_out") or records.records]
+        seen = {r.name: _Watched.of(better, spring, r, choice) for r in records.records}
     except NlsError as error:
         return Regeneration(better, after.model, (f"the observers are not compared: {error}",), **known)
+    runs = [seen[r.name] for r in records.of("held_out") or records.records]
+    deciding = [seen[r.name] for r in records.of("selection") or records.of("fit") or records.records]
     progress("designing the observers that learn")
     learned = [_learning(model, choice) for model in (declared, better)]
-    adaptive, lacking = _compared(learned, runs)
+    both = [each for each in learned if not isinstance(each, str)]
+    generated, chosen = _generated((before, after), both if len(both) == 2 else [], deciding)
+    corrected, lacking = _compared(learned, runs)
     pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
     errors = tuple(
         ObserverTorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
         for run, (a, b) in zip(runs, pairs, strict=True)
     )
-    generated, chosen = _generated(after, learned[1], errors, adaptive)
     progress("designing observers over the spread of the numbers")
     draws = [*_draws(declared, ()), *_draws(better, fits)]
     models = [*[declared] * DRAWS, *[better] * DRAWS]
@@ -255,7 +259,7 @@ def regenerate(
         generated.model,
         (*lacking, *_failures(spread)),
         errors=errors,
-        adaptive=adaptive,
+        corrected=corrected,
         chosen=chosen,
         spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
         spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
@@ -274,10 +278,10 @@ def _designed(model: FlatModel, choice: ObserverChoice, grid: Grid | None = None
     )
 
 
-def _learning(model: FlatModel, choice: ObserverChoice) -> AdaptiveDesign | str:
-    """Return the adaptive observer of a model, or why there is none."""
+def _learning(model: FlatModel, choice: ObserverChoice) -> CorrectedDesign | str:
+    """Return the corrected observer of a model, or why there is none."""
     try:
-        return design_adaptive_observer(
+        return design_corrected_observer(
             model,
             estimate=series_spring(model, choice.spring).effort,
             measured=measured_motion(model, choice.measured),
@@ -289,10 +293,10 @@ def _learning(model: FlatModel, choice: ObserverChoice) -> AdaptiveDesign | str:
 
 
 def _compared(
-    learned: Sequence[AdaptiveDesign | str], runs: Sequence[_Watched]
+    learned: Sequence[CorrectedDesign | str], runs: Sequence[_Watched]
 ) -> tuple[tuple[ObserverTorqueError, ...], tuple[str, ...]]:
-    """Return the errors of the adaptive observers, before and after, or why there are none."""
-    words = "the adaptive observer is not compared: "
+    """Return the errors of the corrected observers, before and after, or why there are none."""
+    words = "the corrected observer is not compared: "
     designs = []
     for which, each in zip(("declared", "better"), learned, strict=True):
         if isinstance(each, str):
@@ -310,17 +314,36 @@ def _compared(
 
 
 def _generated(
-    cascade: ObserverDesign,
-    learning: AdaptiveDesign | str,
-    errors: Sequence[ObserverTorqueError],
-    adaptive: Sequence[ObserverTorqueError],
-) -> tuple[ObserverDesign | AdaptiveDesign, str]:
-    """Return the observer of the better model that errs less on the records, and why in words."""
-    if isinstance(learning, str) or not adaptive:
-        return cascade, "cascade"
-    if _over_records(adaptive)[1] < _over_records(errors)[1]:
-        return learning, "adaptive observer: it errs less on these records than the cascade"
-    return cascade, "cascade: it errs less on these records than the adaptive observer"
+    cascades: tuple[ObserverDesign, ObserverDesign],
+    corrected: Sequence[CorrectedDesign],
+    deciding: Sequence[_Watched],
+) -> tuple[ObserverDesign | CorrectedDesign, str]:
+    """Return the observer that errs least on the records that decide, and why in words.
+
+    It is one of the declared model where none of the better model errs less: what is worse replaces nothing.
+    ``corrected``: those of the declared and of the better model, or none.
+    """
+    named: list[tuple[str, ObserverDesign | CorrectedDesign, ObserverDesign | CorrectedDesign]] = [
+        ("cascade", *cascades)
+    ]
+    if corrected and not any(run.lacks(each) for run in deciding for each in corrected):
+        named.append(("corrected observer", corrected[0], corrected[1]))
+    errors = [
+        [_rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
+    ]
+    best = min(range(len(named)), key=lambda k: errors[k][1])
+    replaced = min(range(len(named)), key=lambda k: errors[k][0])
+    roles = ", ".join(sorted({run.record.role.replace("_", " ") for run in deciding}))
+    if errors[replaced][0] < errors[best][1]:
+        name = named[replaced][0]
+        return named[replaced][1], (
+            f"{name} of the declared model, which is not replaced: on the records that decide ({roles}) it "
+            "errs less than those of the better model"
+        )
+    name, _, design = named[best]
+    if len(named) == 1:
+        return design, name
+    return design, f"{name}: it errs less on the records that decide ({roles}) than the other"
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,18 +378,17 @@ class _Watched:
         """Root mean square of the torque."""
         return float(np.sqrt(np.mean(self.torque**2)))
 
-    def lacks(self, design: ObserverDesign | AdaptiveDesign) -> list[str]:
+    def lacks(self, design: ObserverDesign | CorrectedDesign) -> list[str]:
         """Return inputs of an observer that the record does not measure."""
         return [v.name for v in design.model.inputs if v.name in self.silent]
 
-    def estimate(self, design: ObserverDesign | AdaptiveDesign) -> Array:
+    def estimate(self, design: ObserverDesign | CorrectedDesign) -> Array:
         """Return what an observer makes of the record, begun at rest at its first angle."""
         inputs = {v.name for v in design.model.inputs}
         wires = {name: signal for name, signal in self.readings.items() if name in inputs}
         first = float(self.trace[self.readings.get(self.motion, self.motion)][0])
         run = observe(design.model, self.trace, readings=wires, start=design.start(first))
-        step = design.step.nominal if isinstance(design, AdaptiveDesign) else design.step
-        return run[step.plant.estimate.name]
+        return run[design.step.plant.estimate.name]
 
     def error(self, estimate: Array) -> float:
         """Return the root mean square error of an estimate."""

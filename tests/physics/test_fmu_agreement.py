@@ -182,7 +182,7 @@ def test_the_observer_in_c_agrees_with_the_observer_in_python_to_1e_12(tmp_path,
     size = np.abs(expected).max(axis=0)
     assert np.all(size > 0)
     # A slow state counts deviations of the deck: one is its size, also where it has hardly moved.
-    slow = np.array([".deviation[" in v.name for v in estimator.outputs])
+    slow = np.array([".deviation[" in v.name or ".factor[" in v.name for v in estimator.outputs])
     size = np.where(slow, np.maximum(size, 1.0), size)
     # An innovation is the difference of two angles: it cannot be known better than both are rounded.
     rounding = 2.0 * np.finfo(float).eps * np.abs(angle).max()

@@ -127,8 +127,8 @@ def test_the_fuzz_would_notice(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_default_observer_recovers_on_a_motion_that_its_current_makes(tmp_path: Path) -> None:
-    """The adaptive observer has a memory of seconds; what it learns must not come from a named fault."""
+def test_the_adaptive_observer_recovers_on_a_motion_that_its_current_makes(tmp_path: Path) -> None:
+    """It has a memory of seconds; what it learns must not come from a named fault."""
     outputs = ["motor.angle", "motor_encoder.reading", "spring.torque"]
     machine = nls.flatten(nls.declare(nls.load_deck(DECK)), outputs=outputs)
     time = 1e-3 * np.arange(5000.0)

@@ -1,6 +1,7 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
 from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
+from .adaptive.corrected_cascade import CorrectedDesign, design_corrected_observer
 from .adaptive.duty_and_directions import AdaptiveSettings, Trust
 from .adaptive.estimator_bound import EstimatorBound, estimator_bound
 from .certificates import (
@@ -51,6 +52,7 @@ __all__ = [
     "ConstantGain",
     "ContinuousContraction",
     "Contraction",
+    "CorrectedDesign",
     "DesignedObserver",
     "ErrorStability",
     "EstimatorBound",
@@ -79,6 +81,7 @@ __all__ = [
     "clamped_estimate_bound",
     "declared_assumptions",
     "design_adaptive_observer",
+    "design_corrected_observer",
     "design_observer",
     "design_observer_with_details",
     "designed_observer",

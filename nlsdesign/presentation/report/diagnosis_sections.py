@@ -436,10 +436,10 @@ def _torque_errors(result: Regeneration) -> NumbersSection:
         counts = f"{len(result.spread_before)} and {len(result.spread_after)} draws"
         note = f"declared spreads → covariance of the fit, {counts}"
         numbers.append(KeyNumber("torque error over the spread", f"{before} → {after} {unit}", note))
-    if result.adaptive:
+    if result.corrected:
         before, after = (three_digits(each) for each in result.learning)
         note = "learns on each record, begun at the numbers of its model"
-        numbers.append(KeyNumber("adaptive observer", f"{before} → {after} {unit}", note))
+        numbers.append(KeyNumber("corrected observer", f"{before} → {after} {unit}", note))
     return NumbersSection("Torque error", tuple(numbers))
 
 
@@ -454,13 +454,13 @@ def _table(result: Regeneration) -> TableSection:
             three_digits(e.after),
             three_digits(e.torque),
         )
-        for kind, errors in (("cascade", result.errors), ("adaptive", result.adaptive))
+        for kind, errors in (("cascade", result.errors), ("corrected", result.corrected))
         for e in errors
     )
     columns = ("observer", "record", "used", f"before in {unit}", f"after in {unit}", f"torque in {unit}")
     caption = (
         "Root mean square error of the estimated torque, and the torque itself; the cascade with nominal "
-        "numbers, the adaptive observer begun with them."
+        "numbers, the corrected one begun with them."
         + (f" Generated is the {result.chosen}." if result.chosen else "")
     )
     return TableSection("Torque error of each record", columns, rows, caption=caption)

@@ -37,7 +37,7 @@ def test_all_commands_write_what_errs_least_over_the_spread(run: Run, tmp_path: 
     found = json.loads(out)
     assert found["reason"] == chosen.reason
     assert found["expected_rms"] == pytest.approx(chosen.expected)
-    assert (found["kind"] == "adaptive") == (chosen.expected[1] < chosen.expected[0])
+    assert (found["kind"] == "corrected") == (chosen.expected[1] < chosen.expected[0])
     assert not found["certified"]
     assert run("export", "c", "--deck", DECK, "--out", "c")[0] == 0
     codes = [(tmp_path / folder / "observer.c").read_text("utf-8") for folder in "oc"]
@@ -47,7 +47,7 @@ def test_all_commands_write_what_errs_least_over_the_spread(run: Run, tmp_path: 
     assert "not certified" in head
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("best", "adaptive")])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("best", "adaptive", "corrected")])
 def test_every_kind_is_written(run: Run, tmp_path: Path, kind: str) -> None:
     deck = "austin2015_figure_consistent" if kind == "published" else DECK  # its states need a cam
     status, out, err = run("observer", "--deck", deck, "--kind", kind, "--out", "o", "--json")
@@ -80,7 +80,7 @@ def test_a_deck_without_spread_gets_the_cascade_and_the_reason(run: Run, tmp_pat
     deck = str(without_spread(tmp_path / "exact.toml"))
     status, out, err = run("observer", "--deck", deck, "--out", "o")
     assert status == 0, err
-    assert "cascade, for no adaptive observer can be designed: " in out
+    assert "cascade, for it cannot be corrected: " in out
     status, out, err = run("observer", "--deck", deck, "--errors", "--out", "e")
     assert status == 2
     assert "declares no spread" in err

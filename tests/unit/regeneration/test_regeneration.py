@@ -99,13 +99,46 @@ def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Pat
     assert nominal.endswith(" N·m.")
     assert "over the spread" in spread
     assert "that learns" in learning
-    least = min((result.nominal[1], "cascade"), (result.learning[1], "adaptive"))
-    assert generated.startswith(f"Generated is the {least[1]}")
-    assert (len(result.observer.states) > 20) == (least[1] == "adaptive")
+    assert "on the records that decide (fit)" in generated
+    assert (len(result.observer.states) > 20) == generated.startswith("Generated is the corrected")
     written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert written["nominal"]["before"] == result.nominal[0]
     page = report.write_report(tmp_path / "r.html", *regeneration_sections(result, {}), title="t")
     assert nominal.partition(": ")[2].removesuffix(".") in page.read_text(encoding="utf-8")
+
+
+def with_records(*records: tuple[str, float]) -> RecordSet:
+    """Records of machines with these stiffnesses, by role."""
+    made = []
+    for role, stiffness in records:
+        torque = stiffness * ANGLE
+        known = {ALL[0]: ANGLE, ALL[1]: (torque - 0.16 * ANGLE), ALL[2]: torque}
+        made.append(Record(role, Trace(TIME, known, dict(zip(ALL, ("rad", "A", "N*m"), strict=True))), role))
+    return RecordSet(tuple(made), bench(*ALL).columns)
+
+
+def test_held_out_records_decide_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the selection the better model is right; the record held out is of the declared machine."""
+    monkeypatch.setattr(regenerated_observer, "DRAWS", 1)
+    records = with_records(("fit", TRUE), ("selection", TRUE), ("held_out", DECLARED))
+    declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
+    found = regenerate(declared, better, records, choice=CHOICE)
+    assert [e.role for e in found.errors] == ["held_out"]
+    before, after = found.nominal
+    assert before < after, "held out, the declared model would have been taken"
+    assert "(selection)" in found.chosen
+    assert "not replaced" not in found.chosen
+
+
+def test_an_observer_that_would_be_worse_replaces_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(regenerated_observer, "DRAWS", 1)
+    records = with_records(("fit", TRUE), ("selection", DECLARED), ("held_out", TRUE))
+    declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
+    found = regenerate(declared, better, records, choice=CHOICE)
+    assert "of the declared model, which is not replaced" in found.chosen
+    assert any("not replaced" in sentence for sentence in found.words())
+    assert found.observer is not None
+    assert found.observer.origin == declared.origin or "declared" in found.chosen
 
 
 def test_observer_and_plant_are_written(

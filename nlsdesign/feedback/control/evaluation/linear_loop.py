@@ -22,6 +22,7 @@ from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ....model.roles import series_spring
 from ....simulation.sampled_batch import PLANT, SampledSystem
+from ...observer.adaptive.corrected_cascade import PREFIX
 from ..closed_loop import ClosedLoop
 from ..laws.law_writer import DESIRED
 from .linear_parts import (
@@ -191,6 +192,15 @@ def assembled(
     return writer.loop(angles, mode)
 
 
+def restless(system: SampledSystem) -> ConvergenceError:
+    """Return the error of a loop whose observer learns."""
+    return ConvergenceError(
+        f"linear loop with {' and '.join(m.name for m in system.blocks.values())}",
+        "no rest is found, for what the observer has learned depends on what went before",
+        next_step="take a scheduled observer: design_observer(model, gain=CascadeGain())",
+    )
+
+
 class _Assembler:
     """Puts plant and blocks together by rows over all states and open inputs."""
 
@@ -221,6 +231,9 @@ class _Assembler:
 
     def rest(self) -> None:
         """Find the states of the blocks, and the goals, at which the loop rests."""
+        if any(v.name.startswith(f"{PREFIX}.") for m in self.system.blocks.values() for v in m.states):
+            # What was learned stays whatever it is, so every value of it would be a rest.
+            raise restless(self.system)
         goals = [n for n in self.inputs if n not in self.cut and not n.startswith(f"{PLANT}.")]
         columns = [len(self.states) + self.inputs.index(n) for n in goals]
         for b, m in self.system.blocks.items():
@@ -244,12 +257,8 @@ class _Assembler:
             try:
                 step = -(np.linalg.pinv(slope) @ residual[:, :, None])[:, :, 0]
             except np.linalg.LinAlgError as error:
-                # Values ran away; an adaptive observer, whose covariance is a state, has no rest like this.
-                raise ConvergenceError(
-                    f"linear loop with {' and '.join(m.name for m in self.system.blocks.values())}",
-                    "no rest is found",
-                    next_step="take a scheduled observer: design_observer(model, gain=CascadeGain())",
-                ) from error
+                # Values ran away: a covariance that is a state has no rest like this.
+                raise restless(self.system) from error
             for k, column in enumerate(columns):
                 self._moved(column, step[:, k])
             if np.max(np.abs(step)) < 1e-9:

@@ -418,6 +418,7 @@ def loop_over_spread(
     frequency: float,
     draws: int = 100,
     seed: int = 1,
+    kick: float = 0.0,
     translate: Translate = as_it_is,
 ) -> LoopSpread:
     """Run a loop on draws of the numbers of its plant, which its observer and controller do not know.
@@ -434,6 +435,8 @@ def loop_over_spread(
         Number of draws.
     seed
         The same seed gives the same numbers.
+    kick
+        Torque in N·m that is wanted besides for 10 ms when a held torque is reached.
     translate
         For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
 
@@ -454,7 +457,7 @@ def loop_over_spread(
             loop, amplitude=amplitude, frequencies=np.full(draws, frequency), parameters=parameters
         )
     else:
-        drive = held_drive(loop, torques=np.full(draws, amplitude), parameters=parameters)
+        drive = held_drive(loop, torques=np.full(draws, amplitude), parameters=parameters, kick=kick)
     runs = run_periodic(loop, drive, translate=translate)
     errors = []
     for run in runs:

@@ -214,6 +214,7 @@ class _Group:
 
 
 _APPROACH = 0.3
+_BLOW = 0.01
 """Time in s in which a held torque is approached."""
 _SILENT = 1e-6
 """Share of the desired torque below which a torque has not answered."""
@@ -457,16 +458,22 @@ def sine_drive(
 
 
 def held_drive(
-    loop: ClosedLoop, *, torques: Array, parameters: Mapping[str, Array | float] | None = None
+    loop: ClosedLoop,
+    *,
+    torques: Array,
+    parameters: Mapping[str, Array | float] | None = None,
+    kick: float = 0.0,
 ) -> PeriodicDrive:
     """Return torques that are approached smoothly and then held, as drives of many runs.
 
-    The last twentieth comes as a step: a loop that only dry friction keeps quiet is woken by it.
+    The last twentieth comes as a step: a loop that only dry friction keeps quiet is woken by it. A kick is
+    wanted besides for the 10 ms after the step.
     """
 
     def drives(time: Array, runs: Indices) -> dict[str, Array | float]:
         share = 0.475 - 0.475 * np.cos(math.pi * np.minimum(time / _APPROACH, 1.0))
-        return {loop.desired: torques[runs, None] * np.where(time >= _APPROACH, 1.0, share)}
+        struck = (time >= _APPROACH) & (time < _APPROACH + _BLOW)
+        return {loop.desired: torques[runs, None] * np.where(time >= _APPROACH, 1.0, share) + kick * struck}
 
     return PeriodicDrive(frequencies=np.zeros(len(torques)), drives=drives, parameters=parameters or {})
 

@@ -43,6 +43,7 @@ from .responses import (
     torque_resolution,
     zero_torque,
 )
+from .spread_margins import SpreadMargins, spread_margins
 
 FREQUENCIES = (0.1, 11.0, 20)
 """First and last in Hz, and how many."""
@@ -72,6 +73,8 @@ class LoopEvaluation:
         No torque wanted, load moved.
     resolution
         Torque of one count at the angles of the margins, in N·m.
+    spread
+        Margins of the gain over the spread of the deck, and whether machines settle after a kick.
     """
 
     responses: tuple[SineResponse, ...]
@@ -83,9 +86,10 @@ class LoopEvaluation:
     coupled: CoupledStability
     zero: ZeroTorque
     resolution: Array
+    spread: SpreadMargins
 
     def findings(self) -> list[str]:
-        """Return sentences on what does not hold; none if the loop is stable wherever it was looked at."""
+        """Return sentences on what does not hold; none if the loop is stable, with a margin."""
         result = []
         for response in self.responses:
             about = f" about {response.offset:g} N·m" if response.offset else ""
@@ -100,18 +104,19 @@ class LoopEvaluation:
         lost = np.degrees(linear.angles[linear.reached & ~linear.stable()])
         if len(lost):
             result.append(f"the linear loop is unstable from {lost[0]:.3g}° on, {linear.mode}")
+        result += self.spread.findings()
         if result:
             result += [str(onset) for onset in self.onsets]
         return result
 
     @property
     def stable(self) -> bool:
-        """Whether nothing was found that does not hold."""
+        """Whether nothing was found that does not hold, too small a margin included."""
         return not self.findings()
 
     def content(self) -> dict[str, Any]:
         """Return all figures as JSON holds them, with their units in their names."""
-        findings, linear = self.findings(), self.margins[0].linear
+        findings, linear, kicked = self.findings(), self.margins[0].linear, self.spread.kicked
         return {
             "stable": not findings,
             "findings": findings,
@@ -134,6 +139,15 @@ class LoopEvaluation:
                  "delay_s": _plain(m.delay)}
                 for m in self.margins
             ],
+            "margins_over_spread": {
+                "gain": self.spread.gain, "value": self.spread.value,
+                "declared_dB_deg": _plain(self.spread.least),
+                "kept_by_95_percent_dB_deg": _plain(self.spread.spread),
+                "value_with_6_dB_30_deg": json_number(self.spread.enough),
+                "held_Nm": json_number(kicked.amplitude) if kicked else None,
+                "settled_after_kick": json_number(kicked.held) if kicked else None,
+                "limit_cycling_after_kick": json_number(self.spread.cycling),
+            },
             "angle_rad": _plain(linear.angles), "mode": str(linear.mode),
             "resolution_Nm": _plain(self.resolution),
             "impedance": {"angle_rad": _plain(self.impedance.linear.angles),
@@ -251,7 +265,7 @@ def evaluate_loop(
     )
     return LoopEvaluation(
         responses, held, onsets, line, margins, output_impedance(moved, angles[::5]), coupled, zero,
-        torque_resolution(fixed, angles),
+        torque_resolution(fixed, angles), spread_margins(fixed, gain, last=last, translate=translate),
     )  # fmt: skip
 
 

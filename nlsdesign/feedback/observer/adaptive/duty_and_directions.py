@@ -191,10 +191,10 @@ class Trust:
         If a number is not positive.
     """
 
-    unmodelled: float = 0.005
+    unmodelled: float = 0.02
     correlation_time: float = 0.02
     drift_time: float = 60.0
-    counts: float = 1.0
+    counts: float = 4.0
     limit: float = 2.5
     surprise: float = 3.0
     smallest: float = 0.0004
@@ -327,7 +327,7 @@ def _features(form: AngleForm, points: OperatingPoints, prior: Prior, root: Arra
         for sign in (1.0, -1.0):
             shifted = prior.numbers(sign * STEP * root[:, k])
             changed = form.with_values(dict(zip(prior.names, shifted, strict=True)))
-            effects.append(_effects(changed, points))
+            effects.append(effects_of(changed, points))
         up, down = effects
         columns.append([(a - b) / (2.0 * STEP) for a, b in zip(up, down, strict=True)])
     own = np.array([column[0] for column in columns]).T
@@ -335,7 +335,7 @@ def _features(form: AngleForm, points: OperatingPoints, prior: Prior, root: Arra
     return np.vstack([own, drive]), len(own)
 
 
-def _effects(form: AngleForm, points: OperatingPoints) -> tuple[Array, Array]:
+def effects_of(form: AngleForm, points: OperatingPoints) -> tuple[Array, Array]:
     """Return what the spring gives and what the drive adds, as torques along the duty."""
     k, c = form.inner, form.at(points.angles)
     rest = np.einsum("aj,aj->a", c.estimate[:, :-1], form.rest(points.angles) - c.shift) + c.estimate[:, -1]

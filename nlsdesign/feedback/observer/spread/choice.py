@@ -23,6 +23,7 @@ from ....simulation.sampled_batch import PLANT, run_batch
 from ...analysis.kalman import NoiseAssumptions, declared_deviation
 from ...analysis.rest_points import rest_points
 from ..adaptive.adaptive_observer import SPREAD, AdaptiveDesign, design_adaptive_observer, encoder_quantum
+from ..adaptive.corrected_cascade import PREFIX, CorrectedDesign, design_corrected_observer
 from ..adaptive.duty_and_directions import AdaptiveSettings
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from ..certificates.certificate import Certificate
@@ -34,8 +35,8 @@ from ..scheduling.step import CascadeGain, FittedGain, GainRule, SteadyStateKalm
 from ..scheduling.table import Grid
 from .observer_bench import ObserverBench, observer_bench
 
-BEST, CASCADE, CERTIFIED = "best", "cascade", "certified"
-KINDS = (BEST, "adaptive", CASCADE, CERTIFIED, "kalman", "published")
+BEST, CORRECTED, CASCADE, CERTIFIED = "best", "corrected", "cascade", "certified"
+KINDS = (BEST, CORRECTED, "adaptive", CASCADE, CERTIFIED, "kalman", "published")
 """Kinds of observers by name; the first is the one that errs least over the spread."""
 
 
@@ -54,7 +55,7 @@ class ObserverOfChoice:
         the adaptive observer where it could be designed.
     """
 
-    design: AdaptiveDesign | ObserverDesign
+    design: CorrectedDesign | AdaptiveDesign | ObserverDesign
     reason: str
     expected: tuple[float, ...]
 
@@ -109,30 +110,29 @@ def choose_observer(
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     unit = typeset_unit(model.variable(estimate).unit)
     try:
-        adaptive = design_adaptive_observer(
+        corrected = design_corrected_observer(
             model, estimate=estimate, measured=measured, sample_time=sample_time, settings=settings, grid=grid
         )
-        learned = _expected(model, adaptive, settings)
+        learned = expected_error(model, corrected, settings)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
-        return ObserverOfChoice(cascade, f"cascade, for no adaptive observer can be designed: {error}", ())
-    effects = adaptive.directions.effect * adaptive.directions.torque_share
-    alone = math.hypot(float(np.linalg.norm(effects)), adaptive.directions.left_out)
+        return ObserverOfChoice(cascade, f"cascade, for it cannot be corrected: {error}", ())
+    alone = corrected.balance.before
     sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
     both = f"expected over the spread {sizes} of the cascade"
     if learned < alone:
-        return ObserverOfChoice(adaptive, f"adaptive: {both}", (alone, learned))
-    return ObserverOfChoice(cascade, f"cascade: the adaptive one has {both}", (alone, learned))
+        return ObserverOfChoice(corrected, f"corrected: {both}", (alone, learned))
+    return ObserverOfChoice(cascade, f"cascade: the corrected one has {both}", (alone, learned))
 
 
-def _expected(model: FlatModel, design: AdaptiveDesign, settings: AdaptiveSettings) -> float:
-    """Return the deviation that the filter expects along the bench with the numbers of the deck."""
-    plant = design.step.nominal.plant
+def expected_error(model: FlatModel, design: CorrectedDesign, settings: AdaptiveSettings) -> float:
+    """Return the deviation that the observer expects along the bench with the numbers of the deck."""
+    plant = design.step.plant
     bench = observer_bench(
         model, duty=settings.duty, estimate=plant.estimate.name, measured=plant.angle,
-        sample_time=design.step.nominal.sample_time,
+        sample_time=design.step.sample_time,
     )  # fmt: skip
-    name = f"observer.{plant.estimate.name}.{SPREAD}"
+    name = f"observer.{PREFIX}.{SPREAD}"
     batch = run_batch(bench.system({"observer": design.model}), bench.stop, inputs=bench.inputs, keep=[name])
     counted = np.zeros(len(batch.time), dtype=bool)
     for _, first, last in bench.stretches:
@@ -164,7 +164,7 @@ class DesignedObserver:
     """
 
     kind: str
-    design: AdaptiveDesign | ObserverDesign
+    design: CorrectedDesign | AdaptiveDesign | ObserverDesign
     reason: str = ""
     expected: tuple[float, ...] = ()
 
@@ -266,10 +266,12 @@ def designed_observer(
     kind = kind or BEST
     if kind == BEST:
         chosen = choose_observer(plant, **named)
-        adaptive = isinstance(chosen.design, AdaptiveDesign)
+        corrected = isinstance(chosen.design, CorrectedDesign)
         return DesignedObserver(
-            "adaptive" if adaptive else CASCADE, chosen.design, chosen.reason, chosen.expected
+            CORRECTED if corrected else CASCADE, chosen.design, chosen.reason, chosen.expected
         )
+    if kind == CORRECTED:
+        return DesignedObserver(kind, design_corrected_observer(plant, **named))
     if kind == "adaptive":
         return DesignedObserver(kind, design_adaptive_observer(plant, **named))
     if kind == "published":

@@ -13,6 +13,7 @@ from nlsdesign.export import natively
 from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
+    CorrectedDesign,
     ObserverDesign,
     PaperForm,
     SpreadErrors,
@@ -55,9 +56,9 @@ def errors(linear: FlatModel, adaptive: AdaptiveDesign) -> SpreadErrors:
     )  # fmt: skip
 
 
-def test_the_adaptive_one_is_taken_where_it_expects_less(linear: FlatModel) -> None:
+def test_the_corrected_one_is_taken_where_it_expects_less(linear: FlatModel) -> None:
     found = choose_observer(linear)
-    assert isinstance(found.design, AdaptiveDesign)
+    assert isinstance(found.design, CorrectedDesign)
     alone, learned = found.expected
     assert learned < alone
     assert found.model.description.endswith(found.reason)

@@ -1,0 +1,82 @@
+"""A gain with too small a margin is a finding, with the gain that has enough and what a kick does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nlsdesign.components import declare, with_moved_load
+from nlsdesign.export import quickest
+from nlsdesign.feedback.control import ClosedLoop, cascade_loops, loop_margins
+from nlsdesign.feedback.control.evaluation.responses import held_drive
+from nlsdesign.feedback.control.evaluation.spread_margins import (
+    GAIN_MARGIN,
+    PHASE_MARGIN,
+    SpreadMargins,
+    spread_margins,
+)
+from nlsdesign.foundation.deck import load_deck
+from nlsdesign.model import flatten
+
+GAIN, LAST = "controller.proportional", np.radians(50.0)
+
+
+def loop_of(deck: str) -> ClosedLoop:
+    assembly = declare(load_deck(deck))
+    machines = [flatten(each) for each in (assembly, with_moved_load(assembly))]
+    return cascade_loops(*machines, delay=1, sample_time=1e-3)[0]
+
+
+@pytest.fixture(scope="module")
+def loop() -> ClosedLoop:
+    return loop_of("austin2015_figure_consistent")
+
+
+@pytest.fixture(scope="module")
+def published(loop: ClosedLoop) -> SpreadMargins:
+    return spread_margins(loop, GAIN, last=LAST, translate=quickest())
+
+
+def test_the_published_gain_is_a_finding_with_the_gain_that_has_a_margin(published: SpreadMargins) -> None:
+    assert published.value == 32.0
+    assert not published.kept
+    assert published.least[0] < 1.0
+    margin, kick = published.findings()
+    assert "6 dB, 30° are asked for: 14" in margin
+    assert "machines of the spread limit-cycle at 3.5 N·m after a step and a kick of 10 ms" in kick
+    assert 0.05 < published.cycling < 0.4
+
+
+def test_the_gain_that_is_named_has_the_margin_and_survives_the_kick(
+    loop: ClosedLoop, published: SpreadMargins
+) -> None:
+    better = replace(loop, controller=loop.controller.with_values({GAIN: published.enough}))
+    found = spread_margins(better, GAIN, last=LAST, translate=quickest())
+    assert found.kept
+    assert found.findings() == []
+    assert found.kicked is not None
+    assert found.kicked.held == 1.0
+    # By the margins of the declared machine alone, one angle at a time.
+    margins = loop_margins(better, np.linspace(0.05, 1.0, 11) * LAST, opening=better.desired)
+    assert np.min(margins.gain) >= GAIN_MARGIN
+    assert np.min(margins.phase) >= PHASE_MARGIN
+
+
+def test_a_kick_is_wanted_for_ten_milliseconds_once_the_torque_is_reached(loop: ClosedLoop) -> None:
+    time = 1e-3 * np.arange(3000)
+    drives = [held_drive(loop, torques=np.array([2.0]), kick=kick).drives for kick in (0.0, 1.0)]
+    plain, kicked = (np.asarray(each(time, np.zeros(1, dtype=np.intp))[loop.desired])[0] for each in drives)
+    assert np.sum(kicked - plain) == pytest.approx(10.0)
+    struck = np.flatnonzero(kicked != plain)
+    assert len(struck) == 10
+    assert plain[struck[0] - 1] < 2.0 == plain[struck[0]]
+
+
+def test_a_linear_spring_keeps_its_margin_with_the_same_gain() -> None:
+    gentle = loop_of("austin2015_soft_spring")
+    found = spread_margins(gentle, GAIN, last=LAST, translate=quickest())
+    assert found.kept
+    assert found.enough == found.value
+    assert found.findings() == []
