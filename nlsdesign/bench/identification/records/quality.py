@@ -441,6 +441,8 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
         edges = [float(abs(values[b] - values[a])) for a, b in pairs] or [0.0]
         if values[first] in extremes and min(edges) < abrupt:
             continue  # it may be clipped, or slack
+        if around.motion and edges[-1] < abrupt:
+            continue  # a body that moves on from where it rested has no way to catch up
         length = behind - first
         span = max(_SCATTER_SPAN, 2 * length)
         near = np.concatenate([equal[max(first - span, 0) : first], equal[behind : behind + span]])

@@ -121,6 +121,30 @@ def test_what_machines_do_is_no_fault(case: str, noise: float, quantum: float) -
             assert not faulty_groups(values[rows], Surroundings(commanded=commanded))
 
 
+def crept(*, jumps: bool) -> dict[str, np.ndarray]:
+    """An angle that shakes while it creeps and rests for 0.3 s, and the current that goes on.
+
+    Without a jump it takes up its way where it rested; with one it shows the way that it missed.
+    """
+    shake = np.round(4.0 * np.random.default_rng(5).standard_normal(COUNT))
+    rest = slice(AT, AT + 150)
+    speed = np.ones(COUNT)
+    if not jumps:
+        speed[rest] = 0.0
+    angle = np.cumsum(speed) + shake
+    angle[rest] = angle[AT - 1]
+    if not jumps:
+        angle[rest.stop :] += angle[AT - 1] - angle[rest.stop]
+    return {"angle": 1e-5 * angle, "current": 0.3 * sine(0.2)}
+
+
+def test_a_body_that_rests_and_moves_on_from_there_has_no_stuck_encoder() -> None:
+    """Cogging holds a motor until its integrator has gone on: stick-slip is no fault."""
+    assert groups_of(crept(jumps=False), "angle", motion=True) == []
+    ((first, behind, kind),) = groups_of(crept(jumps=True), "angle", motion=True)
+    assert (first, behind, kind) == (AT - 1, AT + 150, "stuck")
+
+
 def test_long_tails_are_no_spikes() -> None:
     values = 0.01 * np.random.default_rng(1).laplace(size=COUNT)
     assert not faulty_groups(values, Surroundings())
