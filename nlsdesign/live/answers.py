@@ -180,6 +180,9 @@ class DesignView:
         Strain to which the rubber may be believed; infinite without rubber.
     beyond
         In words where it is stretched further, how far, and what to change.
+    made_error
+        Rms error in N·m that 95 % of the springs stay below whose numbers lie within their declared spreads;
+        ``None`` before the check, and where no number is spread.
     """
 
     revision: int
@@ -196,6 +199,7 @@ class DesignView:
     rubber_volume: float
     strain_end: float = math.inf
     beyond: tuple[str, ...] = ()
+    made_error: float | None = None
 
     def column(self, name: str) -> LiveColumn:
         """Return one column."""

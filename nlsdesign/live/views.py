@@ -181,7 +181,7 @@ def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[
 
 def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignView:
     """Return what is shown of a finished design: its torque is that of the assembly, flattened anew."""
-    check, largest = design.check, design.target.largest
+    check, largest, made = design.check, design.target.largest, design.tolerance
     columns = list(curve_columns(design.curves, design.target.torque(design.curves.angles)))
     every = max(1, len(check.angles) // _MOST_CHECKED)
     at = np.interp
@@ -209,6 +209,7 @@ def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignV
         rubber_volume=design.rubber_volume,
         strain_end=smallest(question.machine.strain_ends),
         beyond=stretched_beyond(question.machine.strain_ends, columns),
+        made_error=made.quantiles[-1].value if made is not None and made.causes else None,
     )
 
 

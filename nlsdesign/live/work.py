@@ -293,6 +293,8 @@ def _designed(shown: AngleView | None) -> AngleView:
 
 
 STARTS = 12
+_DRAWS = 200
+"""Made springs of the check; of as many normal errors the 95 % quantile is known to 13 %, 19 times of 20."""
 _DEARER = 1e-3
 """Relative difference of costs, and cost, from which two solutions are different optima."""
 _WEIGHED = " (torque error, rubber and smoothness together)"
@@ -331,7 +333,7 @@ def whole_design(
 
     stage(f"solves from {STARTS} starts at most, until the best was found twice")
     settings = DesignSettings(
-        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress,
+        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=_DRAWS, progress=progress,
         contour=contour,
     )  # fmt: skip
     try:

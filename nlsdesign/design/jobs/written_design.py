@@ -211,6 +211,7 @@ def design_summary(design: CamDesign) -> dict[str, Any]:
         spread = {f"{100 * q.share:g} %": _rounded(q.value) for q in design.tolerance.quantiles}
     return {
         "met": design.met,
+        "rms_error_over_spreads": spread,
         "torque_error_rms": _rounded(design.rms),
         "miss": None if design.miss is None else str(design.miss),
         "advice": [] if design.miss is None else list(design.miss.advice),
@@ -218,7 +219,6 @@ def design_summary(design: CamDesign) -> dict[str, Any]:
         "active_limits": list(design.active_limits),
         "largest_cable_force": _rounded(float(design.curves.forces.max())),
         "energy": _rounded(design.curves.energy),
-        "rms_error_over_spreads": spread,
     }
 
 

@@ -379,21 +379,23 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"
     fit = f", contour held to {1e6 * design.fit_error:.2g} µm" if design.fit_error > 0.0 else ""
-    rows = [("verdict", "meets its target" if design.miss is None else str(design.miss))]
+    rows = [("verdict", _MET if design.miss is None else str(design.miss))]
     if design.miss is not None:
         rows += [("what would help", sentence) for sentence in design.miss.advice]
+    rows += [
+        *_spread_rows(design),
+        (
+            "torque error, exact numbers",
+            f"{prefixed(check.rms)} rms ({without_power(share * check.rms, 2)} %), "
+            f"{prefixed(largest)} at most",
+        ),
+    ]
     rows += [("target", f"{type(target).__name__}, {target.largest:.4g} N·m at {end}")]
     rows += [
         (name, str(value) if len(value.values) <= 4 else f"<{len(value.values)} control values>")
         for name, value in design.changes
     ]
     rows += [
-        (
-            "torque error",
-            f"{prefixed(check.rms)} rms ({without_power(share * check.rms, 2)} %), "
-            f"{prefixed(largest)} at most",
-        ),
-        *_spread_rows(design),
         ("cable force", f"{curves.forces[0]:.4g} to {curves.forces.max():.4g} N in each cable"),
         *((f"strain of {path}", f"up to {100 * row.max():.4g} %") for path, row in curves.strains.items()),
         *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
@@ -416,6 +418,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     return rows if inside is None else [*rows, ("within tolerance", f"{100 * inside:.3g} % of the angles")]
 
 
+_MET = "meets its target with exact numbers"
 _SURE = 2
 """Starts from which a design was found where nothing more is said."""
 _EDGE = 1e-3
@@ -448,17 +451,20 @@ def _starts(design: CamDesign) -> str:
 
 
 def _spread_rows(design: CamDesign) -> list[tuple[str, str]]:
-    spread = design.tolerance
+    what, spread = "torque error over the spread", design.tolerance
     if spread is None:
-        return []
+        return [(what, "not known: no draws were asked for, or a remark says why")]
+    if not spread.causes:
+        return [(what, "not known: the deck declares no spread of a number that acts on the torque")]
     worst = spread.quantiles[-1]
-    below = f"{prefixed(worst.value, digits=4)} rms ({len(spread.errors)} draws)"
+    share = without_power(100.0 * worst.value / design.target.largest, 2)
+    below = f"{prefixed(worst.value, digits=4)} rms ({share} %, {len(spread.errors)} draws)"
     text = f"{100 * worst.share:g} % of made springs below {below}"
     if spread.trims:
         trim = spread.trims[0]
         text += f", {prefixed(trim.quantiles[-1].value, digits=4)} after a trim of {trim.name}"
     first = spread.measure_first
-    return [("over the spread", text), *([] if first is None else [("measure first", first)])]
+    return [(what, text), *([] if first is None else [("measure first", first)])]
 
 
 def _alternative(design: CamDesign, each: Alternative) -> str:

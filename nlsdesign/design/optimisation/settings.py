@@ -26,8 +26,8 @@ class DesignSettings:
     Parameters
     ----------
     starts
-        Most starting points; the first four are always the same. Eight are taken, and eight more each time
-        until the best design has been found from two of them.
+        Most starting points; the first four are always the same. Six are taken, and six more each time until
+        the best design has been found from two of them.
     seed
         Of the starting points after the fourth.
     largest_error

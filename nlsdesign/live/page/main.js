@@ -275,13 +275,21 @@ function numberRow([name, value, unit, , free, , , source]) {
 
 function showNumbers(design) {
   const rows = [
-    ["torque error, rms", `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`],
-    ["torque error, largest", withUnit(design.largest_error, "N*m", 3)],
+    ["torque error, 95 % of made springs", design.made_error === null ? (design.checked ? "not known: no number is spread" : "comes with the check") : `${withUnit(design.made_error, "N*m", 3)} rms`],
+    ["torque error, exact numbers", `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`],
+    ["largest error, exact numbers", withUnit(design.largest_error, "N*m", 3)],
     ["limits it sits on", sitsOn(design) || "none"],
     ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
     ...(answer.controls.can_undo ? [["answered in", `${plain(1e3 * answer.seconds, 2)} ms`]] : []),
   ];
   byId("numbers").replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
+}
+
+// What made springs do stands first; what exact numbers would give says how well the cam fits the curve.
+function errorOf(design) {
+  const exact = `${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque`;
+  if (design.made_error !== null) return `95 % of made springs err by less than ${withUnit(design.made_error, "N*m", 3)} rms; with exact numbers ${exact}.`;
+  return `Torque error with exact numbers ${exact}; ${design.checked ? "that of made springs is not known, for no number is spread" : "that of made springs comes with the check"}.`;
 }
 
 // One of: computing, quick answer, checked answer, infeasible, failed; always in words too.
@@ -298,7 +306,7 @@ function showState() {
   const failed = full?.state === "failed" && full.revision === answer.revision ? `The check failed: ${full.message}. ` : "";
   const shown = answer.stale ? (design ? "What is shown greyed is the last good design, of an earlier question. " : "") : "";
   const sits = design && sitsOn(design) ? `It sits on: ${sitsOn(design)}. ` : "No limit binds. ";
-  const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
+  const good = design ? `${errorOf(design)} ${sits}` : "";
   let name, kind, words;
   if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `No design keeps all limits. ${message} `];
   else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message.replace(/^not solved yet: /i, "").replace(/^[a-z](?=[a-z]* )/, (first) => first.toUpperCase())} `];

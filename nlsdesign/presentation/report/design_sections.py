@@ -151,12 +151,12 @@ def write_design_report(
 
 
 def _key_numbers(design: CamDesign) -> tuple[KeyNumber, ...]:
-    """Return error, tolerance and loads in large letters."""
+    """Return tolerance, error and loads in large letters: what can be made first."""
     share = 100.0 * design.rms / design.target.largest
     verdict = "meets its target" if design.met else "misses its target"
     numbers = [
-        KeyNumber("torque error", f"{_shown(design.rms)} rms", f"{share:.2g} %; {verdict}"),
-        KeyNumber("largest error", _shown(design.check.largest), "nominal numbers"),
+        KeyNumber("torque error, exact numbers", f"{_shown(design.rms)} rms", f"{share:.2g} %; {verdict}"),
+        KeyNumber("largest error", _shown(design.check.largest), "exact numbers"),
         KeyNumber("cable force", f"{three_digits(float(design.curves.forces.max()))} N", "largest"),
         KeyNumber(
             "limits reached", str(len(design.active_limits)), ", ".join(design.active_limits) or "none"
@@ -167,9 +167,9 @@ def _key_numbers(design: CamDesign) -> tuple[KeyNumber, ...]:
         trims = design.tolerance.trims[:1]
         after = [_shown(each.quantiles[-1].value) for each in trims]
         note = f"as built → {trims[0].name} trimmed" if trims else "as built"
-        label = f"{100 * design.tolerance.quantiles[-1].share:g} % of made springs"
+        label = f"torque error, {100 * design.tolerance.quantiles[-1].share:g} % of made springs"
         number = KeyNumber(label, f"{(after or [built])[0]} rms", note, before=built if after else "")
-        numbers.insert(2, number)
+        numbers.insert(0, number)
     return tuple(numbers)
 
 

@@ -96,13 +96,13 @@ def key_figures(results: Sequence[ComparedResult]) -> dict[str, list[str]]:
     rows: dict[str, Callable[[ComparedResult], str]] = {
         "deck": lambda r: r.model.name,
         "target": lambda r: {True: "met", False: "missed"}.get(r.design.get("met"), _NONE),  # type: ignore[arg-type]
-        "torque error, rms": lambda r: _scaled(r.design.get("torque_error_rms"), 1e3, "mN*m"),
         **{
             f"torque error, {share} of made springs": lambda r, s=share: _scaled(  # type: ignore[misc]
                 r.design.get("rms_error_over_spreads", {}).get(s), 1e3, "mN*m"
             )
             for share in dict.fromkeys(s for r in results for s in r.design.get("rms_error_over_spreads", {}))
         },
+        "torque error, exact numbers": lambda r: _scaled(r.design.get("torque_error_rms"), 1e3, "mN*m"),
         "largest cable force": lambda r: _scaled(r.design.get("largest_cable_force"), 1.0, "N"),
         "energy": lambda r: _scaled(r.design.get("energy"), 1.0, "J"),
         "limits reached": lambda r: ", ".join(r.design.get("active_limits", ())) or _NONE,

@@ -51,7 +51,7 @@ def test_designs_and_verdicts_stand_side_by_side(run: Run, tmp_path: Path) -> No
     assert status == 0, err
     content = json.loads(out)
     figures = content["key_figures"]
-    assert figures["torque error, rms"] == {"one": "12.3 mN·m", "two": "–"}
+    assert figures["torque error, exact numbers"] == {"one": "12.3 mN·m", "two": "–"}
     assert figures["error after"] == {"one": "–", "two": "0.300 N (1.50 × noise)"}
     stiffness = next(row for name, row in content["numbers_that_differ"].items() if "stiffness" in name)
     assert stiffness["one"] != stiffness["two"]
