@@ -88,7 +88,11 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @click.option("--stock", multiple=True, help=f"Stock; {_LINE} '\"spring.cam.elements\" = [1, 2, 4]'.")
 @click.option("--starts", type=int, default=None, help="Most starting points of the search.")
 @click.option("--seed", type=int, default=None, help="Seed of the starts after the fourth, and of the draws.")
-@click.option("--largest-error", default=None, help='Rms error that is no miss, e.g. "1 %" of the torque.')
+@click.option(
+    "--largest-error",
+    default=None,
+    help='Largest rms error that still meets the target, e.g. "1 %" of the torque.',
+)
 @click.option("--draws", type=int, default=None, help="Draws of the tolerance, else 1000; 0: none.")
 @spring_option
 @workers_option

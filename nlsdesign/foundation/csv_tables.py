@@ -141,7 +141,7 @@ def _encoding(file: Path) -> str:
     raise MeasurementError(
         file.name,
         "cannot be read: it is no text in UTF-8, UTF-16 with its mark, or Windows-1252",
-        next_step="save it as CSV in UTF-8; other kinds of file are told by their ending",
+        next_step="save it as CSV in UTF-8; the ending of a file says what other kind it is",
     )
 
 

@@ -92,7 +92,7 @@ def _heads(file: str, given: Sequence[str], columns: Mapping[str, tuple[str, ...
         name = name if name in columns else _NAMES.get(name, name)
         if name not in columns:
             raise MeasurementError(
-                place, "is none that is known here", did_you_mean=nearest(name, columns),
+                place, "is not a column that is read here", did_you_mean=nearest(name, columns),
                 next_step="the columns may be " + ", ".join(f"'{n} [{u[0]}]'" for n, u in columns.items()),
             )  # fmt: skip
         if name in heads:

@@ -62,6 +62,8 @@ class VerdictSection(Section):
         ``"none"``, ``"named"``, ``"unknown"``, ``"undecidable"`` or ``"data_suspect"``.
     words
         The findings, in sentences.
+    detail
+        What speaks for them, in sentences that are folded away; empty for none.
     headline
         The findings in one line.
     gap
@@ -75,6 +77,7 @@ class VerdictSection(Section):
     verdict: str
     words: str
     _: KW_ONLY
+    detail: str = ""
     headline: str = ""
     gap: Gap | None = None
     after: str = "with what was added"
@@ -102,6 +105,7 @@ class VerdictSection(Section):
             "headline": self.headline,
             "gap": None if self.gap is None else _drawn(self.gap, self.after),
             "words": self.words,
+            "detail": self.detail,
             "parts": parts,
         }
 
@@ -149,7 +153,8 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
     card = VerdictSection(
         "Verdict",
         verdict.verdict,
-        "\n\n".join(verdict.paragraphs()),
+        " ".join(verdict.brief()),
+        detail="\n\n".join(verdict.details()),
         headline=verdict.headline(),
         gap=verdict.gap(),
         after="with declared numbers let go" if let_go(verdict) else "with what was added",

@@ -27,9 +27,9 @@ class EffectEvidence:
         The number that says how large the effect is, and how many standard errors it is away from the value
         at which the effect vanishes.
     worst_record, worst_change
-        The record that gains least, and its gain in predictive log density; below zero it becomes worse.
+        The record that gains least, and the gain of its log-likelihood; below zero it becomes worse.
     over_simpler
-        The simpler forms of the effect: identifier, predictive log density that is lost with that form in its
+        The simpler forms of the effect: identifier, log-likelihood that is lost with that form in its
         place, and its standard error.
     next_leaves
         How many times as much of the excess the best other name leaves, with the noise margin on both sides.
@@ -47,14 +47,14 @@ class EffectEvidence:
     def words(self) -> str:
         """Return the evidence in sentences."""
         text = (
-            "Without it the predictive log density of records that its numbers were not fitted to falls by "
-            f"{with_error(self.removal_cost, self.removal_error)}."
+            "Without it records that its numbers were not fitted to are predicted worse: their log-likelihood "
+            f"falls by {with_error(self.removal_cost, self.removal_error)}."
         )
         if math.isfinite(self.distance):
             text += f" Its `{self.number}` is {self.distance:.3g} standard errors away from no effect."
         if self.worst_record:
             change = three_digits(abs(self.worst_change))
-            text += f" The record that gains least is '{self.worst_record}': without it the density there "
+            text += f" The record that gains least is '{self.worst_record}': there it "
             text += f"falls by {change}." if self.worst_change >= 0.0 else f"rises by {change}."
         if math.isfinite(self.next_leaves):
             text += f" The best other name leaves {three_digits(self.next_leaves)} times as much."
