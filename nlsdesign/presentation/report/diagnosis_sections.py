@@ -12,7 +12,16 @@ import numpy as np
 from ...bench.discrepancy.effects.plain_names import kind_in_words, title
 from ...bench.discrepancy.reporting.circumstances import settings_of
 from ...bench.discrepancy.reporting.fitted_numbers import FittedNumber, fitted_numbers
-from ...bench.discrepancy.reporting.verdict import Gap, RecordGap, Verdict, best_forms, let_go, suspicions
+from ...bench.discrepancy.reporting.verdict import (
+    Gap,
+    RecordGap,
+    Verdict,
+    best_forms,
+    details_of,
+    in_brief,
+    let_go,
+    suspicions,
+)
 from ...foundation.errors import unknown_name
 from ...foundation.quantity import three_digits, typeset_unit, with_error
 from ...model import FlatModel, flatten
@@ -153,8 +162,8 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
     card = VerdictSection(
         "Verdict",
         verdict.verdict,
-        " ".join(verdict.brief()),
-        detail="\n\n".join(verdict.details()),
+        " ".join(in_brief(verdict)),
+        detail="\n\n".join(details_of(verdict)),
         headline=verdict.headline(),
         gap=verdict.gap(),
         after="with declared numbers let go" if let_go(verdict) else "with what was added",

@@ -47,8 +47,8 @@ class EffectEvidence:
     def words(self) -> str:
         """Return the evidence in sentences."""
         text = (
-            "Without it records that its numbers were not fitted to are predicted worse: their log-likelihood "
-            f"falls by {with_error(self.removal_cost, self.removal_error)}."
+            "Without it records that its numbers were not fitted to are predicted worse: their "
+            f"log-likelihood falls by {with_error(self.removal_cost, self.removal_error)}."
         )
         if math.isfinite(self.distance):
             text += f" Its `{self.number}` is {self.distance:.3g} standard errors away from no effect."

@@ -284,41 +284,6 @@ class Verdict:
             return capitalised(effects)
         return LET_GO[0] if let_go(self) else HEADLINES[self.verdict]
 
-    def brief(self) -> tuple[str, ...]:
-        """Return the verdict in at most three sentences: what is missing, what that changes, what is next."""
-        gap = self.gap()
-        before, after = (three_digits(each) for each in gap.times)
-        records = "held-out" if gap.role == "held_out" else "fitted"
-        where = f"the error of `{gap.block}` on {records} records"
-        sentences = [LET_GO[1] if let_go(self) else EXPLANATIONS.get(self.verdict, "")]
-        if self.verdict == "named":
-            one = len(self.effects) == 1
-            numbers = "; ".join(e.numbers_in_words() for e in self.effects if e.parameters)
-            sentences = [
-                f"{self.headline()} {'is' if one else 'are'} missing from the deck"
-                + (f": {numbers}." if numbers else ".")
-            ]
-            rest = "" if self.complete else ", so something without a name is left"
-            change = f"falls from {before} to {after} times the noise{rest}"
-            sentences.append(f"With {'it' if one else 'them'} {where} {change}.")
-            chance = min((e.probability for e in self.effects), default=math.nan)
-            if math.isfinite(chance):
-                there = (
-                    "It is there with a probability of" if one else "Each is there with at least probability"
-                )
-                sentences.append(f"{there} {chance:.3g}.")
-        elif self.verdict == "data_suspect":
-            sentences += [as_sentence(reason) for reason in suspicions(self)[:1]]
-        else:
-            sentences.append(f"{capitalised(where)} is {after} times the noise.")
-            sentences += [as_sentence(step) for step in self.next_steps[:1]]
-        return tuple(sentences)
-
-    def details(self) -> tuple[str, ...]:
-        """Return the verdict in words, without the sentences of :meth:`brief`."""
-        brief = self.brief()
-        return tuple(each for each in self.paragraphs() if each not in brief)
-
     def paragraphs(self) -> tuple[str, ...]:
         """Return the verdict in words: what was found, each effect, what is left."""
         sentences = [] if self.verdict == "named" else [EXPLANATIONS[self.verdict]]
@@ -418,10 +383,10 @@ class Verdict:
         return "\n".join(
             [
                 f"verdict: {self.verdict}",
-                *self.brief(),
+                *in_brief(self),
                 "In detail:",
                 *(self.gap(name).words() for name in self.blocks),
-                *self.details(),
+                *details_of(self),
                 *(each for each in self.findings if each not in suspicions(self)),
                 *(self.tried_words() if self.verdict != "named" or not self.complete else ()),
                 *self.remarks,
@@ -429,6 +394,41 @@ class Verdict:
                 *self.next_steps,
             ]
         )
+
+
+def in_brief(verdict: Verdict) -> tuple[str, ...]:
+    """Return the verdict in at most three sentences: what is missing, what that changes, what is next."""
+    gap = verdict.gap()
+    before, after = (three_digits(each) for each in gap.times)
+    records = "held-out" if gap.role == "held_out" else "fitted"
+    where = f"the error of `{gap.block}` on {records} records"
+    sentences = [LET_GO[1] if let_go(verdict) else EXPLANATIONS.get(verdict.verdict, "")]
+    if verdict.verdict == "named":
+        one = len(verdict.effects) == 1
+        numbers = "; ".join(e.numbers_in_words() for e in verdict.effects if e.parameters)
+        sentences = [
+            f"{verdict.headline()} {'is' if one else 'are'} missing from the deck"
+            + (f": {numbers}." if numbers else ".")
+        ]
+        rest = "" if verdict.complete else ", so something without a name is left"
+        change = f"falls from {before} to {after} times the noise{rest}"
+        sentences.append(f"With {'it' if one else 'them'} {where} {change}.")
+        chance = min((e.probability for e in verdict.effects), default=math.nan)
+        if math.isfinite(chance):
+            there = "It is there with a probability of" if one else "Each is there with at least probability"
+            sentences.append(f"{there} {chance:.3g}.")
+    elif verdict.verdict == "data_suspect":
+        sentences += [as_sentence(reason) for reason in suspicions(verdict)[:1]]
+    else:
+        sentences.append(f"{capitalised(where)} is {after} times the noise.")
+        sentences += [as_sentence(step) for step in verdict.next_steps[:1]]
+    return tuple(sentences)
+
+
+def details_of(verdict: Verdict) -> tuple[str, ...]:
+    """Return the verdict in words, without the sentences of :func:`in_brief`."""
+    brief = in_brief(verdict)
+    return tuple(each for each in verdict.paragraphs() if each not in brief)
 
 
 def let_go(verdict: Verdict) -> bool:

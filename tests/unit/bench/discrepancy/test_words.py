@@ -22,7 +22,7 @@ from nlsdesign.bench.discrepancy.effects.plain_names import (
 )
 from nlsdesign.bench.discrepancy.reporting.circumstances import DiagnosisRun, RecordOfRun, settings_of
 from nlsdesign.bench.discrepancy.reporting.named_effect import EffectEvidence, NamedEffect, as_sentence
-from nlsdesign.bench.discrepancy.reporting.verdict import Course, RecordGap
+from nlsdesign.bench.discrepancy.reporting.verdict import Course, RecordGap, in_brief
 from nlsdesign.bench.discrepancy.screening.scale_and_sign import _hint
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.selection.measures import DECLARED, Excess
@@ -222,16 +222,16 @@ def test_an_effect_is_told_with_probability_evidence_and_class() -> None:
 
 def test_a_verdict_begins_with_three_sentences_for_whoever_stands_at_the_bench(tmp_path: Any) -> None:
     said = verdict()
-    assert said.brief() == (
+    assert in_brief(said) == (
         "Stribeck friction at the motor is missing from the deck: sliding effort = 0.37482 ± 0.00043 N·m.",
         "With it the error of `motor` on held-out records falls from 26.0 to 1.20 times the noise.",
         "It is there with a probability of 0.97.",
     )
-    assert str(said).splitlines()[1:5] == [*said.brief(), "In detail:"]
+    assert str(said).splitlines()[1:5] == [*in_brief(said), "In detail:"]
     page = report.write_report(tmp_path / "r.html", *report.verdict_sections(said), title="t").read_text()
     assert page.index("0.97") < page.index("<summary>In detail</summary>") < page.index("310 ± 12")
     second = replace(EFFECT, name="coulomb_friction", probability=0.9)
-    both = verdict(effects=(EFFECT, second), complete=False).brief()
+    both = in_brief(verdict(effects=(EFFECT, second), complete=False))
     assert " and " in both[0]
     assert " are missing from the deck: " in both[0]
     assert both[1].endswith("to 1.20 times the noise, so something without a name is left.")
@@ -240,13 +240,13 @@ def test_a_verdict_begins_with_three_sentences_for_whoever_stands_at_the_bench(t
 
 def test_a_verdict_without_a_name_begins_with_the_error_that_is_left_and_the_next_step() -> None:
     other = verdict("unknown", next_steps=("record a slower motion",))
-    assert other.brief() == (
+    assert in_brief(other) == (
         "Something is missing; what was tried and how far it goes is listed below.",
         "The error of `motor` on held-out records is 1.20 times the noise.",
         "Record a slower motion.",
     )
     assert str(other).count("Something is missing; what") == 1
-    assert verdict("data_suspect", where=("odd: it rests",)).brief()[1] == "odd: it rests."
+    assert in_brief(verdict("data_suspect", where=("odd: it rests",)))[1] == "odd: it rests."
 
 
 def test_a_large_gain_is_told_without_a_power_of_ten() -> None:
