@@ -19,7 +19,11 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.export import CORTEX_M4F, PROCESSORS, Processor, TargetMeasurement, export_c, measure_on_target
 from nlsdesign.feedback.control import joined
-from nlsdesign.feedback.observer import design_observer_with_details
+from nlsdesign.feedback.observer import (
+    design_adaptive_observer,
+    design_corrected_observer,
+    design_observer_with_details,
+)
 from nlsdesign.model import FlatModel, Variable
 from tests.unguarded import unguarded
 
@@ -37,13 +41,17 @@ class Goal:
     flash: int
 
 
-GOALS = {"cascade observer": Goal(400, 16_384), "cascade observer and controller": Goal(700, 16_384)}
+GOALS = {
+    "cascade observer": Goal(400, 16_384), "cascade observer and controller": Goal(700, 16_384),
+    "corrected observer": Goal(1500, 12_288),
+}  # fmt: skip
 
 
 def models() -> dict[str, FlatModel]:
     """What runs on the controller, from the bundled deck."""
     plant = nls.flatten(nls.declare(nls.load_deck(DECK)))
-    cascade, adaptive = design_observer_with_details(plant).model, nls.design_observer(plant)
+    cascade = design_observer_with_details(plant).model
+    corrected, adaptive = design_corrected_observer(plant).model, design_adaptive_observer(plant).model
     controller = nls.torque_controller(plant)
     scheduled = nls.torque_controller(plant, law=nls.control.ScheduledTorque())
     return {
@@ -52,6 +60,9 @@ def models() -> dict[str, FlatModel]:
         "scheduled controller": scheduled,
         "cascade observer and controller": joined(cascade, controller),
         "cascade observer and scheduled controller": joined(cascade, scheduled),
+        "corrected observer": corrected,
+        "corrected observer and controller": joined(corrected, controller),
+        "corrected observer and scheduled controller": joined(corrected, scheduled),
         "adaptive observer": adaptive,
         "adaptive observer and controller": joined(adaptive, controller),
     }

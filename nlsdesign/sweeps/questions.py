@@ -115,7 +115,7 @@ class SpreadQuestion(SweepQuestion):
     sample_time
         In s.
     adaptive
-        Whether the observer may learn deviations, where that helps; otherwise it is the cascade.
+        Whether the observer may learn, where that helps; otherwise it is the cascade.
 
     Raises
     ------

@@ -76,7 +76,7 @@ def test_the_commands_and_scripts_work_with_smaller_settings(
                         assert status == 0, (line, err)
                         printed += out
                     elif words[-1].endswith(".py") and words[-1] != "bench.py":
-                        as_shown = False  # the adaptive observer takes seconds to design
+                        as_shown = False  # the default observer takes seconds to design
                     else:
                         printed += tutorial.call(words, tmp_path)
     assert compared >= 5, "the pages show nothing that this test compares"

@@ -19,12 +19,13 @@ needs_emulator = pytest.mark.skipif(bool(missing_emulator()), reason=missing_emu
 
 @pytest.fixture(scope="module")
 def chosen():
-    """Cascade observer, and it with the controller."""
+    """Cascade observer, it with the controller, and the default observer."""
     plant = nls.flatten(nls.declare(nls.load_deck(targets.DECK)))
     cascade = design_observer_with_details(plant).model
     return {
         "cascade observer": cascade,
         "cascade observer and controller": joined(cascade, nls.torque_controller(plant)),
+        "corrected observer": nls.design_observer(plant),
     }
 
 

@@ -47,12 +47,12 @@ class ObserverOfChoice:
     Parameters
     ----------
     design
-        Adaptive where that helps, else the cascade.
+        Corrected where that helps, else the cascade.
     reason
         One sentence with the errors that decided.
     expected
         Root mean square torque error over the spread, to first order, along the duty: of the cascade, and of
-        the adaptive observer where it could be designed.
+        the corrected one where it could be designed.
     """
 
     design: CorrectedDesign | AdaptiveDesign | ObserverDesign
@@ -78,7 +78,7 @@ def choose_observer(
     """Return the observer that errs least over the spread of the deck.
 
     Compared are, to first order, the error of the cascade, which takes the numbers of the deck for granted,
-    and that which the adaptive filter expects of itself along one run of the bench with these numbers.
+    and that which the corrected one expects of itself along one run of the bench with these numbers.
     :func:`~nlsdesign.feedback.observer.observer_errors` measures both on drawn machines.
 
     Parameters
@@ -159,7 +159,7 @@ class DesignedObserver:
     reason
         Why it was taken; empty where it was asked for.
     expected
-        Root mean square torque error over the spread, to first order: cascade, and adaptive observer where it
+        Root mean square torque error over the spread, to first order: cascade, and corrected one where it
         could be designed; empty where it was asked for.
     """
 
@@ -315,8 +315,8 @@ def design_observer(
     the estimate, the states, and the innovation. A name is that of the plant; what the plant does not have
     carries an ending: ``.memory`` is what goes from sample to sample, ``.innovation`` the measured minus
     the expected angle, ``.estimate`` the estimate of the angle itself, whose name the input has;
-    ``.standard_deviation`` what an adaptive observer expects of its estimate, ``.deviation[i]`` its slow
-    states.
+    ``correction.standard_deviation`` what the corrected one expects of its estimate, ``correction.factor[i]``
+    what it has learned; ``.standard_deviation`` and ``.deviation[i]`` those of an adaptive one.
 
     Parameters
     ----------
