@@ -41,7 +41,7 @@ class _OverAngleByDefault(click.Group):
 
 @click.group(cls=_OverAngleByDefault)
 def analyse() -> None:
-    """Analyse a machine; without a command it goes over the cam angle, see ``analyse angle --help``."""
+    """Analyse a machine over its cam angle, or its torque loop. Without a command: as ``analyse angle``."""
 
 
 def check_angles(first: float, last: float) -> None:
@@ -96,7 +96,7 @@ def analyse_angle(
     as_json: bool,
     **roles: str | None,
 ) -> None:
-    """Poles sliding and stuck, exact angles that hide a state, and which sensor would help most."""
+    """Tell poles, hidden states and the best sensor over the angle. Poles are sliding and stuck."""
     import numpy as np
 
     from ..components import declare
@@ -260,7 +260,7 @@ def loop(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Evaluate the closed torque loop: responses, margins, impedance, coupled stability, limit cycles.
+    """Evaluate the closed torque loop. Responses, margins, impedance, coupled stability, limit cycles.
 
     The load is fixed for responses, moved for the impedance. Where the spring gives torque of one sign only,
     each sine of the torque swings about 1.25 amplitudes, and 2.25 are held. Exit status 1 if the loop

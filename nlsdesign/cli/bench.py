@@ -77,7 +77,7 @@ def _part_files(parts: Sequence[str]) -> list[str]:
 )
 @json_option
 def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
-    """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
+    """Refit the numbers that have a spread. Nothing is added to the model."""
     from ..bench.discrepancy import refit, refit_of_run, write_refit
     from ..bench.identification import load_records
     from ..components import declare
@@ -178,7 +178,7 @@ def _diagnosis_files(given: Mapping[str, Any]) -> list[str]:
 @out_option("out/diagnosis", writes=_diagnosis_files)
 @json_option
 def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
-    """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
+    """Name and add the effects that a deck lacks. They are judged on held-out records."""
     from ..bench.discrepancy import diagnose as find_what_is_missing
     from ..bench.discrepancy import range_findings, verdict_of_run, write_verdict
     from ..bench.identification import load_records
@@ -258,7 +258,7 @@ def calibrate(
     out: Path,
     as_json: bool,
 ) -> None:
-    """Turn an afternoon at the bench into smaller spreads in the deck, or plan that afternoon."""
+    """Turn bench tests into smaller spreads, or plan them. An afternoon is enough."""
     from ..bench.calibration import (
         KINDS,
         calibrated,

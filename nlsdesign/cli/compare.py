@@ -30,7 +30,7 @@ _SOURCES = ("design", "verdict")
 @out_option("out/comparison", writes=("report.html", "comparison.json"))
 @json_option
 def compare(results: tuple[Path, ...], out: Path, as_json: bool) -> None:
-    """Compare designs or diagnoses: key figures, torque curves, errors, effects, numbers that differ.
+    """Compare designs or diagnoses. Key figures, torque curves, errors, effects, numbers that differ.
 
     Each FOLDER is what `nlsdesign design` or `nlsdesign diagnose` wrote (model.toml with design.json or
     verdict.json), or a deck (a .toml file).

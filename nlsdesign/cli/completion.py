@@ -30,7 +30,7 @@ COMPLETE = "_NLSDESIGN_COMPLETE"
 @json_option
 @click.pass_context
 def completion(context: click.Context, /, shell: str, as_json: bool) -> None:
-    """Print the script that makes a shell complete commands, options, decks, materials and studies.
+    """Print the completion script of a shell. It completes commands, options, decks, materials, studies.
 
     A comment on top says where to put it; it takes effect in a new shell.
     """

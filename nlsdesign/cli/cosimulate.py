@@ -79,7 +79,7 @@ WIRE_HELP = (
 @out_file_option(None, "CSV to write.", ending=".csv")
 @json_option
 def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **given: Any) -> None:
-    """Run FMUs together; numbers are in the units that the FMUs state for their variables.
+    """Run FMUs together. Numbers are in the units that the FMUs state for their variables.
 
     The FMUs run in a process of their own. Row k of the file shows what holds at its time. Where continuous
     FMUs are coupled or driven, the error of coupling is estimated by a second run with half the step.
@@ -288,7 +288,7 @@ def _finite(text: str) -> float:
 @out_file_option(None, "File to write, NAME.ssp.", ending=".ssp")
 @json_option
 def export_ssp(version: str, out: Path, as_json: bool, **given: tuple[str, ...]) -> None:
-    """Write FMUs and their wires as one SSP archive, which other tools and 'cosimulate --system' run."""
+    """Write FMUs and their wires as an SSP archive. Other tools and 'cosimulate --system' run it."""
     from ..export import write_ssp
 
     written = write_ssp(

@@ -49,7 +49,7 @@ def new(
     path: str, template: str | None, material: str | None, given: tuple[str, ...], yes: bool, force: bool,
     **others: Any,
 ) -> None:  # fmt: skip
-    """Write a deck from a template: commented, with every number, ready for the commands that it names.
+    """Write a deck from a template. It is commented and names the commands that it is ready for.
 
     On a terminal the numbers that matter are asked for, with unit and usual value; elsewhere, and with --yes,
     those of the template are taken unless --set gives another. A name without .toml gets it.

@@ -37,7 +37,7 @@ _LONG_ROW = 8
 
 @click.group()
 def deck() -> None:
-    """Begin, copy, check and show decks: every number with value, unit, source and spread."""
+    """Begin, copy, check and show decks. A deck gives value, unit, source and spread of each number."""
 
 
 deck.add_command(new)
@@ -46,7 +46,7 @@ deck.add_command(new)
 @deck.command("list", epilog=examples("nlsdesign deck list", "nlsdesign deck list --json"))
 @json_option
 def list_decks(as_json: bool) -> None:
-    """List the decks that come with the project, and the templates of `deck new`."""
+    """List decks of the project and templates of `deck new`."""
     decks = {name: load_deck(name) for name in deck_names()}
     texts = {name: template_text(name) for name in template_names()}
     templates = {name: read_deck(text, Path(f"{name}.toml")) for name, text in texts.items()}
@@ -70,7 +70,7 @@ def list_decks(as_json: bool) -> None:
 @force_option
 @json_option
 def copy_deck(deck_name: str, out: Path, force: bool, as_json: bool) -> None:
-    """Copy a deck, such as one that comes with the project, into a file of one's own, with its comments."""
+    """Copy a deck into a file of one's own. It may be one that comes with the project; comments are kept."""
     read = load_deck(deck_name)
     if out.suffix != ".toml":
         raise click.BadParameter(f"'{out}' does not end with .toml", param_hint="OUT.TOML")
@@ -90,7 +90,7 @@ def copy_deck(deck_name: str, out: Path, force: bool, as_json: bool) -> None:
 @click.argument("deck_name", metavar="DECK")
 @json_option
 def check(deck_name: str, as_json: bool) -> None:
-    """Name every problem with line and column, likely slips, and the commands that the deck is ready for.
+    """Name problems, likely slips and the commands it is ready for. Problems have line and column.
 
     Exit status 2 if the deck has a problem; a command that it is not ready for, or a warning, is none.
     """
@@ -185,7 +185,7 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
 @out_file_option(None, "Deck to write.")
 @json_option
 def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
-    """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
+    """Write the deck of a practice rig. It is made from the declared numbers and a table of the cam."""
     from ..components import write_deck
 
     assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)

@@ -35,7 +35,7 @@ def records() -> None:
 @out_file_option("out/records.toml", "File for a mapping to begin with.", ending=".toml")
 @json_option
 def describe(folder: Path, deck_name: str, out: Path, as_json: bool) -> None:
-    """Tell columns, units, clocks, gaps and faults of files, and write a records.toml to edit."""
+    """Tell what files hold, and write a records.toml to edit. Columns, units, clocks, gaps, faults."""
     from ..bench.identification import describe_records
     from ..components import declare
     from ..foundation.deck import load_deck

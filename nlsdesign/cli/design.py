@@ -100,7 +100,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @json_option
 @click.pass_context
 def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
-    """Design cam and rubber for a torque curve; exit status 1 if the design misses its target.
+    """Design cam and rubber for a torque curve. Exit status 1 if the design misses its target.
 
     Limits of the declared cable and rubber hold unless one of the same kind is given.
     """

@@ -75,7 +75,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 def export_code(
     deck_name: str, what: str, sample_time: float, out: Path, real: str, as_json: bool, **chosen: Any
 ) -> None:
-    """Write the torque observer, the torque controller, or both as one step, as C99 with a self-test.
+    """Write observer, controller or both as C99 with a self-test. Both together are one step.
 
     The observer is by default the one that is best over the spread of the deck.
     """
@@ -187,7 +187,7 @@ def export_controller(
 def export_modelica_text(
     deck_name: str, out: Path, smooth: bool, outputs: tuple[str, ...], as_json: bool
 ) -> None:
-    """Write the plant of a deck as one flat Modelica class, with units, values and sources.
+    """Write the plant as one flat Modelica class. It has units, values and sources.
 
     Names are those of the deck between quotation marks, such as 'motor.angle'.
     """
@@ -216,7 +216,7 @@ TOGETHER, APART, UNREADABLE = 0, 1, 2
 @click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @json_option
 def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
-    """Say whether C files, Modelica texts, FMUs and decks in a folder belong together, and to a deck.
+    """Say whether exported files belong together, and to a deck. C, Modelica, FMUs, decks in a folder.
 
     Exit status 0 if all do and none was edited, 1 if not, 2 if a file cannot be read.
     """

@@ -105,7 +105,7 @@ def export_fmus(
     as_json: bool,
     **others: Any,
 ) -> None:
-    """Write plant, torque observer, torque controller, and observer with controller in one, as FMUs."""
+    """Write plant, observer, controller as FMUs. Also observer with controller in one."""
     from ..components import declare
     from ..export import ALL_PLATFORMS, Authorship, export_fmu, write_reference
     from ..foundation.deck import load_deck

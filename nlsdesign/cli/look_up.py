@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @click.argument("name", metavar="[PART]", required=False)
 @json_option
 def parts(name: str | None, as_json: bool) -> None:
-    """List the parts that a deck can name, or show one: its law, source and numbers."""
+    """List the parts that a deck can name, or show one. Law, source and numbers are shown."""
     from ..components import component_classes, renamed
 
     known = component_classes()
@@ -85,7 +85,7 @@ def _kind(part: type[Part]) -> str:
 @click.argument("name", metavar="[MATERIAL]", required=False)
 @json_option
 def materials(name: str | None, as_json: bool) -> None:
-    """List the rubbers of the library, or show one: values, conditions, grade of evidence and source."""
+    """List the rubbers of the library, or show one. Values, conditions, grade of evidence and source."""
     from .. import components as library
 
     if name is None:
@@ -123,7 +123,7 @@ _SITE = "site"
 @click.option("--print", "whole", is_flag=True, help="Print the page.")
 @json_option
 def docs(page: str | None, whole: bool, as_json: bool) -> None:
-    """Say where the documentation is, list its pages, or name the file of one PAGE.
+    """Say where the documentation is. Its pages are listed, or the file of one PAGE is named.
 
     Pages are Markdown, which is read in any editor.
     """

@@ -93,7 +93,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 def observer(
     context: click.Context, /, deck_name: str | None, out: Path, as_json: bool, **options: Any
 ) -> None:
-    """Design the torque observer and write it as C with a self-test.
+    """Design the torque observer and write it as C. A self-test is written beside it.
 
     Without --kind it is the observer with the least expected error over the spread of the deck; the same that
     `export c` and `export fmu` write. The reason is printed.
@@ -258,7 +258,7 @@ def show_errors(errors: SpreadErrors, kind: str, deck_name: str) -> None:
 )
 @json_option
 def verify_certificate(certificate: Path, deck_name: str | None, code: Path | None, as_json: bool) -> None:
-    """Check a certificate again, without the solver; exit status 1 where it does not hold."""
+    """Check a certificate again, without the solver. Exit status 1 where it does not hold."""
     from ..components import declare
     from ..export import export_c
     from ..feedback.observer import CodeToCompare, read_certificate, verify
@@ -331,7 +331,7 @@ def certify_continuous_gain(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Design one gain in continuous time with the proof that every error vanishes."""
+    """Prove one gain in continuous time. The proof says that every error vanishes."""
     from ..feedback.observer import Minimal, PaperForm, certify_continuous, write_certificate
 
     text, plant = _plant(deck_name)
@@ -371,7 +371,7 @@ def certify_adaptive_estimate(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Write the adaptive observer as C, with a bound on how far its estimate can leave the deck's torque."""
+    """Write the adaptive observer as C with a bound. It says how far its torque can leave the deck's."""
     from ..export import export_c
     from ..feedback.observer import (
         AdaptiveSettings,

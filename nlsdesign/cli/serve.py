@@ -27,7 +27,7 @@ from .output import examples, show_json
 def serve(
     context: click.Context, /, deck_name: str, host: str, port: int, no_browser: bool, as_json: bool
 ) -> None:
-    """Serve a page on which a design follows the mouse, to this machine only, until interrupted.
+    """Serve a page on which a design follows the mouse. To this machine only, until interrupted.
 
     DECK is a file, or the name of a deck or template that comes with the project; without it the page begins
     with a template. The address holds a random token, without which nothing is answered.

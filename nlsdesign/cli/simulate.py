@@ -83,7 +83,7 @@ _FORWARD = (
 def simulate(
     context: click.Context, /, deck_name: str, record: Path | None, mapping: Path | None, **given: Any
 ) -> None:
-    """Simulate a machine forward in time, driven by --input; or predict a measured --record.
+    """Simulate a machine, or predict a measured record. It is driven by --input, or by --record.
 
     Forward: writes all signals as CSV with the names of the model and units in the heads, a picture and a
     page.

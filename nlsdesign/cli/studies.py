@@ -208,7 +208,7 @@ def _first_line(name: str) -> str:
 @dry_run_option
 @json_option
 def run(name: str, out: Path | None, fast: bool, as_json: bool, force: bool, dry_run: bool) -> None:
-    """Run a study; exit status 1 if a number differs from its claim."""
+    """Run a study. Exit status 1 if a number differs from its claim."""
     target = out if out is not None else Path("out") / Path(name).stem
     if dry_run:
         list_files(listed_files(target), target, as_json=as_json)

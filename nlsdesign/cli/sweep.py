@@ -54,7 +54,7 @@ _MOST_REASONS = 8
 @json_option
 @click.pass_context
 def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: Any) -> None:
-    """Ask one question of every point of a sweep file; exit status 1 if points failed.
+    """Ask one question of every point of a sweep file. Exit status 1 if points failed.
 
     Results come as Parquet: the table in results.parquet, one row per point. What was finished when a run was
     stopped, in whatever way, is not computed again.
@@ -211,7 +211,7 @@ def _show_plan(task: SweepTask, out: Path, as_json: bool) -> None:
 def report(
     folder: Path, deck_of: tuple[int, ...], out: Path, as_json: bool, **given: tuple[str, ...]
 ) -> None:
-    """Write the page of a sweep: what was asked, failures, the best points with their decks, figures.
+    """Write the page of a sweep. What was asked, failures, the best points with their decks, figures.
 
     FOLDER is what `nlsdesign sweep` wrote, also where the sweep is not finished.
 

@@ -1,4 +1,4 @@
-"""The waist: from an assembly to a frozen, flat, named model, and views of it."""
+"""From an assembly to a frozen, flat, named model, and views of it."""
 
 from .flat import FlatModel, Plausibility, Table, Variable, casadi_dae
 from .flatten import flatten

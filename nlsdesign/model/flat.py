@@ -1,4 +1,4 @@
-"""The waist of the house: a frozen, flat, named model of ordinary differential (or difference) equations."""
+"""A frozen, flat, named model of ordinary differential (or difference) equations."""
 
 from __future__ import annotations
 

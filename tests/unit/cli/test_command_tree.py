@@ -125,6 +125,18 @@ def test_a_help_text_is_no_wider_than_80_columns() -> None:
         assert wide == [], path
 
 
+@pytest.mark.parametrize(
+    "path", [path for path, command in COMMANDS.items() if isinstance(command, click.Group)]
+)
+def test_the_summary_of_a_command_fits_into_its_line(path: Path_) -> None:
+    group = COMMANDS[path]
+    listed = group.get_help(click.Context(group, info_name="nlsdesign", terminal_width=80)).partition(
+        "Commands:"
+    )[2]
+    assert listed
+    assert [line for line in listed.partition("Examples:")[0].splitlines() if line.endswith("...")] == []
+
+
 def test_the_lists_of_a_design_are_those_of_the_library(run: Run) -> None:
     from nlsdesign.design import Goal, Limit
     from nlsdesign.design.jobs.job_file import kinds
