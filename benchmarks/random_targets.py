@@ -35,6 +35,7 @@ _LIMITS: dict[str, type] = {
     for each in (
         design_room.MaximumCamRadius,
         design_room.MaximumCableTension,
+        design_room.MaximumLastingStrain,
         design_room.MaximumStrain,
         design_room.MaximumStress,
         design_room.MinimumRadiusOfCurvature,

@@ -72,6 +72,8 @@ def call(words: list[str], folder: Path) -> str:
     ) + words[1:]
     path = os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = {**os.environ, "PYTHONPATH": path, "PYTHONIOENCODING": "utf-8"}
+    # Readline sets the width of a terminal in processes that have none, so in the workers of a run of tests.
+    environment.pop("COLUMNS", None)
     done = subprocess.run(
         words, cwd=folder, env=environment, capture_output=True, text=True, encoding="utf-8", timeout=600
     )

@@ -12,6 +12,7 @@ from ...model.structure import SpecimenNames
 from .limits import (
     Limit,
     MaximumCableTension,
+    MaximumLastingStrain,
     MaximumStrain,
     MaximumStress,
     MinimumRadiusOfCurvature,
@@ -25,6 +26,10 @@ STRESS_FACTOR = 3.0
 falls by about a half over many cycles."""
 STRAIN_FACTOR = 3.0
 """Assumed, for the same reason as the factor of stress."""
+LASTING_STRAIN = 1.0
+"""Half of the extension of about 200 % beyond which the stress of natural rubber without filler relaxes at a
+sharply higher rate, for crystals grow (Gent, Relaxation processes in vulcanized rubber III, Rubber Chem.
+Technol. 36, 1963, 697). Assumed: the half, and that other rubbers bear as much for good."""
 BREAKS = 5.0
 """Nominal strain at which soft rubbers break, for rubber of which nothing is stated: the tensile curve of
 PMC-770 ends there (Schepelmann 2014)."""
@@ -65,6 +70,7 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
     elongations = [values[p.elongation_at_break] for p in cam.specimens if p.elongation_at_break is not None]
     if elongations:
         yield MaximumStrain(min(elongations) / STRAIN_FACTOR)
+        yield MaximumLastingStrain(LASTING_STRAIN)
 
 
 def with_defaults(keep: Sequence[Limit], defaults: Sequence[Limit]) -> tuple[Limit, ...]:

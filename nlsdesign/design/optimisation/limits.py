@@ -189,7 +189,23 @@ class MaximumCamRadius(Limit):
 
 
 @dataclass(frozen=True)
-class MaximumStrain(Limit):
+class StrainLimit(Limit):
+    """Base of the limits on the nominal strain of rubber.
+
+    Parameters
+    ----------
+    strain
+        Largest nominal strain, a pure number; 1 means twice the rest length.
+    """
+
+    strain: Quantity | float
+
+    def __post_init__(self) -> None:
+        self.number("strain", "1", 1e-4, 10.0)
+
+
+@dataclass(frozen=True)
+class MaximumStrain(StrainLimit):
     """Nominal strain of each piece of rubber ≤ strain; 1 means twice the rest length.
 
     Parameters
@@ -204,14 +220,43 @@ class MaximumStrain(Limit):
 
     strain: Quantity | float
 
-    def __post_init__(self) -> None:
-        self.number("strain", "1", 1e-4, 10.0)
-
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound for each piece of rubber."""
         design.of_rubber("rest_length")
         for path, strain in design.strains.items():
             yield self.bound(f"strain of {path}", strain, plain(self.strain), upper=True, unit="1")
+
+
+@dataclass(frozen=True)
+class MaximumLastingStrain(StrainLimit):
+    """Nominal strain of each piece of rubber at angle zero, where a machine rests for good, ≤ strain.
+
+    Rubber that stays stretched creeps and keeps a part of its strain as set; see :func:`safe_limits`.
+
+    Parameters
+    ----------
+    strain
+        Largest nominal strain at rest, a pure number; 1 means twice the rest length.
+
+    Examples
+    --------
+    >>> from nlsdesign.foundation.quantity import quantity
+    >>> MaximumLastingStrain(quantity(60.0, "%")).strain
+    0.6
+    """
+
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "strain", "strain of the rubber at rest", unit="1", shown_unit="%", upper=True
+    )
+
+    strain: Quantity | float
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield one bound for each piece of rubber."""
+        design.of_rubber("rest_length")
+        for path, strain in design.strains.items():
+            of = f"strain at rest of {path}"
+            yield self.bound(of, strain[0], plain(self.strain), upper=True, unit="%")
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ class Give:
     @property
     def sensible(self) -> bool:
         """Whether a designer could consider it: within ten times, and within what rubber can stretch."""
-        if self.bound.value == 0.0 or (self.bound.unit == "1" and self.moved > BREAKS):
+        if self.bound.value == 0.0 or (self.bound.unit in ("1", "%") and self.moved > BREAKS):
             return False
         ratio = self.moved / self.bound.value
         return ratio <= _MOST_RAISED if self.bound.upper else ratio >= 1.0 / _MOST_RAISED

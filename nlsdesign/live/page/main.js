@@ -244,9 +244,9 @@ function limitRow([name, words, value, si, shown, upper, byDefault]) {
 
 // A new limit begins where the design is, so that nothing changes before it is moved.
 function startOf(limit) {
-  const ends = { MaximumStrain: /\.strain$/, MaximumStress: /\.stress$/, MaximumCableTension: /^tension$/, MaximumCamRadius: /^radius$/, MinimumRadiusOfCurvature: /^radius_of_curvature$/, PositiveStiffness: /^stiffness$/ };
+  const ends = { MaximumStrain: /\.strain$/, MaximumLastingStrain: /\.strain$/, MaximumStress: /\.stress$/, MaximumCableTension: /^tension$/, MaximumCamRadius: /^radius$/, MinimumRadiusOfCurvature: /^radius_of_curvature$/, PositiveStiffness: /^stiffness$/ };
   const kind = kinds.find((each) => each.name === limit);
-  const rows = (answer.design?.columns ?? []).filter((each) => ends[limit]?.test(each.name)).flatMap((each) => each.values).filter((value) => value !== null && value > 0);
+  const rows = (answer.design?.columns ?? []).filter((each) => ends[limit]?.test(each.name)).flatMap((each) => (limit === "MaximumLastingStrain" ? each.values.slice(0, 1) : each.values)).filter((value) => value !== null && value > 0);
   if (rows.length === 0) return 1;
   // A strain that no rubber bears is no place to begin at.
   const end = limit === "MaximumStrain" ? answer.design.strain_end ?? Infinity : Infinity;

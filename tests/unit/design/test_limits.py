@@ -17,6 +17,7 @@ from nlsdesign.design import (
     Limit,
     MaximumCableTension,
     MaximumCamRadius,
+    MaximumLastingStrain,
     MaximumStrain,
     MaximumStress,
     MaximumTorqueError,
@@ -52,6 +53,7 @@ def test_quantities_and_bare_numbers_are_the_same() -> None:
         (lambda: MaximumStress(5e6, safety_factor=0.5), ValueRangeError, "safety_factor = 0.5"),
         (lambda: PretensionRange(5e-3, 3e-3), ValueRangeError, "minimum exceeds the maximum"),
         (lambda: MaximumStrain(float("nan")), ValueRangeError, "strain = nan"),
+        (lambda: MaximumLastingStrain(quantity(1.0, "mm")), UnitError, "unit like '1'"),
     ],
 )
 def test_slips_are_named(make: Callable[[], Limit], error: type[Exception], words: str) -> None:
@@ -64,6 +66,7 @@ BOUNDED = [
     (MinimumRadiusOfCurvature(1e-3), "radius of curvature >= 1 mm"),
     (MaximumCamRadius(20e-3), "cam radius <= 20 mm"),
     (MaximumStrain(0.8), "strain of spring.rubber <= 0.8"),
+    (MaximumLastingStrain(0.8), "strain at rest of spring.rubber <= 80 %"),
     (MaximumStress(quantity(5.17, "MPa"), safety_factor=2.0), "stress of spring.rubber <= 2.585 MPa"),
     (MaximumCableTension(150.0), "cable tension <= 150 N"),
     (PositiveStiffness(0.5), "tangent stiffness >= 0.5 N·m/rad"),
@@ -105,8 +108,9 @@ def test_each_limit_says_what_it_bounds(limit: Limit, text: str) -> None:
         (PretensionRange(0.0, 2e-3), lambda d: 2e-3 - d.values["spring.pretension"].number),
         (MaximumCamRadius(16e-3), lambda d: 16e-3 - d.contour.radii.max()),
         (MaximumStrain(0.9), lambda d: 0.9 - _extension(d)[-1] / 12.5e-3),
+        (MaximumLastingStrain(0.2), lambda d: 0.2 - d.values["spring.pretension"].number / 12.5e-3),
     ],
-    ids=["stress", "tension", "pretension", "radius", "strain"],
+    ids=["stress", "tension", "pretension", "radius", "strain", "lasting"],
 )
 def test_an_active_limit_is_kept_and_named(limit: Limit, measure: Callable[[object], float]) -> None:
     keep = [*KEEP, limit]
