@@ -53,7 +53,7 @@ CORRELATION, DRIFT = 0.08, 60.0
 """Seconds over which it stays the same, and of motion after which nothing that was learned is left."""
 SURPRISE, REACH = 3.0, 3.5
 """Deviations of a residual from which on it teaches less, and of the torque within which it is held."""
-RISE, FALL, LARGEST_INFLATION = 0.5, 1.0, 1e4
+RISE, FALL, LARGEST_INFLATION = 0.3, 1.0, 1e4
 """Seconds in which residuals raise and lower the noise that is reckoned with, and the largest factor."""
 RESTLESS, QUICKEST = 100.0, 0.02
 """How much faster what was learned fades per unit of unrest, and the largest share of it in one sample."""
@@ -176,8 +176,7 @@ class CorrectionEquations:
         ratio = (total - alone) / alone
         news = other**2 / alone - innovation**2 / total - ratio * (6.0 + ratio) / (6.0 + 4.0 * ratio)
         forgotten = (1.0 - self.time / EVIDENCE_TIME) * evidence
-        # A frozen reading contradicts the drive, and says nothing of what the machine is.
-        excess = moving * (ca.fmin(nis, SURPRISE**2) - 1.0) * self.time
+        excess = (ca.fmin(nis, SURPRISE**2) - 1.0) * self.time
         grown = unrest * (1.0 + ca.fmax(excess * (1.0 / RISE), excess * (1.0 / FALL)))
         return slow, after, ca.vertcat(
             offset + share * other,
