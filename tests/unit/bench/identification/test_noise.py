@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
+from nlsdesign.bench.identification.equation_error.block_noise import noise_of_blocks
 from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
 from nlsdesign.bench.identification.equation_error.noise import (
     Noise,
@@ -17,7 +19,7 @@ from nlsdesign.bench.identification.equation_error.noise import (
     independent_number,
 )
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.bench.identification.residuals import effective_size
+from nlsdesign.bench.identification.residuals import effective_size, rmse
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
@@ -27,6 +29,8 @@ from tests.unit.bench.identification.test_order_of_records import COLUMNS, SIGNA
 
 FORCE, STEP, COUNT = "force", 0.002, 6000
 FLICKER = [NoisePart(0.16, time) for time in (0.004, 0.0225, 0.126, 0.71, 4.0)]
+EFFORT_PER_AMPERE = 25.0 * 0.0302
+"""Gear ratio times torque constant of the rig, in N·m/A."""
 BLOCKS = {b.name: b for b in blocks_of(flatten(declare(load_deck("test_rig"))), tuple(SIGNALS))}
 
 
@@ -85,3 +89,38 @@ def test_a_short_sample_of_slow_noise_seems_to_hold_more_independent_rows_than_i
     shares = [p._replace(variance=p.variance / whole) for p in FLICKER]
     seen = [effective_size(steps(seed).records[0].trace[FORCE][::4]) for seed in range(9)]
     assert np.median(seen) > 1.5 * independent_number(shares, count, 4 * STEP)
+
+
+def driven(coloured: float, seed: int) -> tuple[RecordSet, np.ndarray]:
+    """A sine that fine counts show, and a current with white noise and noise that remembers for 20 ms."""
+    draw, time = np.random.default_rng(seed), STEP * np.arange(COUNT)
+    noise = 0.02 * draw.standard_normal(COUNT) + coloured * first_order_noise(COUNT, 0.02 / STEP, draw)
+    angle = 1e-5 * np.round(1e5 * (1.0 - np.cos(2.0 * np.pi * 1.3 * time)))
+    rows = (angle, 2.0 * angle + noise, 100.0 * angle)
+    columns = tuple(
+        replace(c, quantum=quantum) for c, quantum in zip(COLUMNS, (1e-5, 0.0, 1e-3), strict=True)
+    )
+    trace = Trace(time, dict(zip(SIGNALS, rows, strict=True)), SIGNALS, "sine")
+    return RecordSet((Record("sine", trace, "fit"),), columns), noise
+
+
+def test_noise_of_a_current_that_remembers_is_in_the_floor_of_the_motor() -> None:
+    ratios = []
+    for seed in range(4):
+        records, noise = driven(0.03, seed)
+        blocks = list(BLOCKS.values())
+        bench = Bench(records, blocks)
+        _, floors = noise_of_blocks(blocks, records, bench.noise, bench.filters)
+        floor = floors["motor", "sine"]
+        ratios.append(rmse(floor.sigma) / (EFFORT_PER_AMPERE * float(np.std(floor.filter @ noise))))
+    assert 0.8 < np.median(ratios) < 1.6
+
+
+def test_white_noise_of_a_current_leaves_the_floor_that_it_has_without_colour() -> None:
+    for seed in range(4):
+        records, _ = driven(0.0, seed)
+        floor, plain = (
+            Bench(records, list(BLOCKS.values()), noise=noise).floors["motor", "sine"]
+            for noise in (None, estimate_noise(records))
+        )
+        assert rmse(floor.sigma) == pytest.approx(rmse(plain.sigma), rel=0.01)
