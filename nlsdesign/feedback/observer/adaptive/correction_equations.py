@@ -57,8 +57,9 @@ RISE, FALL, LARGEST_INFLATION = 0.5, 1.0, 1e4
 """Seconds in which residuals raise and lower the noise that is reckoned with, and the largest factor."""
 RESTLESS, QUICKEST = 100.0, 0.02
 """How much faster what was learned fades per unit of unrest, and the largest share of it in one sample."""
-EVIDENCE_TIME, DECIDED = 5.0, 30.0
-"""Seconds after which evidence is forgotten, and how much is kept at most (a natural logarithm)."""
+EVIDENCE_TIME, DECIDED, ENOUGH = 5.0, 30.0, 2.0
+"""Seconds after which evidence is forgotten, how much is kept at most, and how much gives the factors half
+of the weight (natural logarithms)."""
 
 
 class CorrectionEquations:
@@ -137,7 +138,8 @@ class CorrectionEquations:
         after = self.low_passed(signals)
         residual, terms, rest, moving = self.residual_of(after)
         slow, packed, others = self.learned(residual, terms, rest, moving)
-        weight = 0.5 + 0.5 * others[3] / ca.sqrt(1.0 + others[3] ** 2)
+        surplus = others[3] - ENOUGH
+        weight = 0.5 + 0.5 * surplus / ca.sqrt(1.0 + surplus**2)
         estimate, deviation = self.corrected(signals, slow, packed, weight)
         states = [follow[0], *(ca.vertcat(*chain) for chain in after), slow, packed, others]
         outputs = [estimate, deviation, follow[1][1:], slow, weight, others[2]]
