@@ -283,7 +283,9 @@ def test_units_that_differ_by_the_radian_only_are_joined(tmp_path, loop):
     np.testing.assert_array_equal(run["plant.motor.angle"], plain(loop)["plant.motor.angle"])
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is only the other way")
+@pytest.mark.skipif(
+    not hasattr(os, "fork"), reason="without fork FMUs always run in this process: nothing to compare"
+)
 def test_without_fork_the_fmus_run_in_this_process_with_the_same_result(loop, monkeypatch):
     isolated = plain(loop)
     monkeypatch.delattr(os, "fork")
