@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .foundation.processes import guarded
+from .foundation.processes import guarded, use_one_thread
 
 
 def main() -> None:
@@ -11,6 +11,7 @@ def main() -> None:
 
 
 def _run() -> None:
+    use_one_thread()
     from .cli import main as program
 
     program()

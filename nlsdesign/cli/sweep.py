@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -59,9 +58,6 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     Results come as Parquet: the table in results.parquet, one row per point. What was finished when a run was
     stopped, in whatever way, is not computed again.
     """
-    # Many processes share the cores; threads of the linear algebra within each would only be in the way.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     executor = _executor(given)
     from ..sweeps import libraries, read_sweep_file
 

@@ -66,6 +66,21 @@ def signals_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+THREADS_OF_LINEAR_ALGEBRA = (
+    "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
+)  # fmt: skip
+
+
+def use_one_thread() -> None:
+    """Give the linear algebra, which must not be loaded yet, one thread unless the environment says how many.
+
+    Matrices of this package have a few rows: threads wait for each other longer than they compute, and
+    several processes that share the cores already would each bring as many.
+    """
+    if not any(name in os.environ for name in THREADS_OF_LINEAR_ALGEBRA):
+        os.environ.update(dict.fromkeys(THREADS_OF_LINEAR_ALGEBRA, "1"))
+
+
 def ready_as_helper(at_death_of_parent: signal.Signals = signal.SIGTERM) -> None:
     """Let the parent handle interruptions, and end at once when it asks for it or ends itself."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

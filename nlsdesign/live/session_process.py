@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ..foundation.errors import NlsError
+from ..foundation.processes import THREADS_OF_LINEAR_ALGEBRA
 
 Listener = Callable[[str], Awaitable[None]]
 
@@ -54,7 +55,7 @@ class SessionProcess:
         """Start the process; it reads its libraries while the page is being painted."""
         root = str(Path(__file__).resolve().parents[2])
         path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
-        threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+        threads = dict.fromkeys(THREADS_OF_LINEAR_ALGEBRA, "1")
         self._process = await asyncio.create_subprocess_exec(
             sys.executable, "-P", "-m", "nlsdesign.live.session_work",
             stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,

@@ -21,6 +21,7 @@ from ...foundation.errors import ConvergenceError, MeasurementError, unknown_nam
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ...model.structure import body_moved_by
+from .equation_error.batch import ColumnFunction, PointFunction
 from .equation_error.block import Drive
 from .equation_error.block_noise import rate_span
 from .filters import derivative
@@ -121,8 +122,8 @@ class Windows:
                     ends[:, i] = record.sampling_of(drive.signal).over_steps(record.trace[drive.signal])
         # Steps behind the last sample fill up the last window; nothing is read there.
         padded = np.minimum(np.arange(self.number * self.count), n - 2)
-        self.ends = ca.DM(np.vstack([ends[0][:, padded], ends[1][:, padded]]))
-        self.inputs = ca.DM(inputs)
+        self.ends: Array = np.vstack([ends[0][:, padded], ends[1][:, padded]])
+        self.inputs = inputs
         self.measured = np.array([record.as_computed(name) for name in wiring.outputs])
         # Motion and speed that are measured tell where a window begins.
         self.seen = _seen(model, wiring, record)
@@ -203,8 +204,9 @@ class Shooter:
         nx = len(model.states)
         self.size = nx
         self._rate = ca.Function("rate", [s.state, s.input, p], [ca.reshape(rows[:nx], nx, 1)])
-        self._see = _observed(ca.Function("see", [s.state, s.input, p], [rows[nx:]]), self._columns)
-        self._maps: dict[tuple[int, int, float], ca.Function] = {}
+        see = ca.Function("see", [s.state, s.input, p], [rows[nx:]])
+        self._see = ColumnFunction(_observed(see, self._columns))
+        self._walks: dict[tuple[int, int, float], PointFunction] = {}
 
     @property
     def _columns(self) -> int:
@@ -216,13 +218,13 @@ class Shooter:
         ``start``: state at the beginning of each window, shape (windows, states).
         """
         nx, columns, w, m = self.size, self._columns, windows.number, windows.count
-        p = ca.DM([values[n] for n in self.free])
+        p = np.array([values[n] for n in self.free])
         whole = nx * (1 + columns)
         first = np.zeros((whole, w))
         first[:nx] = start.T
         if columns:
             first[nx : nx + nx * nx] = np.eye(nx).ravel(order="F")[:, None]
-        walked = self._map(m, w, windows.record.step)(ca.DM(first), windows.ends, p).full()
+        walked = self._walk(m, w, windows.record.step)(first, windows.ends, p)[0]
         path = np.empty((whole, w * m + 1))
         # A window's own beginning stands where it begins; the end of the one before is kept apart.
         ends = walked[:, m - 1 :: m].copy()
@@ -231,7 +233,7 @@ class Shooter:
         n = windows.measured.shape[1]
         if n == w * m + 1:
             path[:, -1] = walked[:, -1]
-        rows = self._see.map(n)(ca.DM(path[:, :n]), windows.inputs, p).full()
+        rows = self._see(n, [path[:, :n], windows.inputs, p])
         if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(ends))):
             raise ConvergenceError(
                 f"simulation of record '{windows.record.name}'",
@@ -243,13 +245,14 @@ class Shooter:
         state, by = ends[:nx].T, ends[nx:].reshape(columns, nx, w).transpose(2, 1, 0)
         return Shot(rows[:ny], slopes[:, :nx], slopes[:, nx:], state, by[:, :, :nx], by[:, :, nx:])
 
-    def _map(self, count: int, windows: int, step: float) -> ca.Function:
+    def _walk(self, count: int, windows: int, step: float) -> PointFunction:
         key = count, windows, step
-        if key not in self._maps:
+        if key not in self._walks:
             nx, nu = self.size, len(self.model.inputs)
             one = _stepped(self._rate, (nx, nu, self._columns), step / self._substeps, self._substeps)
-            self._maps[key] = one.mapaccum("window", count).map("windows", "serial", windows, [2], [])
-        return self._maps[key]
+            all_windows = one.mapaccum("window", count).map("windows", "serial", windows, [2], [])
+            self._walks[key] = PointFunction(all_windows)
+        return self._walks[key]
 
 
 def _expression(model: FlatModel, s: object, name: str) -> Expression:

@@ -105,12 +105,15 @@ class PointFunction:
     Parameters
     ----------
     function
-        With dense columns as inputs.
+        With dense inputs: columns are given in shape (rows,), matrices in shape (rows, columns).
     """
 
     def __init__(self, function: ca.Function) -> None:
         self._buffer, self._trigger = function.buffer()
-        self._given: list[Array] = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
+        # Columns lie one behind the other in CasADi, as rows do in NumPy.
+        self._given: list[Array] = [
+            np.zeros((function.size2_in(i), function.size1_in(i))) for i in range(function.n_in())
+        ]
         self._results: list[Array] = [
             np.zeros((function.size2_out(i), function.size1_out(i))) for i in range(function.n_out())
         ]
@@ -124,6 +127,6 @@ class PointFunction:
     def __call__(self, *arrays: Array | float) -> list[Array]:
         """Return all outputs, shape (rows, columns) each."""
         for given, array in zip(self._given, arrays, strict=True):
-            given[:] = array
+            given[:] = np.asarray(array).T
         self._trigger()
         return [result.T.copy() for result in self._results]
