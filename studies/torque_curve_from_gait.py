@@ -50,7 +50,7 @@ from ._published import declared_actuator
 BODY_MASS = nls.quantity(75.0, "kg")
 SHARE = 0.05
 RATIOS = tuple(float(ratio) for ratio in range(20, 121, 10))
-COARSE = (20.0, 40.0, 80.0)
+COARSE = (40.0, 80.0)
 FREE = ("spring.cam.contour", "spring.pretension", "spring.rubber.area", "spring.rubber.rest_length")
 KEEP = (
     nls.MaximumCamRadius(nls.quantity(25.0, "mm", source="assumed: room at a shank")),

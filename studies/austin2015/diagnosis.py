@@ -15,7 +15,6 @@ RIVALS = (
     effects.drive_delay,
     effects.rate_independent_hysteresis,
     effects.second_relaxation,
-    effects.stress_softening,
 )
 """What the loss of the rubber is most easily mistaken for, and it itself: enough for the fast way."""
 

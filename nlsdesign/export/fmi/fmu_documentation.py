@@ -6,6 +6,7 @@ import math
 import struct
 import zlib
 from collections.abc import Sequence
+from functools import cache
 from html import escape
 
 from ...foundation.locations import version as own_version
@@ -93,6 +94,7 @@ def _table_row(each: FmuVariable) -> str:
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
 
 
+@cache
 def icon(name: str = "icon", size: int = 96) -> bytes:
     """Return a PNG: the model as a spiral cam with its cable, or one of its terminals."""
     pixel = {LOOP: _of_loop, FLANGE: _of_flange}.get(name, _of_model)

@@ -22,7 +22,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
@@ -156,18 +155,16 @@ def _motion(model: FlatModel, sizes: Mapping[str, float]) -> list[_Point]:
 
 def _largest(model: FlatModel, points: Sequence[_Point]) -> Sizes:
     """Return the largest finite magnitude of each computed variable that is not 0 everywhere."""
-    rows = []
-    parameters = model.start(model.parameters)
-    for x, u in points:
-        w = model.look_up(x.tolist(), u.tolist())
-        f, y, s, _ = model.equations(0.0, x, u, parameters, w)
-        computed = np.array(ca.vertcat(f, y, s), dtype=float).ravel()
-        rows.append(np.concatenate([computed, x] if model.sample_time is not None else [computed]))
+    x, u = (np.array(rows).T for rows in zip(*points, strict=True))
+    w = np.array([model.look_up(at.tolist(), given.tolist()) for at, given in points]).T
+    every = model.equations.map("every", "serial", len(points), [0, 3], [])
+    f, y, s, _ = every(0.0, x, u, model.start(model.parameters), w)
+    rows = np.vstack([f, y, s, x] if model.sample_time is not None else [f, y, s])
     names = [f"der({v.name})" for v in model.states] + [v.name for v in (*model.outputs, *model.signals)]
     names += [v.name for v in model.states] if model.sample_time is not None else []
-    values = np.abs(np.array(rows))
+    values = np.abs(rows)
     values[~np.isfinite(values)] = 0.0
-    return {name: size for name, size in zip(names, values.max(axis=0).tolist(), strict=True) if size > 0.0}
+    return {name: size for name, size in zip(names, values.max(axis=1).tolist(), strict=True) if size > 0.0}
 
 
 def _rounded(size: float) -> float:

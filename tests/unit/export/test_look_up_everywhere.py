@@ -54,7 +54,7 @@ def program(spacing: str, folder: Path, spoil=lambda text: text) -> Path:
 @pytest.mark.long_cases("even", "crowded at one end", "crowded in the middle")
 @pytest.mark.parametrize("spacing", SPACINGS)
 def test_sampled_floats_find_their_cell_and_no_index_leaves_the_table(spacing, tmp_path):
-    done = subprocess.run([program(spacing, tmp_path), "10007"], capture_output=True, text=True)
+    done = subprocess.run([program(spacing, tmp_path), "100003"], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
 
 
@@ -69,7 +69,7 @@ def test_an_index_beyond_the_table_is_noticed(tmp_path):
     done = subprocess.run(
         [
             program("many", tmp_path, lambda text: text.replace("place_0 = above_0 < ", "place_0 = 9.0f < ")),
-            "10007",
+            "100003",
         ],
         capture_output=True,
         text=True,

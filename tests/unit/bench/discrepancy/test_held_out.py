@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import diagnose
-from nlsdesign.bench.discrepancy.effects import coulomb_friction, quadratic_drag, second_relaxation
+from nlsdesign.bench.discrepancy.effects import coulomb_friction, quadratic_drag
 from nlsdesign.bench.discrepancy.reporting.verdict import Verdict
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.records.quality import Finding
@@ -17,7 +17,7 @@ from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.simulation import Trace
 from tests.diagnosed import rig_set
 
-FEW = (quadratic_drag, coulomb_friction, second_relaxation)
+FEW = (quadratic_drag, coulomb_friction)
 ALLOWED = {"error", "where", "records"}
 """Of ``verdict.json`` that may depend on records that are held out."""
 
