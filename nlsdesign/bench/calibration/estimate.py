@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
@@ -344,7 +344,7 @@ def _chance(y: Array, covariance: Array) -> float:
     strength, axes = np.linalg.eigh(covariance)
     informed = strength < _TELLS
     squares = float(np.sum((axes[:, informed].T @ y) ** 2))
-    return float(chi2.sf(squares, max(1, int(np.sum(informed)))))
+    return float(scipy.stats.chi2.sf(squares, max(1, int(np.sum(informed)))))
 
 
 def _told_by(

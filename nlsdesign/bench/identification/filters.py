@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from ...foundation.arrays import Array, Mask
 
@@ -44,7 +44,9 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
     half = len(weights) // 2
     if order == 1 and _POINTS < len(weights) <= len(signal):
         # Near the ends the quartic through the first or last samples goes on.
-        smooth: Array = savgol_filter(signal, len(weights), 4, deriv=1, delta=step, mode="interp")
+        smooth: Array = scipy.signal.savgol_filter(
+            signal, len(weights), 4, deriv=1, delta=step, mode="interp"
+        )
         return smooth
     beyond = min(half, len(signal) - 1)
     longer = np.pad(signal, beyond, mode="reflect", reflect_type="odd")
@@ -63,7 +65,7 @@ def smoothed(signal: Array, step: float, *, order: int, span: float) -> Array:
     points = 2 * round(0.5 * (span / step - 1.0)) + 1
     if not _LEAST_POINTS <= points <= len(signal):
         return derivative(signal, step, order=order)
-    smooth: Array = savgol_filter(signal, points, 4, deriv=order, delta=step, mode="interp")
+    smooth: Array = scipy.signal.savgol_filter(signal, points, 4, deriv=order, delta=step, mode="interp")
     return smooth
 
 
@@ -77,9 +79,9 @@ def difference(order: int, span: float = 0.0) -> Array:
     if order == 0:
         result: Array = np.ones(1)
     elif points >= _LEAST_POINTS:
-        result = savgol_coeffs(points, 4, deriv=order)
+        result = scipy.signal.savgol_coeffs(points, 4, deriv=order)
     else:
-        result = savgol_coeffs(_POINTS, _DEGREE, deriv=order)
+        result = scipy.signal.savgol_coeffs(_POINTS, _DEGREE, deriv=order)
     result.flags.writeable = False
     return result
 
@@ -96,7 +98,7 @@ def without_rounding(signal: Array, step: float, span: float) -> Array:
     points = 2 * round(0.5 * (_ROUNDING_SHARE * span / step - 1.0)) + 1
     if not 5 <= points <= len(signal):
         return signal
-    result: Array = savgol_filter(signal, points, 3)
+    result: Array = scipy.signal.savgol_filter(signal, points, 3)
     return result
 
 

@@ -14,9 +14,13 @@ from nlsdesign.cli.main import program
 
 HEAVY = {"casadi", "numpy", "sympy", "control", "scipy", "matplotlib", "fmpy", "rich", "jinja2"}
 DECK = "austin2015_figure_consistent"
-AT_THE_END = """
+SLOW_PARTS = {"scipy.signal", "scipy.stats"}
+"""Of SciPy, half a second each, which SciPy loads at their first use."""
+AT_THE_END = f"""
 import atexit, sys
-atexit.register(lambda: print(*{name.partition(".")[0] for name in sys.modules}, file=sys.stderr))
+atexit.register(lambda: print(
+    *{{name.partition(".")[0] for name in sys.modules}}, *({SLOW_PARTS!r} & set(sys.modules)), file=sys.stderr
+))
 """
 COMMAND = "from nlsdesign.cli.main import main; sys.argv = ['nlsdesign', *{words!r}]; main()"
 Loaded = Callable[..., tuple[set[str], str]]
@@ -24,7 +28,7 @@ Loaded = Callable[..., tuple[set[str], str]]
 
 @pytest.fixture
 def loaded(root: Path, tmp_path: Path) -> Loaded:
-    """Run code in a process of its own; returns the top-level modules loaded at its end, and the output."""
+    """Run code in a process of its own; returns the packages loaded at its end, and the output."""
 
     def call(code: str, **environment: str) -> tuple[set[str], str]:
         done = subprocess.run(
@@ -87,7 +91,7 @@ def test_completion_in_the_shell_loads_no_library(loaded: Loaded) -> None:
 
 
 NOT_NEEDED = {
-    ("deck", "check", DECK): {"sympy", "control", "matplotlib", "fmpy", "rich", "jinja2"},
+    ("deck", "check", DECK): {"sympy", "control", "matplotlib", "fmpy", "rich", "jinja2", *SLOW_PARTS},
     ("deck", "show", DECK): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
     ("parts",): {"scipy", "sympy", "control", "matplotlib", "fmpy", "jinja2"},
     ("materials",): {"scipy", "sympy", "control", "matplotlib", "fmpy", "jinja2"},
@@ -101,6 +105,33 @@ def test_a_command_does_not_load_what_it_does_not_use(loaded: Loaded, words: tup
     assert shown.strip()
     assert "casadi" in modules
     assert not modules & NOT_NEEDED[words]
+
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+@pytest.mark.parametrize(
+    ("given", "used"),
+    [({}, ["1"] * 4), ({"OMP_NUM_THREADS": "3"}, ["3", "None", "None", "None"])],
+    ids=["nothing is said", "the environment says"],
+)
+def test_linear_algebra_has_one_thread_unless_the_environment_says_how_many(
+    root: Path, given: dict[str, str], used: list[str]
+) -> None:
+    """Before NumPy is loaded, which reads the number once."""
+    code = f"""
+import os, sys
+sys.argv = ["nlsdesign", "--version"]
+from nlsdesign.__main__ import main
+main()
+print("numpy" in sys.modules, *[os.environ.get(name) for name in {THREADS!r}])
+"""
+    environment = {n: v for n, v in os.environ.items() if n not in THREADS} | given
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120,
+        env={**environment, "PYTHONPATH": str(root)},
+    )  # fmt: skip
+    assert done.stdout.split()[-5:] == ["False", *used], done.stderr
 
 
 @pytest.mark.parametrize("deck", ["cam-actuator", "test_rig"])

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
@@ -164,7 +164,7 @@ def _as_good(rival: ReadyHypothesis, bench: Bench, noise: Values, fit: Fit) -> l
     centre = rival.values[0]
     least = _Total.of(rival, bench, noise, blocks, centre).squares
     kept: list[tuple[float, Values]] = []
-    for point in qmc.Sobol(len(loose), scramble=False).random(_POINTS):
+    for point in scipy.stats.qmc.Sobol(len(loose), scramble=False).random(_POINTS):
         x = np.array([p.inward(centre[p.name]) for p in fit.parameters])
         x[loose] = low[loose] + point * (high - low)[loose]
         moved = _with_numbers(fit, centre, x)

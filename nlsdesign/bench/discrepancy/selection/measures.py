@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, norm
+import scipy
 
 from ....foundation.arrays import Array
 from ...identification.least_squares import Fit
@@ -123,7 +123,7 @@ class Standing:
         statistic = float(distances @ np.linalg.solve(self.covariance, distances))
         if len(distances) == 1 or statistic > 100.0:
             return math.sqrt(max(statistic - len(distances) + 1.0, 0.0))
-        return float(norm.isf(0.5 * chi2.sf(statistic, len(distances))))
+        return float(scipy.stats.norm.isf(0.5 * scipy.stats.chi2.sf(statistic, len(distances))))
 
 
 def total_excess(excesses: Excesses) -> float:

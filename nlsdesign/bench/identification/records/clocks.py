@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize_scalar
-from scipy.signal import correlate, fftconvolve, find_peaks, firwin
 
 from ....foundation.arrays import Array, Indices
 from ....foundation.errors import MeasurementError, ValueRangeError
@@ -196,8 +196,9 @@ def _low_pass(name: str, values: Array, ratio: float) -> Array:
             name, f"is shorter than the anti-alias filter of the new clock ({half} samples to either side)",
             next_step="take a higher rate",
         )  # fmt: skip
-    taps = firwin(2 * half + 1, 1.0 / ratio, window=("kaiser", _KAISER))
-    result: Array = fftconvolve(np.pad(values, half, mode="reflect", reflect_type="odd"), taps, mode="valid")
+    taps = scipy.signal.firwin(2 * half + 1, 1.0 / ratio, window=("kaiser", _KAISER))
+    padded = np.pad(values, half, mode="reflect", reflect_type="odd")
+    result: Array = scipy.signal.fftconvolve(padded, taps, mode="valid")
     return result
 
 
@@ -301,6 +302,7 @@ def _correlations(
     origin, most = reach
     ones = np.ones_like(delayed), np.ones_like(reference)
     a, b = delayed - delayed.mean(), reference - reference.mean()
+    correlate = scipy.signal.correlate
     count = np.maximum(correlate(ones[0], ones[1], method="fft"), 1.0)
     first, second = correlate(a, ones[1], method="fft"), correlate(ones[0], b, method="fft")
     square_a = correlate(a * a, ones[1], method="fft") - first**2 / count
@@ -362,7 +364,7 @@ def _check_unique(pair: str, lags: Array, correlations: Array, effective: float)
     allowed = (1.0 - best**2) * (1.0 + _SIGNIFICANT * math.sqrt(2.0 / max(effective, 1.0))) + 1e-9
     peaks = [
         k
-        for k in find_peaks(correlations)[0]
+        for k in scipy.signal.find_peaks(correlations)[0]
         if 1.0 - correlations[k] ** 2 <= allowed and correlations[k] > 0.0
     ]
     if len(peaks) > 1:

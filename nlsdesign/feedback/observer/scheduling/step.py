@@ -17,9 +17,9 @@ from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import casadi as ca
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.signal import place_poles
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
@@ -373,7 +373,7 @@ def _placed(a: Array, c: Array, poles: Spectrum) -> Array:
     # Both methods place the poles exactly; their iterations only seek well-conditioned eigenvectors.
     method = "YT" if np.any(poles.imag) else "KNV0"
     try:
-        placed = place_poles(
+        placed = scipy.signal.place_poles(
             a.T, c.T, poles if method == "YT" else poles.real, method=method, maxiter=10, rtol=1e-2
         )
     except ValueError as error:
