@@ -137,7 +137,7 @@ def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array, *, exact: 
                 if exact:
                     with suppress(ConvergenceError):
                         # Without a response there, what the linearised problem says is all that is known.
-                        predicted[place][mask] = others.of(piece.evidence, moved)[0][mask]
+                        predicted[place][mask] = others.left(piece.evidence, moved)[mask]
     return predicted
 
 
@@ -146,7 +146,7 @@ class _Others:
 
     def __init__(self, rows: StackedRows, used: Sequence[_Piece], fold: int, x: Array) -> None:
         self._rows, self._used, self._fold, self._x = rows, used, fold, x
-        self._last: tuple[bytes, dict[int, tuple[Array, Array]]] = (b"", {})
+        self._last: tuple[bytes, dict[int, Array]] = (b"", {})
 
     def descended(self, moved: Array) -> Array:
         """Return numbers that one step has given, or those of a descent where the step is none.
@@ -157,21 +157,22 @@ class _Others:
         """
         try:
             before, slope = self(self._x)
-            promised = self._cost(before) - self._cost(before + slope @ (moved - self._x))
-            if promised < ENOUGH or self._cost(before) - self._cost(self(moved)[0]) >= _KEPT * promised:
+            cost, linear = before @ before, before + slope @ (moved - self._x)
+            promised = 0.5 * float(cost - linear @ linear)
+            if promised < ENOUGH or 0.5 * float(cost) - self._cost(moved) >= _KEPT * promised:
                 return moved
         except ConvergenceError:
             pass  # the step leads to where there is no response, so it is none
         low, high, _ = box(self._rows.parameters)
         return minimise(self, self._x, (low, high), evaluations=_EVALUATIONS, share=_TOLERANCE).x
 
-    def of(self, each: Evidence, x: Array) -> tuple[Array, Array]:
-        """Return residuals and slopes of one record; those at the last numbers are remembered."""
+    def left(self, each: Evidence, x: Array) -> Array:
+        """Return residuals of one record; those at the last numbers are remembered."""
         if self._last[0] != x.tobytes():
             self._last = x.tobytes(), {}
         known = self._last[1]
         if id(each) not in known:
-            known[id(each)] = self._rows.of(each, x)
+            known[id(each)] = each.left(self._rows.values(x))
         return known[id(each)]
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
@@ -181,13 +182,14 @@ class _Others:
         for piece in self._used:
             kept = piece.fold != self._fold
             if kept.any():
-                pair = (piece.residual, piece.slope) if at_optimum else self.of(piece.evidence, x)
+                pair = (piece.residual, piece.slope) if at_optimum else self._rows.of(piece.evidence, x)
                 pairs.append((pair[0][kept], pair[1][kept]))
         return np.concatenate([r for r, _ in pairs]), np.vstack([s for _, s in pairs])
 
-    @staticmethod
-    def _cost(residual: Array) -> float:
-        return 0.5 * float(residual @ residual)
+    def _cost(self, x: Array) -> float:
+        """Return half the sum of squares that the call at these numbers would give."""
+        left = [self.left(p.evidence, x)[p.fold != self._fold] for p in self._used]
+        return 0.5 * float(np.sum(np.concatenate([self._rows.prior_rows(x)[0], *left]) ** 2))
 
 
 def _without(information: Array, pull: Array, gradient: Array, place: tuple[Array, Array, Array]) -> Array:

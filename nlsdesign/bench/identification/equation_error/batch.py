@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -10,16 +10,12 @@ import casadi as ca
 import numpy as np
 
 from ....foundation.arrays import Array
-from ....model.graph import fold, read_graph
+from ....model.graph import read_graph
 from ....simulation.numpy_columns import ON_COLUMNS
 
 _CHUNK = 250
 _COLUMNS = 4096
 """Columns that are computed at once: what an instruction works on then lies in the cache."""
-
-
-def _on_columns(operation: int, operands: Sequence[Any]) -> Any:
-    return ON_COLUMNS[operation](*operands)
 
 
 class ColumnFunction:
@@ -35,7 +31,30 @@ class ColumnFunction:
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._rows, self._graph = function.numel_out(0), read_graph(function)
+        self._rows, graph = function.numel_out(0), read_graph(function)
+        self._constants: list[float] = []
+        self._inputs: list[tuple[int, int, int]] = []
+        self._operations: list[tuple[int, Callable[..., Any], tuple[int, ...]]] = []
+        # A place is taken again after the last use of what stands there; inputs and constants keep theirs.
+        places: dict[int, int] = {}
+        for number, (operation, operands, extra) in enumerate(graph.steps):
+            if not operands:
+                places[number] = len(self._constants)
+                if operation == ca.OP_INPUT:
+                    self._inputs.append((places[number], *extra))
+                self._constants.append(0.0 if operation == ca.OP_INPUT else float(extra))
+        kept, free, many = set(places.values()), [], len(self._constants)
+        for number, (operation, operands, _) in enumerate(graph.steps):
+            if operands:
+                into = tuple(places[i] for i in operands)
+                free += [places[i] for i in graph.last_uses[number] if places[i] not in kept]
+                if free:
+                    places[number] = free.pop()
+                else:
+                    places[number], many = many, many + 1
+                self._operations.append((places[number], ON_COLUMNS[operation], into))
+        self._constants += [0.0] * (many - len(self._constants))
+        self._results = [(row, places[number]) for (_, row), number in graph.results.items()]
 
     def __call__(self, count: int, arrays: Sequence[Array]) -> Array:
         """Return the outputs, shape (rows, count).
@@ -52,9 +71,13 @@ class ColumnFunction:
         return result
 
     def _compute(self, arrays: Sequence[Array], result: Array) -> None:
-        values = fold(self._graph, lambda argument, row: arrays[argument][row], float, combined=_on_columns)
-        for (_, row), value in values.items():
-            result[row] = value
+        values: list[Any] = self._constants.copy()
+        for place, argument, row in self._inputs:
+            values[place] = arrays[argument][row]
+        for place, operation, operands in self._operations:
+            values[place] = operation(*[values[i] for i in operands])
+        for row, place in self._results:
+            result[row] = values[place]
 
 
 class ChainFunction:

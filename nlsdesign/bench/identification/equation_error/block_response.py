@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ....foundation.arrays import Array, Mask
+from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, unknown_name
 from ....foundation.symbolic import Expression, depends
 from ..filters import derivative, smoothed, without_rounding
@@ -48,14 +49,18 @@ class Samples(NamedTuple):
 
 
 class _Walk(NamedTuple):
-    """Functions of a step: tables over the parameters, and the step itself.
+    """Functions of a step: tables over the parameters, the step, its slopes, and what carries these on.
 
-    ``near`` holds the states of the stages that take their derivative from the start of the record; ``stiff``
-    tells whether there are short implicit steps, ``mean`` whether the mean output over these is taken.
+    Only the states go through the chain of steps; the slopes of all steps are taken at once afterwards, and
+    the derivatives of the states follow from them by products of small matrices. ``near`` holds the states of
+    the stages that take their derivative from the start of the record; ``stiff`` tells whether there are
+    short implicit steps, ``mean`` whether the mean output over these is taken.
     """
 
     tables: PointFunction
     step: ChainFunction
+    slopes: ColumnFunction
+    carried: ChainFunction
     near: list[list[int]]
     stiff: bool
     mean: bool
@@ -192,34 +197,74 @@ class DrivenBlock:
 
     def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
         """Return the output and its derivatives."""
-        p = np.array([values[name] for name in (*self.free, *self._late)])
+        p = self._numbers(values)
         n = given.at.shape[1]
         states, mean = (np.zeros((0, n)), None) if self._walk is None else self._states(self._walk, given, p)
-        result = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
+        result = self._finite(self._output(n, [states, given.at, p]) if mean is None else _centred(mean))
+        return Response(result[0], result[1:].T)
+
+    def output(self, given: Samples, values: Mapping[str, float]) -> Array:
+        """Return the output alone, shape (n,)."""
+        p, n, size = self._numbers(values), given.at.shape[1], self._size
+        path = np.zeros((0, n)) if self._walk is None else self._path(self._walk, given, p)[0]
+        mean = self._walk is not None and self._walk.mean
+        result = _centred(path[size:]) if mean else self._plain_output(n, [path[:size], given.at, p])
+        only: Array = self._finite(result)[0]
+        return only
+
+    def _numbers(self, values: Mapping[str, float]) -> Array:
+        return np.array([values[name] for name in (*self.free, *self._late)])
+
+    def _finite(self, result: Array) -> Array:
         if not np.all(np.isfinite(result)):
             raise ConvergenceError(
                 f"block '{self.block.name}'",
                 "its response is not finite",
                 next_step="narrow the bounds of the parameters",
             )
-        return Response(result[0], result[1:].T)
+        return result
 
-    def _states(self, walk: _Walk, given: Samples, p: Array) -> tuple[Array, Array | None]:
-        """Return states and sensitivities, and the mean output over each step where the walk takes it."""
-        (n, size), begin, end = (given.at.shape[1], self._size), given.begin, given.end
-        rest, many = self._rest(begin[:, 0], p), size * (1 + len(self.free))
-        start = np.zeros(many + (1 + len(self.free) if walk.mean else 0))
-        start[:size] = rest
+    @cached_property
+    def _plain_output(self) -> ColumnFunction:
+        e = self._equations
+        given = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
+        return ColumnFunction(ca.Function("output", given, [ca.densify(e.output)]))
+
+    def _path(self, walk: _Walk, given: Samples, p: Array) -> tuple[Array, Array]:
+        """Return the states, with the mean output over each step behind them, and the constants of a step."""
+        begin, end = given.begin, given.end
+        rest = self._rest(begin[:, 0], p)
         slope = self._rate(rest, begin.mean(axis=1), p)[1]
         near = [slope[np.ix_(g, g)].ravel(order="F") for g in walk.near]
         tables = walk.tables(p, given.step)[0].ravel(order="F")
         constant = np.concatenate([p, tables, *near, [given.step]])
-        path = np.column_stack([start, walk.step(n - 1, [start, begin, end, constant])])
-        return path[:many], path[many:] if walk.mean else None
+        start = np.concatenate([rest, [0.0] * walk.mean])
+        path: Array = np.column_stack([start, walk.step(begin.shape[1], [start, begin, end, constant])])
+        return path, constant
+
+    def _states(self, walk: _Walk, given: Samples, p: Array) -> tuple[Array, Array | None]:
+        """Return states and sensitivities, and the mean output over each step where the walk takes it."""
+        (path, constant), free = self._path(walk, given, p), len(self.free)
+        (rows, steps), size = path[:, 1:].shape, self._size
+        if not free:
+            return path[:size], path[size:] if walk.mean else None
+        # Column after column: by the states at the beginning of the step, and by the free parameters.
+        by = walk.slopes(steps, [path[:, :-1], given.begin, given.end, constant]).reshape(
+            size + free, rows, steps
+        )
+        both = np.concatenate([part.reshape(-1, steps) for part in (by[:size, :size], by[size:, :size])])
+        none = np.zeros(size * free)
+        slopes = np.column_stack([none, walk.carried(steps, [none, both])])
+        states = np.concatenate([path[:size], slopes])
+        if not walk.mean:
+            return states, None
+        before = slopes[:, :-1].reshape(free, size, steps)
+        means = np.einsum("jk,pjk->pk", by[:size, size], before) + by[size:, size]
+        return states, np.vstack([path[size], np.column_stack([np.zeros(free), means])])
 
     def _made_walk(self, records: Sequence[Record], values: Mapping[str, float]) -> _Walk:
         """Return the functions of a step, with short implicit steps for what is faster than a sample."""
-        p = np.array([values[name] for name in (*self.free, *self._late)])
+        p = self._numbers(values)
         stretches = np.zeros(len(self._stages))
         for record in records:
             stretches = np.maximum(stretches, self._stretches(record, values, p))
@@ -229,12 +274,15 @@ class DrivenBlock:
         ]
         # What jumps within a step is not seen at its ends; a balance of efforts counts the impulse.
         mean = any(stiff) and self.block.target is None
-        tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
+        tables, step, slopes = _walk_functions(self._equations, self._stages, stiff, mean=mean)
+        carried = _carried(self._size, len(self.free))
         rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
         near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
+        instructions = sum(each.n_instructions() for each in (step, slopes, carried))
         return _Walk(
-            PointFunction(tables), ChainFunction(step), near, any(stiff), mean, step.n_instructions()
-        )
+            PointFunction(tables), ChainFunction(step), ColumnFunction(slopes), ChainFunction(carried),
+            near, any(stiff), mean, instructions,
+        )  # fmt: skip
 
     def _stretches(self, record: Record, values: Mapping[str, float], p: Array) -> Array:
         """Return for each stage the largest norm of its derivative along a record, times the step."""
@@ -363,30 +411,9 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     return _Equations(s.state, digested, p, now, core[:n], core[n:], digest)
 
 
-def _sensitivities(e: _Equations) -> tuple[Expression, Expression]:
-    """Return symbols of the states' derivatives with respect to parameters, and x and those as one column.
-
-    Where a parameter acts on a state neither itself nor through other states, there is no symbol but a
-    structural zero: most states depend on few of the parameters.
-    """
-    slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
-    acting = ca.Sparsity(e.state.numel(), e.parameter.numel())
-    if slope.numel():
-        reach = np.eye(e.state.numel(), dtype=bool) | _pattern(e.derivative, e.state)
-        for _ in range(e.state.numel().bit_length()):
-            reach = reach @ reach
-        acts = reach @ _pattern(e.derivative, e.parameter)
-        acting = ca.sparsify(ca.DM(acts.astype(float))).sparsity()
-    return ca.project(slope, acting), ca.vertcat(e.state, ca.vec(slope))
-
-
-def _pattern(value: Expression, of: Expression) -> Mask:
-    """Return which items of a column contain which symbols, shape (items, symbols)."""
-    return np.asarray(ca.DM(ca.jacobian_sparsity(value, of), 1.0).full() > 0.0)
-
-
 def _output_function(e: _Equations) -> ca.Function:
-    slope, everything = _sensitivities(e)
+    slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
+    everything = ca.vertcat(e.state, ca.vec(slope))
     total = ca.jacobian(e.output, e.parameter) + ca.jacobian(e.output, e.state) @ slope
     column = ca.cse(ca.densify(ca.vertcat(e.output, ca.vec(total))))
     return ca.Function("output", [everything, e.digested, ca.vertcat(e.parameter, e.now)], [column])
@@ -394,10 +421,11 @@ def _output_function(e: _Equations) -> ca.Function:
 
 def _walk_functions(
     e: _Equations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
-) -> tuple[ca.Function, ca.Function]:
-    """Return the tables of the exact steps over the parameters, and one step of states and sensitivities.
+) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Return the tables of the exact steps over the parameters, one step of the states, and its slopes.
 
-    With ``mean`` the step gives out the mean of the output over a stiff stage's short steps as well.
+    With ``mean`` the step gives out the mean of the output over a stiff stage's short steps as well. Slopes
+    are those by the states at its beginning and by the free parameters, column after column.
     """
     h, free = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now)
     tables, symbols, matrices, outputs = [], [], [], []
@@ -435,25 +463,35 @@ def _walk_functions(
     table, symbol = _column(tables), _column(symbols)
     dependence = ca.jacobian(table, e.parameter)
     prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
-    slope, everything = _sensitivities(e)
     along = ca.SX.sym("along", table.numel(), e.parameter.numel())
-    of = ca.vertcat(e.state, e.parameter, symbol)
-    directions = ca.vertcat(slope, ca.SX.eye(e.parameter.numel()), ca.project(along, dependence.sparsity()))
-
-    def with_slope(value: Expression) -> Expression:
-        return ca.SX(ca.vertcat(value, ca.vec(ca.jtimes(value, of, directions))))
-
-    column = with_slope(new)
+    before, column = ca.SX(e.state), ca.SX(new)
     if mean:
-        column = ca.vertcat(column, with_slope(sum(outputs, start=ca.SX(0))))
-        everything = ca.vertcat(everything, ca.SX.sym("before", 1 + e.parameter.numel()))
+        before = ca.vertcat(before, ca.SX.sym("before"))
+        column = ca.vertcat(column, sum(outputs, start=ca.SX(0)))
+    by_parameter = ca.jacobian(column, e.parameter)
+    by_parameter += ca.jacobian(column, symbol) @ ca.project(along, dependence.sparsity())
+    slopes = ca.vec(ca.densify(ca.horzcat(ca.jacobian(column, e.state), by_parameter)))
     if guess:
         # Backwards: each symbol stands for an expression of those before it.
         for name, value in zip(reversed(guess), reversed(guessed), strict=True):
-            column = ca.substitute(column, name, value)
+            column, slopes = ca.substitute([column, slopes], [name], [value])
     constant = ca.vertcat(free, symbol, ca.vec(along), _column([ca.vec(w) for w in matrices]), h)
-    return prepare, ca.Function(
-        "step", [everything, e.digested, right, constant], [ca.cse(ca.densify(column))]
+    given = [before, e.digested, right, constant]
+    return (
+        prepare,
+        ca.Function("step", given, [ca.cse(ca.densify(column))]),
+        ca.Function("slopes", given, [ca.cse(slopes)]),
+    )
+
+
+def _carried(states: int, free: int) -> ca.Function:
+    """Return the derivatives of the states by the free parameters one step later, from the step's slopes."""
+    slope, by_state = ca.SX.sym("slope", states, free), ca.SX.sym("by_state", states, states)
+    by_parameter = ca.SX.sym("by_parameter", states, free)
+    return ca.Function(
+        "carried",
+        [ca.vec(slope), ca.vertcat(ca.vec(by_state), ca.vec(by_parameter))],
+        [ca.vec(by_state @ slope + by_parameter)],
     )
 
 

@@ -47,17 +47,24 @@ class Evidence:
 
     def residual(self, values: Mapping[str, float]) -> tuple[Array, Array]:
         """Return measured minus predicted over the noise floor, and its derivatives."""
-        samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
-        response = self.driven.respond(samples, values)
-        target = self.driven.block.target
-        error = (self.record.as_computed(target) if target else 0.0) - response.output
-        sigma = self.floor.sigma
-        return (self.floor.filter @ error) / sigma, -(self.floor.filter @ response.slope) / sigma[:, None]
+        response, sigma = self.driven.respond(self._samples(values), values), self.floor.sigma
+        return self._left(response.output), -(self.floor.filter @ response.slope) / sigma[:, None]
+
+    def left(self, values: Mapping[str, float]) -> Array:
+        """Return measured minus predicted over the noise floor alone, for a fraction of the work."""
+        return self._left(self.predicted(values))
 
     def predicted(self, values: Mapping[str, float]) -> Array:
         """Return the unfiltered output over the record."""
-        samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
-        return self.driven.respond(samples, values).output
+        return self.driven.output(self._samples(values), values)
+
+    def _left(self, output: Array) -> Array:
+        target = self.driven.block.target
+        error = (self.record.as_computed(target) if target else 0.0) - output
+        return (self.floor.filter @ error) / self.floor.sigma
+
+    def _samples(self, values: Mapping[str, float]) -> Samples:
+        return self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
 
 
 class Bench:
