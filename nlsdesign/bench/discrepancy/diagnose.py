@@ -23,6 +23,7 @@ from ...foundation.errors import ConvergenceError, MeasurementError
 from ...foundation.text_files import discard, make_folder, write_text
 from ...model import flatten
 from ...model.origin import derived
+from ..identification.equation_error.block_noise import LEAST_COVERED
 from ..identification.equation_error.evidence import Bench
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
@@ -36,7 +37,7 @@ from .reporting.named_effect import EffectEvidence
 from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
-from .screening.causality import lagging_forces
+from .screening.causality import lagging_forces, modes_too_quick
 from .screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from .screening.wrong_numbers import (
     is_explained_by_numbers,
@@ -110,6 +111,8 @@ def diagnose(
         If the declared model cannot be refitted.
     """
     progress("refitting the declared model")
+    too_quick = modes_too_quick(actuator, max(record.step for record in records.records))
+    records = replace(records, remarks=(*records.remarks, *too_quick))
     chosen_by = records.without_held_out()
     bench = Bench(chosen_by, blocks_of(flatten(actuator), records.signals))
     case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)
@@ -255,7 +258,7 @@ def _verdict(
     # proposed for the values of a table that has no name.
     judged = better = better.as_written()
     left, known = case.excesses(judged), tuple(judged.fits.values())
-    complete = is_complete(left)
+    complete = is_complete(left) and min(case.bench.covered().values(), default=0.0) >= LEAST_COVERED
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)

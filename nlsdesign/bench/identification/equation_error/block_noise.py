@@ -84,6 +84,9 @@ _RECTIFIED = 0.1
 """Share of the noise floor up to which a block may rectify the noise of an input: 0.01 of its square."""
 LEAST_ROWS = 20
 """Rows in which a block says anything of a record, at least."""
+LEAST_COVERED = 0.25
+"""Share of the power of a motion in the rows of a block, below which it is read across its reversals: the
+standard errors of what is in proportion to it are then twice those of the whole motion."""
 
 
 class Filters(NamedTuple):
@@ -115,7 +118,7 @@ class BlockNoise:
     ``sigma`` is the noise floor of each row in the unit of the block, ``raw_sigma`` that of each unfiltered
     sample, shape (n,), which only blocks with a target use. Its own noise makes at most ``independent``
     independent rows of them. The floor is known from ``known`` effective squares of that noise. Both are
-    infinite where the noise is white.
+    infinite where the noise is white. The rows hold the share ``covered`` of the power of the motion.
     """
 
     filter: Smoothing
@@ -123,6 +126,7 @@ class BlockNoise:
     raw_sigma: Array
     independent: float = math.inf
     known: float = math.inf
+    covered: float = 1.0
 
     @property
     def places(self) -> NDArray[np.int64]:
@@ -175,7 +179,7 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     step, width, span = record.step, filters.width, filters.span
     stride = max(1, round(filters.spacing / step))
     inputs = measured_inputs(block, record, span)
-    rows = _rows(block, record, noise, filters, inputs)
+    rows, covered = _rows(block, record, noise, filters, inputs)
     gains = output_slopes(block, inputs, stride)
     own = noise.behind(block.target, step, width=width) if block.target else 0.0
     variance = np.full(gains.shape[1], own**2)
@@ -208,11 +212,16 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     ]
     independent = independent_number(shares, len(rows.places), spacing) if shares else math.inf
     known = min(squares, default=math.inf)
-    return BlockNoise(rows, np.sqrt(variance[rows.places]), np.sqrt(raw), independent, known)
+    return BlockNoise(rows, np.sqrt(variance[rows.places]), np.sqrt(raw), independent, known, covered)
 
 
-def _rows(block: Block, record: Record, noise: Noise, filters: Filters, inputs: Array) -> Smoothing:
-    """Return the rows of a record that say something of a block: not masked, and in motion where need be."""
+def _rows(
+    block: Block, record: Record, noise: Noise, filters: Filters, inputs: Array
+) -> tuple[Smoothing, float]:
+    """Return the rows of a record that say something of a block: not masked, and in motion where need be.
+
+    With the share of the power of the motion in them.
+    """
     n, step, span = len(record.trace), record.step, filters.span
     stride = max(1, round(filters.spacing / step))
     margin = max(len(difference(d.order, span / step)) // 2 for d in block.drives.values())
@@ -220,13 +229,17 @@ def _rows(block: Block, record: Record, noise: Noise, filters: Filters, inputs: 
     masked = record.masked_in([*(drive.signal for drive in block.drives.values()), block.target or ""])
     rows = rows[~rows.touched_by(masked)]
     if block.moving is None:
-        return rows
+        return rows, 1.0
     rate = inputs[[v.name for v in block.model.inputs].index(block.moving)]
     # The filter smears what happens at a reversal; so its whole reach must be in motion.
     slow = np.abs(rate) < slowest_rate(block.drives[block.moving], record, noise, span, rate)
-    moving = _in_motion(rows, slow | _reverses(rate))
-    # A motion that is never between two reversals for long, as one that shakes, is read across them.
-    return moving if len(moving.places) >= LEAST_ROWS else _in_motion(rows, slow)
+    moving, whole = _in_motion(rows, slow | _reverses(rate)), float(np.sum(rows @ rate**2))
+    covered = float(np.sum(moving @ rate**2)) / whole if whole else 0.0
+    # A motion that is hardly ever between two reversals, as one that shakes or swings, is read across them.
+    if len(moving.places) < LEAST_ROWS or covered < LEAST_COVERED:
+        moving = _in_motion(rows, slow)
+        covered = float(np.sum(moving @ rate**2)) / whole if whole else 0.0
+    return moving, covered
 
 
 def slowest_rate(drive: Drive, record: Record, noise: Noise, span: float, rate: Array) -> float:
