@@ -15,6 +15,10 @@ that makes the noise of the next one small, and never so quick that the filter o
 very small share of noise through. A motion that reverses sharply has a quick acceleration although
 its rate hardly changes most of the time, and fine counts show that while coarse ones do not.
 
+What a block takes from a rate in proportion, as a damped spring does, may be quicker than that pace: a mode
+that a step of the motion excites swings on. So the span is shortened until what it takes from such a rate is
+little of the noise floor.
+
 Where the supply of a motor is at its limit, the current follows the speed with a steep slope, and the
 speed bends where that begins. There the span of the rate is as short as the noise of the measured current
 allows.
@@ -68,6 +72,9 @@ _LIMIT_NOISE = 0.3
 _LEAST_SPAN = 8.0
 """Samples in such a span, at least."""
 _STEP = 2.0**0.25
+_BLURRED = 0.05
+"""Mean square of what the span of a rate takes from a residual, in that of its noise, up to which it is let
+pass: a block is open from a mean square of about 1.2 on."""
 _WIDTHS = 60
 """Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""
 _ROWS_OF_SHORTEST = 200
@@ -376,6 +383,9 @@ def chosen_filters(
     span = _span_behind_limit(block, records, noise, span)
     spacing = SPACING * BALANCE / pace
     width = min(_unbiased_width(block, records, noise, (least, span)), widest) if moving else least
+    true = _true_span(block, records, noise, Filters(width, span, max(spacing, SPACING * width)))
+    if true < span:
+        span, width = true, min(_unbiased_width(block, records, noise, (least, true)), widest)
     # A record shorter than a few radians of its motion keeps rows that overlap.
     most = min(r.step * len(r.trace) for r in records) / _ROWS_OF_SHORTEST
     return Filters(width, span, min(max(spacing, SPACING * width), most))
@@ -461,6 +471,43 @@ def _span_behind_limit(block: Block, records: Sequence[Record], noise: Noise, lo
             span *= _STEP
         longest = min(longest, span)
     return longest
+
+
+def _true_span(block: Block, records: Sequence[Record], noise: Noise, filters: Filters) -> float:
+    """Return the longest span, up to that of some filters, that takes hardly anything from what rates do."""
+    shortest = _LEAST_SPAN * max(r.step for r in records)
+    span = filters.span
+    while span > shortest and any(drive.order == 1 for drive in block.drives.values()):
+        blur = np.concatenate([_blur(block, r, noise, filters._replace(span=span)) for r in records])
+        if not blur.size or float(np.nanmean(blur)) <= _BLURRED:
+            break
+        span = max(span / _STEP, shortest)
+    return span
+
+
+def _blur(block: Block, record: Record, noise: Noise, filters: Filters) -> Array:
+    """Return the squares of what the span takes from the rates in each row, in those of its noise.
+
+    Less what noise alone makes of them; so they may be negative.
+    """
+    step, span = record.step, filters.span
+    floor, inputs = block_noise(block, record, noise, filters), measured_inputs(block, record, span)
+    stride = max(1, round(filters.spacing / step))
+    gains = output_slopes(block, inputs, stride)
+    every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
+    taken, own = np.zeros(inputs.shape[1]), np.zeros(len(floor.sigma))
+    long, short = (filter_weights(filters.width, 1, step, each) for each in (span, 0.0))
+    middle = np.pad(short, (len(long) - len(short)) // 2) if len(long) > len(short) else short
+    for i, variable in enumerate(block.model.inputs):
+        drive = block.drives.get(variable.name)
+        if drive is not None and drive.order == 1:
+            gain = gains[i][every_row]
+            near = derivative(record.at_samples(drive.signal), step, order=1)
+            taken += gain * (near - inputs[i])
+            scatter = noise.deviation(drive.signal) * float(np.linalg.norm(middle - long))
+            own += (gain[floor.places] * scatter) ** 2
+    squares: Array = ((floor.filter @ taken) ** 2 - own) / floor.sigma**2
+    return squares
 
 
 def _slopes_of(block: Block, record: Record, span: float, place: int) -> Array:

@@ -22,7 +22,7 @@ from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
-from .told_sampling import SeenBlock, with_sampling, with_told_sampling
+from .told_sampling import Missing, SeenBlock, plain_terms, with_sampling, with_told_sampling
 
 _SPARSE = 0.5
 """Share of the power of a motion in the rows of a block, below which a remark says so: most is not judged."""
@@ -139,10 +139,11 @@ class Bench:
             sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
         )
 
-    def inferred(self, blocks: Sequence[Block]) -> RecordSet:
+    def inferred(self, blocks: Sequence[Block], missing: Missing = plain_terms) -> RecordSet:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.
 
-        ``blocks``: of the declared model, or of a better one with the same names.
+        ``blocks``: of the declared model, or of a better one with the same names. ``missing``: what they may
+        lack, see :mod:`.told_sampling`.
         """
         seen = [
             SeenBlock(
@@ -157,7 +158,7 @@ class Bench:
             for block in blocks
             if block.name in self.filters
         ]
-        return with_told_sampling(self._as_measured, seen)
+        return with_told_sampling(self._as_measured, seen, missing)
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
