@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
-from ..filters import Smoothing, derivative, difference, filter_weights, filtered, smoothing
+from ..filters import Smoothing, blurred, derivative, difference, filter_weights, filtered, kernel, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
 from .block import Block, Drive
@@ -72,6 +72,8 @@ _LIMIT_NOISE = 0.3
 _LEAST_SPAN = 8.0
 """Samples in such a span, at least."""
 _STEP = 2.0**0.25
+_BLUR_REACH = 2.0
+"""Spans to each side of a sample in which it has a part in what the span of a rate takes."""
 _BLURRED = 0.05
 """Mean square of what the span of a rate takes from a residual, in that of its noise, up to which it is let
 pass: a block is open from a mean square of about 1.2 on."""
@@ -496,15 +498,15 @@ def _blur(block: Block, record: Record, noise: Noise, filters: Filters) -> Array
     gains = output_slopes(block, inputs, stride)
     every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
     taken, own = np.zeros(inputs.shape[1]), np.zeros(len(floor.sigma))
-    long, short = (filter_weights(filters.width, 1, step, each) for each in (span, 0.0))
-    middle = np.pad(short, (len(long) - len(short)) // 2) if len(long) > len(short) else short
+    one = np.zeros(2 * math.ceil(_BLUR_REACH * span / step) + 1)
+    one[len(one) // 2] = 1.0
+    of_noise = np.convolve(kernel(filters.width / step), blurred(one, step, span=span))
     for i, variable in enumerate(block.model.inputs):
         drive = block.drives.get(variable.name)
         if drive is not None and drive.order == 1:
             gain = gains[i][every_row]
-            near = derivative(record.at_samples(drive.signal), step, order=1)
-            taken += gain * (near - inputs[i])
-            scatter = noise.deviation(drive.signal) * float(np.linalg.norm(middle - long))
+            taken += gain * blurred(record.at_samples(drive.signal), step, span=span)
+            scatter = noise.deviation(drive.signal) * float(np.linalg.norm(of_noise))
             own += (gain[floor.places] * scatter) ** 2
     squares: Array = ((floor.filter @ taken) ** 2 - own) / floor.sigma**2
     return squares
