@@ -26,7 +26,7 @@ LATE = {"belt_axis": 0.25, "elastic_joint": 0.1}
 def test_a_clean_machine_whose_current_is_held_gets_no_name(
     kind: str, seed: int, condition: str, tmp_path: Path
 ) -> None:
-    """A spring's force that acts late looks like its damping: a drift of the clock, a resonance were named."""
+    """A spring's force that acts late looks like its damping: a drifting clock, a resonance were named."""
     write_kind_case(tmp_path, kind, (), 0.0, seed, condition=condition)
     verdict = diagnose(*opened(tmp_path))
     assert (verdict.verdict, verdict.effects) == ("none", ())
