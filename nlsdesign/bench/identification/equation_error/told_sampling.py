@@ -163,23 +163,20 @@ class _Likelihood(NamedTuple):
 def _asked(
     records: RecordSet, seen: Sequence[SeenBlock], signal: str, missing: Missing
 ) -> _Likelihood | None:
-    """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells."""
-    told = _telling(seen, signal)
-    try:
-        rows = [_rows(each, records.deciding, signal, missing) for each in told]
-        return _likelihood(rows) if rows else None
-    except ConvergenceError:
-        return None  # a fit tells that the declared numbers give no response
+    """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells.
 
-
-def _telling(seen: Sequence[SeenBlock], signal: str) -> list[SeenBlock]:
-    """Return the blocks that a signal drives, and those that share numbers with them."""
+    Blocks that share numbers with these say what the numbers are.
+    """
     told = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
     known, left = set[str](), [each for each in seen if all(each is not other for other in told)]
     while known != (known := {name for each in told for name in _free(each)}):
         told += [each for each in left if known & set(_free(each))]
         left = [each for each in left if not known & set(_free(each))]
-    return told
+    try:
+        rows = [_rows(each, records.deciding, signal, missing) for each in told]
+        return _likelihood(rows) if rows else None
+    except ConvergenceError:
+        return None  # a fit tells that the declared numbers give no response
 
 
 def _free(seen: SeenBlock) -> tuple[str, ...]:
@@ -189,10 +186,18 @@ def _free(seen: SeenBlock) -> tuple[str, ...]:
 def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
     """Return how likely each form is; nothing where the blocks do not depend on it.
 
-    The residuals are freed of all terms. What is left beyond the noise scales the noise, and rows that depend
-    on each other count as fewer: the blocks then say as much less.
+    The residuals are freed of all terms: one for each number, and those of each block alone. What is left
+    beyond the noise scales the noise, and rows that depend on each other count as fewer: the blocks then say
+    as much less.
     """
-    rows, rank = _freed(np.hstack([each.residuals for each in blocks]), _stacked(blocks))
+    names = [*dict.fromkeys(name for each in blocks for name in each.numbers)]
+    bands = []
+    for k, each in enumerate(blocks):
+        zero = np.zeros(each.residuals.shape[1])
+        shared = [each.numbers.get(name, zero) for name in names]
+        others = [np.zeros((len(zero), other.own.shape[1])) for other in blocks]
+        bands.append(np.column_stack([*shared, *others[:k], each.own, *others[k + 1 :]]))
+    rows, rank = _freed(np.hstack([each.residuals for each in blocks]), np.vstack(bands))
     sampled, held, averaged = rows
     slope = held - averaged
     information = float(slope @ slope)
@@ -208,18 +213,6 @@ def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
         shift,
         math.sqrt(scale / information),
     )
-
-
-def _stacked(blocks: Sequence[_Rows]) -> Array:
-    """Return the terms of all blocks on the rows of all: one for each number, and those of each block."""
-    names = [*dict.fromkeys(name for each in blocks for name in each.numbers)]
-    bands = []
-    for k, each in enumerate(blocks):
-        zero = np.zeros(each.residuals.shape[1])
-        shared = [each.numbers.get(name, zero) for name in names]
-        others = [np.zeros((len(zero), other.own.shape[1])) for other in blocks]
-        bands.append(np.column_stack([*shared, *others[:k], each.own, *others[k + 1 :]]))
-    return np.vstack(bands)
 
 
 def _freed(residuals: Array, terms: Array) -> tuple[Array, int]:
