@@ -50,7 +50,7 @@ from .screening.wrong_numbers import (
     wrong_numbers,
 )
 from .selection.comparison import Comparison
-from .selection.criteria import CALIBRATION, Criteria, is_complete
+from .selection.criteria import CALIBRATION, Change, Criteria, is_complete
 from .selection.hypothesis import Hypothesis, excesses
 from .selection.measures import DECLARED, Excess, Excesses, Standing, standing_of
 from .selection.search import Outcome, search, with_what_has_no_name
@@ -151,16 +151,20 @@ class _Case:
     def read_as_declared(self, base: Hypothesis) -> tuple[_Case, Hypothesis]:
         """Return the case and its fit, with inputs read between their samples as the declared machine asks.
 
-        Where it then leaves nothing, it lacks nothing: what a shift within a sample explains is no effect.
-        Else both stay as they are.
+        Where it then leaves nothing, it lacks nothing: what a shift within a sample explains is no effect. It
+        must explain as much of each block as effects must. Else both stay as they are.
         """
-        if _leaves_nothing(self.excesses(base)):
+        before = self.excesses(base)
+        if _leaves_nothing(before):
             return self, base
         other = self._read_as(self.bench.inferred(self._blocks(self.actuator), nothing), 0.0)
         if other is None:
             return self, base
         again = other.comparison.base(self.actuator)
-        return (other, again) if _leaves_nothing(other.excesses(again)) else (self, base)
+        after = other.excesses(again)
+        least = min(Change(self.criteria, before, after).shares.values(), default=1.0)
+        explains = _leaves_nothing(after) and least >= self.criteria.closed_share
+        return (other, again) if explains else (self, base)
 
     def read_as_told_beside(self, outcome: Outcome) -> _Case | None:
         """Return the case with inputs read between their samples as records tell it beside what is named.

@@ -8,7 +8,8 @@ from the residuals what they can, however much. So a friction that nobody declar
 
 They take from a shift too: the force of a spring that acts late is one of its damping, and little is left
 that tells the shift. Whoever asks whether a machine lacks anything at all asks without them; numbers that
-blocks share are then held by what other blocks say of them.
+blocks share are then held by what other blocks say of them. That answer is sharper, but true only if nothing
+is missing; so it counts only where the one with the terms, which is true in any case, allows it.
 
 Channels of one recorder can also be shifted against each other by a part of a sample, as where they are
 sampled in turn. Up to half a sample of each of the two, such a shift is a number without a meaning of its
@@ -150,6 +151,10 @@ class _Likelihood(NamedTuple):
             f"as declared: check between_samples in records.toml, {form.name} would fit"
         )
 
+    def allows(self, shift: float) -> bool:
+        """Tell whether a shift is not plainly less likely than the best."""
+        return 0.5 * ((shift - self.shift) / self.error) ** 2 < _PLAINLY
+
     def losses_of_others(self, form: Sampling) -> str:
         """Return in words how much less likely the other forms are than one of them."""
         others = (
@@ -173,10 +178,13 @@ def _asked(
         told += [each for each in left if known & set(_free(each))]
         left = [each for each in left if not known & set(_free(each))]
     try:
-        rows = [_rows(each, records.deciding, signal, missing) for each in told]
-        return _likelihood(rows) if rows else None
+        plain, sharper = (
+            _likelihood([_rows(each, records.deciding, signal, terms) for each in told]) if told else None
+            for terms in (plain_terms, missing)
+        )
     except ConvergenceError:
         return None  # a fit tells that the declared numbers give no response
+    return sharper if plain and sharper and plain.allows(sharper.shift) else plain
 
 
 def _free(seen: SeenBlock) -> tuple[str, ...]:

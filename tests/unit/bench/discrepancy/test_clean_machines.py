@@ -60,3 +60,10 @@ def test_a_span_of_rates_leaves_what_a_damped_mode_does(
     own = filters["table_side"].span
     assert own < 0.1 if let_pass < 1.0 else own > 0.15
     assert filters["axis_1"].span > 0.15, "behind the noise of the current nothing of it is seen"
+
+
+def test_a_shift_that_explains_a_third_is_no_answer(tmp_path: Path) -> None:
+    """Behind coarse counts friction is little beyond noise; a shift takes a third of it, and hid the name."""
+    write_kind_case(tmp_path, "belt_axis", ("load_dependent_friction",), 1.0, 1120, condition="coarse")
+    verdict = diagnose(*opened(tmp_path))
+    assert [effect.name for effect in verdict.effects] == ["load_dependent_friction"]
