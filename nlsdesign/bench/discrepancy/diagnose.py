@@ -23,7 +23,10 @@ from ...foundation.errors import ConvergenceError, MeasurementError
 from ...foundation.text_files import discard, make_folder, write_text
 from ...model import flatten
 from ...model.origin import derived
+from ..identification.equation_error.block import Block
+from ..identification.equation_error.block_noise import LEAST_COVERED
 from ..identification.equation_error.evidence import Bench
+from ..identification.equation_error.told_sampling import nothing
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from .effects import Candidate
@@ -36,7 +39,7 @@ from .reporting.named_effect import EffectEvidence
 from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
-from .screening.causality import lagging_forces
+from .screening.causality import lagging_forces, modes_too_quick
 from .screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from .screening.wrong_numbers import (
     is_explained_by_numbers,
@@ -47,7 +50,7 @@ from .screening.wrong_numbers import (
     wrong_numbers,
 )
 from .selection.comparison import Comparison
-from .selection.criteria import CALIBRATION, Criteria, is_complete
+from .selection.criteria import CALIBRATION, Change, Criteria, is_complete
 from .selection.hypothesis import Hypothesis, excesses
 from .selection.measures import DECLARED, Excess, Excesses, Standing, standing_of
 from .selection.search import Outcome, search, with_what_has_no_name
@@ -110,10 +113,12 @@ def diagnose(
         If the declared model cannot be refitted.
     """
     progress("refitting the declared model")
+    too_quick = modes_too_quick(actuator, max(record.step for record in records.records))
+    records = replace(records, remarks=(*records.remarks, *too_quick))
     chosen_by = records.without_held_out()
     bench = Bench(chosen_by, blocks_of(flatten(actuator), records.signals))
     case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)
-    base = case.comparison.base(actuator)
+    case, base = case.read_as_declared(case.comparison.base(actuator))
     effects = known_effects() if catalogue is None else catalogue
     outcome, decision = _decided(case, base, effects, progress)
     again = case.read_as_told_beside(outcome)
@@ -143,6 +148,24 @@ class _Case:
         """Return the excess of each block on all samples."""
         return excesses(hypothesis, self.bench, self.criteria)
 
+    def read_as_declared(self, base: Hypothesis) -> tuple[_Case, Hypothesis]:
+        """Return the case and its fit, with inputs read between their samples as the declared machine asks.
+
+        Where it then leaves nothing, it lacks nothing: what a shift within a sample explains is no effect. It
+        must explain as much of each block as effects must. Else both stay as they are.
+        """
+        before = self.excesses(base)
+        if _leaves_nothing(before):
+            return self, base
+        other = self._read_as(self.bench.inferred(self._blocks(self.actuator), nothing), 0.0)
+        if other is None:
+            return self, base
+        again = other.comparison.base(self.actuator)
+        after = other.excesses(again)
+        least = min(Change(self.criteria, before, after).shares.values(), default=1.0)
+        explains = _leaves_nothing(after) and least >= self.criteria.closed_share
+        return (other, again) if explains else (self, base)
+
     def read_as_told_beside(self, outcome: Outcome) -> _Case | None:
         """Return the case with inputs read between their samples as records tell it beside what is named.
 
@@ -151,18 +174,32 @@ class _Case:
         """
         if not outcome.steps:
             return None
-        bench = self.bench
-        records = bench.inferred(blocks_of(flatten(outcome.last.fitted), bench.records.signals))
+        return self._read_as(self.bench.inferred(self._blocks(outcome.last.fitted)), _SAME_SAMPLING)
+
+    def _read_as(self, records: RecordSet, least: float) -> _Case | None:
+        """Return the case with inputs read otherwise; nothing where none moves by more samples than that."""
         moved = (
             abs(now.sampling.late - then.sampling.late)
-            for then, now in zip(bench.records.columns, records.columns, strict=True)
+            for then, now in zip(self.bench.records.columns, records.columns, strict=True)
             if then.sampling and now.sampling
         )
-        if max(moved, default=0.0) <= _SAME_SAMPLING:
+        if max(moved, default=0.0) <= least:
             return None
-        bench = Bench(records, blocks_of(flatten(self.actuator), records.signals))
-        sizes = typical_sizes(self.actuator, bench.records)
-        return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
+        bench = Bench(records, self._blocks(self.actuator))
+        return _Case(
+            self.actuator,
+            bench,
+            Comparison(bench, typical_sizes(self.actuator, bench.records)),
+            self.criteria,
+        )
+
+    def _blocks(self, assembly: Assembly) -> list[Block]:
+        return blocks_of(flatten(assembly), self.bench.records.signals)
+
+
+def _leaves_nothing(left: Excesses) -> bool:
+    """Tell whether no block and no declared number is open."""
+    return not any(each.open for each in left.values())
 
 
 def _decided(
@@ -255,7 +292,7 @@ def _verdict(
     # proposed for the values of a table that has no name.
     judged = better = better.as_written()
     left, known = case.excesses(judged), tuple(judged.fits.values())
-    complete = is_complete(left)
+    complete = is_complete(left) and min(case.bench.covered().values(), default=0.0) >= LEAST_COVERED
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)

@@ -5,12 +5,14 @@ Widths are in seconds, so that the same motion sampled twice as fast passes the 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.ndimage import correlate1d
 
 from ...foundation.arrays import Array, Mask
@@ -55,6 +57,21 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
         result[:half] = 0.0
         result[len(result) - half :] = 0.0
     return result / step**order
+
+
+def blurred(signal: Array, step: float, *, span: float) -> Array:
+    """Return what a span takes from the rate of a signal: that between neighbours less that over the span.
+
+    Where the span has too few samples for quartics, the rate over it is the one on a finer clock, on which a
+    record may be read, see :mod:`.equation_error.between_samples`.
+    """
+    times = max(1, math.ceil(_LEAST_POINTS * step / span))
+    finer = signal
+    if times > 1:
+        clock = np.arange(len(signal), dtype=np.float64)
+        finer = make_interp_spline(clock, signal, k=5)(np.arange((len(signal) - 1) * times + 1) / times)
+    over: Array = derivative(finer, step / times, order=1, span=span)[::times]
+    return derivative(signal, step, order=1) - over
 
 
 def smoothed(signal: Array, step: float, *, order: int, span: float) -> Array:

@@ -42,6 +42,8 @@ _STRAIGHT_FAILURES = 3
 """So many straight steps may fail in a row: then the model is not linear in its numbers."""
 _ENDLESS = "has slopes that are not finite"
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-9, 1e8
+_UNDAMPED = 1e-7
+"""Damping up to which a step promises what it does without, in any direction that residuals tell."""
 _EVALUATIONS = 40
 """Bound of evaluations: a fit that has not ended by then is not going to."""
 _LEAST_INFORMATION = 1e-6
@@ -189,7 +191,7 @@ def minimise(
     ``evaluations``: at most so many; a point where there is no response counts as a bad one. ``logarithmic``:
     which coordinates are logarithms of positive numbers, in the shape of the start; by default none.
     """
-    x, damping, used = start, _FIRST_DAMPING, 0
+    x, damping, used, undamped = start, _FIRST_DAMPING, 0, False
     residual, slope = rows(x)
     if not x.size:
         return Minimum(x, 0.5 * float(residual @ residual), True)  # what is known is all there is
@@ -202,7 +204,11 @@ def minimise(
         step = _step(here, damping, _walls(x, box))
         gain = here.gain(step)
         if gain < max(ENOUGH, share * here.cost, least) * (1.0 if damping <= 1.0 else 1e-2):
-            return Minimum(x, here.cost, True)
+            # Damping shortens a step most along what is known least: the step without it has the last word.
+            if undamped or damping <= _UNDAMPED:
+                return Minimum(x, here.cost, True)
+            undamped, damping = True, _LEAST_DAMPING
+            continue
         used, there = used + 1, _better(rows, x + step, here)
         if there is None and straight_left and used < evaluations:
             straight = _step(here, damping, _straight_walls(x, box, logs))
@@ -214,7 +220,7 @@ def minimise(
             straight_left = _STRAIGHT_FAILURES if there else straight_left - 1
         if there is not None:
             good = (here.cost - there.cost) / gain
-            x, here = x + step, there
+            x, here, undamped = x + step, there, False
             damping = max(damping * (0.1 if good > 0.5 else 1.0 if good > 0.1 else 4.0), _LEAST_DAMPING)
         else:
             damping *= 10.0

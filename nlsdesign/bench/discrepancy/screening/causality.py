@@ -1,4 +1,4 @@
-"""Check of causality: forces that lag the extension they belong to, seen before any fit."""
+"""What is seen before any fit: forces that lag the extension they belong to, modes too quick for a log."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from ....components.assembly.named_parts import Assembly
 from ....foundation.arrays import Array
+from ....foundation.errors import ValueRangeError
 from ....foundation.symbolic import depends
 from ....model import FlatModel, flatten
+from ....model.linear import linearise
 from ....model.readings import reading_of
 from ....model.structure import motions_of_efforts
 from ...identification.filters import derivative
@@ -21,9 +23,34 @@ from ...identification.residuals import Loop, loop_of
 from ..block_prediction import shown_values
 
 _QUICK_OVER_SLOW = 3.0
+"""Ratio of paces of records from which a constant delay can be told from another cause."""
+_LEAST_SAMPLES = 6.0
+"""Samples per period of an oscillation from which derivatives are true to 0.1 %, see `filters.derivative`."""
 _SPANS = 50
 """Spans in a record over which its rate is taken: enough for thirty periods."""
-"""Ratio of paces of records from which a constant delay can be told from another cause."""
+
+
+def modes_too_quick(assembly: Assembly, step: float) -> tuple[Finding, ...]:
+    """Return a remark if the quickest oscillation of a machine has too few samples a period.
+
+    ``step``: time in s from one sample to the next.
+    """
+    model = flatten(assembly)
+    try:
+        rates = np.linalg.eigvals(linearise(model, model.start(model.states).tolist())[0])
+    except ValueRangeError:
+        return ()  # at rest the machine stands at a corner
+    swinging = np.abs(rates)[np.abs(rates.imag) > np.abs(rates.real)]
+    quickest = float(np.max(swinging, initial=0.0)) / (2.0 * np.pi)
+    rate = 1.0 / step
+    if rate >= _LEAST_SAMPLES * quickest:
+        return ()
+    text = (
+        f"are sampled at {rate:.4g} Hz, and the quickest mode of the declared machine swings at "
+        f"{quickest:.3g} Hz: {rate / quickest:.2g} samples a period do not show it, and what it does may be "
+        f"taken for something else; log at {2.0 * _LEAST_SAMPLES * quickest:.3g} Hz or more"
+    )
+    return (Finding("records", text),)
 
 
 class LaggingForces(NamedTuple):

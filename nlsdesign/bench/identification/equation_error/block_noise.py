@@ -15,6 +15,10 @@ that makes the noise of the next one small, and never so quick that the filter o
 very small share of noise through. A motion that reverses sharply has a quick acceleration although
 its rate hardly changes most of the time, and fine counts show that while coarse ones do not.
 
+What a block takes from a rate in proportion, as a damped spring does, may be quicker than that pace: a mode
+that a step of the motion excites swings on. So the span is shortened until what it takes from such a rate is
+little of the noise floor.
+
 Where the supply of a motor is at its limit, the current follows the speed with a steep slope, and the
 speed bends where that begins. There the span of the rate is as short as the noise of the measured current
 allows.
@@ -37,7 +41,7 @@ from numpy.typing import NDArray
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
-from ..filters import Smoothing, derivative, difference, filter_weights, filtered, smoothing
+from ..filters import Smoothing, blurred, derivative, difference, filter_weights, filtered, kernel, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
 from .block import Block, Drive
@@ -68,6 +72,11 @@ _LIMIT_NOISE = 0.3
 _LEAST_SPAN = 8.0
 """Samples in such a span, at least."""
 _STEP = 2.0**0.25
+_BLUR_REACH = 2.0
+"""Spans to each side of a sample in which it has a part in what the span of a rate takes."""
+_BLURRED = 0.05
+"""Mean square of what the span of a rate takes from a residual, in that of its noise, up to which it is let
+pass: a block is open from a mean square of about 1.2 on."""
 _WIDTHS = 60
 """Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""
 _ROWS_OF_SHORTEST = 200
@@ -84,6 +93,9 @@ _RECTIFIED = 0.1
 """Share of the noise floor up to which a block may rectify the noise of an input: 0.01 of its square."""
 LEAST_ROWS = 20
 """Rows in which a block says anything of a record, at least."""
+LEAST_COVERED = 0.25
+"""Share of the power of a motion in the rows of a block, below which it is read across its reversals: the
+standard errors of what is in proportion to it are then twice those of the whole motion."""
 
 
 class Filters(NamedTuple):
@@ -115,7 +127,7 @@ class BlockNoise:
     ``sigma`` is the noise floor of each row in the unit of the block, ``raw_sigma`` that of each unfiltered
     sample, shape (n,), which only blocks with a target use. Its own noise makes at most ``independent``
     independent rows of them. The floor is known from ``known`` effective squares of that noise. Both are
-    infinite where the noise is white.
+    infinite where the noise is white. The rows hold the share ``covered`` of the power of the motion.
     """
 
     filter: Smoothing
@@ -123,6 +135,7 @@ class BlockNoise:
     raw_sigma: Array
     independent: float = math.inf
     known: float = math.inf
+    covered: float = 1.0
 
     @property
     def places(self) -> NDArray[np.int64]:
@@ -175,7 +188,7 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     step, width, span = record.step, filters.width, filters.span
     stride = max(1, round(filters.spacing / step))
     inputs = measured_inputs(block, record, span)
-    rows = _rows(block, record, noise, filters, inputs)
+    rows, covered = _rows(block, record, noise, filters, inputs)
     gains = output_slopes(block, inputs, stride)
     own = noise.behind(block.target, step, width=width) if block.target else 0.0
     variance = np.full(gains.shape[1], own**2)
@@ -208,11 +221,16 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     ]
     independent = independent_number(shares, len(rows.places), spacing) if shares else math.inf
     known = min(squares, default=math.inf)
-    return BlockNoise(rows, np.sqrt(variance[rows.places]), np.sqrt(raw), independent, known)
+    return BlockNoise(rows, np.sqrt(variance[rows.places]), np.sqrt(raw), independent, known, covered)
 
 
-def _rows(block: Block, record: Record, noise: Noise, filters: Filters, inputs: Array) -> Smoothing:
-    """Return the rows of a record that say something of a block: not masked, and in motion where need be."""
+def _rows(
+    block: Block, record: Record, noise: Noise, filters: Filters, inputs: Array
+) -> tuple[Smoothing, float]:
+    """Return the rows of a record that say something of a block: not masked, and in motion where need be.
+
+    With the share of the power of the motion in them.
+    """
     n, step, span = len(record.trace), record.step, filters.span
     stride = max(1, round(filters.spacing / step))
     margin = max(len(difference(d.order, span / step)) // 2 for d in block.drives.values())
@@ -220,13 +238,17 @@ def _rows(block: Block, record: Record, noise: Noise, filters: Filters, inputs: 
     masked = record.masked_in([*(drive.signal for drive in block.drives.values()), block.target or ""])
     rows = rows[~rows.touched_by(masked)]
     if block.moving is None:
-        return rows
+        return rows, 1.0
     rate = inputs[[v.name for v in block.model.inputs].index(block.moving)]
     # The filter smears what happens at a reversal; so its whole reach must be in motion.
     slow = np.abs(rate) < slowest_rate(block.drives[block.moving], record, noise, span, rate)
-    moving = _in_motion(rows, slow | _reverses(rate))
-    # A motion that is never between two reversals for long, as one that shakes, is read across them.
-    return moving if len(moving.places) >= LEAST_ROWS else _in_motion(rows, slow)
+    moving, whole = _in_motion(rows, slow | _reverses(rate)), float(np.sum(rows @ rate**2))
+    covered = float(np.sum(moving @ rate**2)) / whole if whole else 0.0
+    # A motion that is hardly ever between two reversals, as one that shakes or swings, is read across them.
+    if len(moving.places) < LEAST_ROWS or covered < LEAST_COVERED:
+        moving = _in_motion(rows, slow)
+        covered = float(np.sum(moving @ rate**2)) / whole if whole else 0.0
+    return moving, covered
 
 
 def slowest_rate(drive: Drive, record: Record, noise: Noise, span: float, rate: Array) -> float:
@@ -363,6 +385,9 @@ def chosen_filters(
     span = _span_behind_limit(block, records, noise, span)
     spacing = SPACING * BALANCE / pace
     width = min(_unbiased_width(block, records, noise, (least, span)), widest) if moving else least
+    true = _true_span(block, records, noise, Filters(width, span, max(spacing, SPACING * width)))
+    if true < span:
+        span, width = true, min(_unbiased_width(block, records, noise, (least, true)), widest)
     # A record shorter than a few radians of its motion keeps rows that overlap.
     most = min(r.step * len(r.trace) for r in records) / _ROWS_OF_SHORTEST
     return Filters(width, span, min(max(spacing, SPACING * width), most))
@@ -448,6 +473,43 @@ def _span_behind_limit(block: Block, records: Sequence[Record], noise: Noise, lo
             span *= _STEP
         longest = min(longest, span)
     return longest
+
+
+def _true_span(block: Block, records: Sequence[Record], noise: Noise, filters: Filters) -> float:
+    """Return the longest span, up to that of some filters, that takes hardly anything from what rates do."""
+    shortest = _LEAST_SPAN * max(r.step for r in records)
+    span = filters.span
+    while span > shortest and any(drive.order == 1 for drive in block.drives.values()):
+        blur = np.concatenate([_blur(block, r, noise, filters._replace(span=span)) for r in records])
+        if not blur.size or float(np.nanmean(blur)) <= _BLURRED:
+            break
+        span = max(span / _STEP, shortest)
+    return span
+
+
+def _blur(block: Block, record: Record, noise: Noise, filters: Filters) -> Array:
+    """Return the squares of what the span takes from the rates in each row, in those of its noise.
+
+    Less what noise alone makes of them; so they may be negative.
+    """
+    step, span = record.step, filters.span
+    floor, inputs = block_noise(block, record, noise, filters), measured_inputs(block, record, span)
+    stride = max(1, round(filters.spacing / step))
+    gains = output_slopes(block, inputs, stride)
+    every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
+    taken, own = np.zeros(inputs.shape[1]), np.zeros(len(floor.sigma))
+    one = np.zeros(2 * math.ceil(_BLUR_REACH * span / step) + 1)
+    one[len(one) // 2] = 1.0
+    of_noise = np.convolve(kernel(filters.width / step), blurred(one, step, span=span))
+    for i, variable in enumerate(block.model.inputs):
+        drive = block.drives.get(variable.name)
+        if drive is not None and drive.order == 1:
+            gain = gains[i][every_row]
+            taken += gain * blurred(record.at_samples(drive.signal), step, span=span)
+            scatter = noise.deviation(drive.signal) * float(np.linalg.norm(of_noise))
+            own += (gain[floor.places] * scatter) ** 2
+    squares: Array = ((floor.filter @ taken) ** 2 - own) / floor.sigma**2
+    return squares
 
 
 def _slopes_of(block: Block, record: Record, span: float, place: int) -> Array:

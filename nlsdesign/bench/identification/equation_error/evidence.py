@@ -14,6 +14,7 @@ from ....foundation.arrays import Array
 from ....simulation import Trace
 from ..filters import derivative, every
 from ..records.measurement import Record, RecordSet, in_canonical_order
+from ..records.quality import Finding
 from ..records.sampling import Sampling
 from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
 from .block import Block
@@ -21,8 +22,10 @@ from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
-from .told_sampling import SeenBlock, with_sampling, with_told_sampling
+from .told_sampling import Missing, SeenBlock, plain_terms, with_sampling, with_told_sampling
 
+_SPARSE = 0.5
+"""Share of the power of a motion in the rows of a block, below which a remark says so: most is not judged."""
 _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
 
@@ -109,6 +112,16 @@ class Bench:
         if self.records is not self._as_measured:
             self.noise = self.noise.read_as(self.records)
             self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
+        sparse = tuple(
+            Finding(
+                f"block '{name}'",
+                f"is judged on rows with {100.0 * share:.0f} % of the power of its motion: elsewhere a "
+                "reversal or a rest is within reach of its filter; sample faster, or reverse less often",
+            )
+            for name, share in self.covered().items()
+            if share < _SPARSE
+        )
+        self.records = replace(self.records, remarks=(*self.records.remarks, *sparse))
         self._remarks = self.records.remarks
         self.units = {block.name: block.unit for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, BlockNoise]] = {}
@@ -133,10 +146,11 @@ class Bench:
             sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
         )
 
-    def inferred(self, blocks: Sequence[Block]) -> RecordSet:
+    def inferred(self, blocks: Sequence[Block], missing: Missing = plain_terms) -> RecordSet:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.
 
-        ``blocks``: of the declared model, or of a better one with the same names.
+        ``blocks``: of the declared model, or of a better one with the same names. ``missing``: what they may
+        lack, see :mod:`.told_sampling`.
         """
         seen = [
             SeenBlock(
@@ -151,7 +165,7 @@ class Bench:
             for block in blocks
             if block.name in self.filters
         ]
-        return with_told_sampling(self._as_measured, seen)
+        return with_told_sampling(self._as_measured, seen, missing)
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
@@ -201,6 +215,14 @@ class Bench:
         # One estimate of the noise serves all records, so more of them make it no better.
         doubt = float(np.mean([1.0 / f.known for (name, _), f in self.floors.items() if name == block]))
         return 1.0 / doubt if doubt else math.inf
+
+    def covered(self) -> dict[str, float]:
+        """Return by block the share of the power of its motion in the rows of the records that decide."""
+        deciding, seen = {record.name for record in self.records.deciding}, dict[str, list[float]]()
+        for (block, record), floor in self.floors.items():
+            if record in deciding:
+                seen.setdefault(block, []).append(floor.covered)
+        return {block: float(np.mean(shares)) for block, shares in seen.items()}
 
     def slowest(self) -> dict[str, float]:
         """Return the least speed that some record resolves, by the measured signal that it is the rate of."""

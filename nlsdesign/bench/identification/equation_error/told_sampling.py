@@ -6,6 +6,11 @@ the model may lack must not decide: numbers with a spread, and plain terms of ea
 place, its sine and cosine, the speed, its square, and its sign, alone and times the size of the input) take
 from the residuals what they can, however much. So a friction that nobody declared is not taken for a hold.
 
+They take from a shift too: the force of a spring that acts late is one of its damping, and little is left
+that tells the shift. Whoever asks whether a machine lacks anything at all asks without them; numbers that
+blocks share are then held by what other blocks say of them. That answer is sharper, but true only if nothing
+is missing; so it counts only where the one with the terms, which is true in any case, allows it.
+
 Channels of one recorder can also be shifted against each other by a part of a sample, as where they are
 sampled in turn. Up to half a sample of each of the two, such a shift is a number without a meaning of its
 own: it is found in the same way, and told. A delay beyond that is left for effects to explain.
@@ -14,9 +19,9 @@ own: it is found in the same way, and told. A delay beyond that is left for effe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -29,7 +34,7 @@ from ..records.sampling import AVERAGED, HELD, SAMPLED, Sampling, shifted
 from ..residuals import effective_size
 from .block import Block
 from .block_noise import BlockNoise, Filters
-from .block_response import DrivenBlock
+from .block_response import DrivenBlock, free_in
 
 _FORMS = (SAMPLED, HELD, AVERAGED)
 _PLAINLY = 3.0
@@ -40,6 +45,10 @@ _MOST = 1.0
 """Samples by which two channels can be shifted against each other: half a sample of each."""
 
 
+Missing: TypeAlias = Callable[[Block, Record, float], Iterator[Array]]
+"""What a block may lack on a record, whose rates are taken over a span in s: terms of shape (n,) each."""
+
+
 class SeenBlock(NamedTuple):
     """A block with the filters and the noise floors with which it reads the records, by record."""
 
@@ -48,18 +57,19 @@ class SeenBlock(NamedTuple):
     floors: Mapping[str, BlockNoise]
 
 
-def with_told_sampling(records: RecordSet, seen: Sequence[SeenBlock]) -> RecordSet:
+def with_told_sampling(records: RecordSet, seen: Sequence[SeenBlock], missing: Missing) -> RecordSet:
     """Return the records in which every input runs between its samples as they tell best, with remarks.
 
-    ``records``: inputs of which nothing is said have columns without a sampling.
+    ``records``: inputs of which nothing is said have columns without a sampling. ``missing``: what the blocks
+    may lack.
     """
     for column in records.columns:
         if column.sampling is None:
-            likelihood = _asked(records, seen, column.signal)
+            likelihood = _asked(records, seen, column.signal, missing)
             inferred, remark = likelihood.taken() if likelihood else (SAMPLED, "")
             records = with_sampling(records, {column.signal: inferred})
         elif column.declared and column.sampling is not SAMPLED:
-            likelihood = _asked(records, seen, column.signal)
+            likelihood = _asked(records, seen, column.signal, missing)
             remark = likelihood.against(column.sampling) if likelihood else ""
         else:
             continue
@@ -81,10 +91,14 @@ def _as(record: Record, sampling: Mapping[str, Sampling]) -> Record:
 
 
 class _Rows(NamedTuple):
-    """Residuals of a block for each form, shape (forms, rows), and what may explain them, (rows, terms)."""
+    """Residuals of a block for each form, shape (forms, rows), and what may explain them.
+
+    ``numbers``: by name, shape (rows,); blocks may share them. ``own``: of this block, shape (rows, terms).
+    """
 
     residuals: Array
-    terms: Array
+    numbers: Mapping[str, Array]
+    own: Array
 
 
 class _Likelihood(NamedTuple):
@@ -137,6 +151,10 @@ class _Likelihood(NamedTuple):
             f"as declared: check between_samples in records.toml, {form.name} would fit"
         )
 
+    def allows(self, shift: float) -> bool:
+        """Tell whether a shift is not plainly less likely than the best."""
+        return 0.5 * ((shift - self.shift) / self.error) ** 2 < _PLAINLY
+
     def losses_of_others(self, form: Sampling) -> str:
         """Return in words how much less likely the other forms are than one of them."""
         others = (
@@ -147,27 +165,51 @@ class _Likelihood(NamedTuple):
         return f"less likely, as decimal logarithms: {', '.join(others)}"
 
 
-def _asked(records: RecordSet, seen: Sequence[SeenBlock], signal: str) -> _Likelihood | None:
-    """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells."""
-    driven = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
+def _asked(
+    records: RecordSet, seen: Sequence[SeenBlock], signal: str, missing: Missing
+) -> _Likelihood | None:
+    """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells.
+
+    Blocks that share numbers with these say what the numbers are.
+    """
+    told = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
+    known, left = set[str](), [each for each in seen if all(each is not other for other in told)]
+    while known != (known := {name for each in told for name in _free(each)}):
+        told += [each for each in left if known & set(_free(each))]
+        left = [each for each in left if not known & set(_free(each))]
     try:
-        return _likelihood([_rows(each, records.deciding, signal) for each in driven]) if driven else None
+        plain, sharper = (
+            _likelihood([_rows(each, records.deciding, signal, terms) for each in told]) if told else None
+            for terms in (plain_terms, missing)
+        )
     except ConvergenceError:
         return None  # a fit tells that the declared numbers give no response
+    return sharper if plain and sharper and plain.allows(sharper.shift) else plain
+
+
+def _free(seen: SeenBlock) -> tuple[str, ...]:
+    return free_in(seen.block, [v.name for v in seen.block.model.parameters if v.spread])
 
 
 def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
     """Return how likely each form is; nothing where the blocks do not depend on it.
 
-    The residuals of each block are freed of its terms. What is left beyond the noise scales the noise, and
-    rows that depend on each other count as fewer: the blocks then say as much less.
+    The residuals are freed of all terms: one for each number, and those of each block alone. What is left
+    beyond the noise scales the noise, and rows that depend on each other count as fewer: the blocks then say
+    as much less.
     """
-    freed = [_freed(each) for each in blocks]
-    rows = np.hstack([residual for residual, _ in freed])
+    names = [*dict.fromkeys(name for each in blocks for name in each.numbers)]
+    bands = []
+    for k, each in enumerate(blocks):
+        zero = np.zeros(each.residuals.shape[1])
+        shared = [each.numbers.get(name, zero) for name in names]
+        others = [np.zeros((len(zero), other.own.shape[1])) for other in blocks]
+        bands.append(np.column_stack([*shared, *others[:k], each.own, *others[k + 1 :]]))
+    rows, rank = _freed(np.hstack([each.residuals for each in blocks]), np.vstack(bands))
     sampled, held, averaged = rows
     slope = held - averaged
     information = float(slope @ slope)
-    count = rows.shape[1] - sum(rank for _, rank in freed) - 1
+    count = rows.shape[1] - rank - 1
     if count <= 0 or information == 0.0:
         return None
     shift = -float(slope @ sampled) / information
@@ -181,22 +223,21 @@ def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
     )
 
 
-def _freed(rows: _Rows) -> tuple[Array, int]:
+def _freed(residuals: Array, terms: Array) -> tuple[Array, int]:
     """Return the residuals without what the terms can explain, and how many terms count."""
-    size = np.linalg.norm(rows.terms, axis=0)
-    terms = rows.terms[:, size > 0.0] / size[size > 0.0]
+    size = np.linalg.norm(terms, axis=0)
+    terms = terms[:, size > 0.0] / size[size > 0.0]
     u, strength, _ = np.linalg.svd(terms, full_matrices=False)
     basis = u[:, strength > 1e-8 * strength.max(initial=0.0)]
-    return rows.residuals - (rows.residuals @ basis) @ basis.T, basis.shape[1]
+    return residuals - (residuals @ basis) @ basis.T, basis.shape[1]
 
 
-def _rows(seen: SeenBlock, records: Sequence[Record], signal: str) -> _Rows:
+def _rows(seen: SeenBlock, records: Sequence[Record], signal: str, missing: Missing) -> _Rows:
     """Return the residuals of a block on all records for each form, with its terms."""
-    block, filters = seen.block, seen.filters
-    free = [v.name for v in block.model.parameters if v.spread]
+    block, filters, free = seen.block, seen.filters, _free(seen)
     chosen = [r for r in records if r.name in seen.floors]
     driven = DrivenBlock(block, free, records=chosen, span=filters.span, straightened=filters.straightened)
-    residuals, terms = [], []
+    residuals, slopes, terms = [], [], []
     for record in chosen:
         floor = seen.floors[record.name]
         values, rows = block.model.values, []
@@ -205,14 +246,20 @@ def _rows(seen: SeenBlock, records: Sequence[Record], signal: str) -> _Rows:
             response = driven.respond(driven.samples(read, values), values)
             error = (read.as_computed(block.target) if block.target else 0.0) - response.output
             rows.append((floor.filter @ error) / floor.sigma)
-        # The slopes of the last form stand for all: they differ by a sample at most.
-        columns = [*response.slope.T, *_plain_terms(block, record, filters.span)]
         residuals.append(np.array(rows))
-        terms.append((floor.filter @ np.column_stack(columns)) / floor.sigma[:, None])
-    return _Rows(np.hstack(residuals), np.vstack(terms))
+        # The slopes of the last form stand for all: they differ by a sample at most.
+        slopes.append((floor.filter @ response.slope) / floor.sigma[:, None])
+        own = [(floor.filter @ term) / floor.sigma for term in missing(block, record, filters.span)]
+        terms.append(np.reshape(own, (len(own), len(floor.sigma))).T)
+    return _Rows(np.hstack(residuals), dict(zip(free, np.vstack(slopes).T, strict=True)), np.vstack(terms))
 
 
-def _plain_terms(block: Block, record: Record, span: float) -> Iterator[Array]:
+def nothing(_block: Block, _record: Record, _span: float) -> Iterator[Array]:
+    """Yield no term: the block lacks nothing."""
+    yield from ()
+
+
+def plain_terms(block: Block, record: Record, span: float) -> Iterator[Array]:
     """Yield what may be missing in a block whatever it is: plain functions of what drives it."""
     yield np.ones(len(record.trace))
     motions = dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0)

@@ -10,10 +10,14 @@ import math
 
 import numpy as np
 
-from nlsdesign.bench.discrepancy.screening.causality import LaggingForces, lagging_forces
+from nlsdesign.bench.discrepancy.screening.causality import (
+    LaggingForces,
+    lagging_forces,
+    modes_too_quick,
+)
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.components import TRANSLATION, Driven, ForceSensor, Spring, tie
+from nlsdesign.components import TRANSLATION, Driven, ForceSensor, Mass, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.simulation import Trace
 
@@ -70,3 +74,13 @@ def test_a_delay_can_be_told_only_between_records_of_three_times_the_pace() -> N
     assert lagging(cycle(2.0), cycle(6.2)).testable
     assert not lagging(cycle(2.0), cycle(4.0, size=0.1 * SIZE)).testable, "pace is no matter of size"
     assert not lagging(cycle(2.0, late=0.0), cycle(6.2, late=0.0)).testable, "nothing lags"
+
+
+def test_a_log_that_is_slower_than_the_quickest_mode_is_told() -> None:
+    """Two masses of 0.5 kg on a spring of 1 kN/m swing at √(k/m₁ + k/m₂)/2π = 10.07 Hz."""
+    bodies = {"front": Mass(mass=0.5), "back": Mass(mass=0.5)}
+    machine = assembly("train", **bodies, coupling=tie(Spring(stiffness=1000.0), "front", "back"))
+    assert modes_too_quick(machine, 0.01) == ()
+    (finding,) = modes_too_quick(machine, 0.025)
+    assert "swings at 10.1 Hz: 4 samples a period" in finding.text
+    assert finding.text.endswith("log at 121 Hz or more")

@@ -12,12 +12,14 @@ import pytest
 from nlsdesign.bench.discrepancy.block_prediction import band_errors, predict
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
-from nlsdesign.bench.identification.equation_error import evidence
+from nlsdesign.bench.identification.equation_error import block_noise, evidence
 from nlsdesign.bench.identification.equation_error.between_samples import on_clock, refined
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.mapping import Column
+from nlsdesign.components import ROTATION, Dashpot, Encoder, Inertia, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, measure, simulate
@@ -89,3 +91,31 @@ def test_a_masked_sample_has_no_part_in_what_is_put_beside_it() -> None:
     )
     np.testing.assert_array_equal(one.trace["motor.current"], other.trace["motor.current"])
     assert list(np.flatnonzero(one.masked["motor.current"])) == [399, 400, 401]
+
+
+@pytest.mark.parametrize("least", [block_noise.LEAST_COVERED, 0.0])
+def test_a_quick_swing_is_read_across_its_reversals(monkeypatch: pytest.MonkeyPatch, least: float) -> None:
+    """Nine samples a period, in the last tenth fifteen: only there a filter fits between two reversals."""
+    swing = assembly(
+        "swing",
+        ball=Inertia(inertia=0.02),
+        loss=tie(Dashpot(damping=1e-3, domain=ROTATION), "ball"),
+        spring=tie(Spring(stiffness=3.0, domain=ROTATION), "ball"),
+        encoder=Encoder(of="ball.angle", quantum=1e-5),
+    )
+    period = np.where(np.arange(4000) < 3600, 9.0, 15.0)
+    angle = 1e-5 * np.round(1e5 * np.sin(math.tau * np.cumsum(1.0 / period)))
+    units = {"encoder.reading": "rad", "ball.torque": "N*m"}
+    trace = Trace(0.01 * np.arange(4000), dict(zip(units, (angle, 0.0 * angle), strict=True)), units, "swing")
+    columns = tuple(Column(name, name, unit) for name, unit in units.items())
+    monkeypatch.setattr(block_noise, "LEAST_COVERED", least)
+    bench = Bench(RecordSet((Record("swing", trace),), columns), blocks_of(flatten(swing), tuple(units)))
+    (floor,) = bench.floors.values()
+    if least:
+        assert len(floor.sigma) > 3000
+        assert bench.covered()["ball"] > 0.9
+        assert bench.records.remarks == ()
+    else:
+        assert len(floor.sigma) < 100
+        (remark,) = bench.records.remarks
+        assert "is judged on rows with 1 % of the power of its motion" in str(remark)

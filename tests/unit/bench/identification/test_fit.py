@@ -311,6 +311,17 @@ def test_least_squares_follows_a_curved_valley_and_steps_around_a_hole() -> None
     np.testing.assert_allclose(found.x, 1.0, atol=0.02)
 
 
+def test_a_fit_goes_on_along_what_is_known_least_although_damping_hides_what_is_there() -> None:
+    """A common scale of two numbers is known to one part in 10⁴ of what each is: it is still known."""
+    scale = 1e4
+    matrix = np.array([[scale, -scale], [1.0, 1.0]])
+    target = np.array([0.0, 8.0])
+    box = np.full(2, -50.0), np.full(2, 50.0)
+    found = minimise(lambda x: (matrix @ x - target, matrix), np.zeros(2), box, evaluations=20)
+    assert found.converged
+    np.testing.assert_allclose(found.x, [4.0, 4.0], atol=0.1)
+
+
 def test_numbers_that_a_model_is_linear_in_are_found_along_a_narrow_valley() -> None:
     """Viscous friction, dry friction and drag nearly stand for each other in sharp records."""
     speed = 0.3 * np.sin(np.linspace(0.0, 20.0, 400))

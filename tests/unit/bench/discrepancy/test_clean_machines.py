@@ -1,0 +1,69 @@
+"""Machines that lack nothing, under digital controllers: how currents run between samples, and modes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks._score_run import opened
+from nlsdesign.bench.discrepancy import diagnose
+from nlsdesign.bench.discrepancy.diagnose import blocks_of
+from nlsdesign.bench.identification.equation_error import block_noise
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.equation_error.told_sampling import nothing
+from nlsdesign.model import flatten
+from tests.rig.kind_cases import write_kind_case
+
+LATE = {"belt_axis": 0.25, "elastic_joint": 0.1}
+"""Samples by which a current that is held for a tick acts late where a row has two ticks, or five."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "condition"),
+    [("rack_carriage", 1100, "plain"), ("belt_axis", 1103, "slow"), ("elastic_joint", 1103, "slow")],
+)
+def test_a_clean_machine_whose_current_is_held_gets_no_name(
+    kind: str, seed: int, condition: str, tmp_path: Path
+) -> None:
+    """A spring's force that acts late looks like its damping: a drifting clock, a resonance were named."""
+    write_kind_case(tmp_path, kind, (), 0.0, seed, condition=condition)
+    verdict = diagnose(*opened(tmp_path))
+    assert (verdict.verdict, verdict.effects) == ("none", ())
+    assert any("nothing says how it runs between its samples" in remark for remark in verdict.remarks)
+
+
+@pytest.mark.parametrize("kind", LATE)
+def test_numbers_that_blocks_share_tell_when_a_current_acts(kind: str, tmp_path: Path) -> None:
+    write_kind_case(tmp_path, kind, (), 0.0, 1103, condition="slow")
+    declared, records = opened(tmp_path)
+    blocks = blocks_of(flatten(declared), records.signals)
+    bench = Bench(records, blocks)
+    plainly, nothing_missing = (
+        next(c.sampling.late for c in told.columns if c.sampling and c.signal == "amplifier_reading.reading")
+        for told in (bench.inferred(blocks), bench.inferred(blocks, nothing))
+    )
+    assert nothing_missing == pytest.approx(LATE[kind], abs=0.01)
+    assert plainly == 0.0, "terms that may be missing take what tells it"
+
+
+@pytest.mark.parametrize("let_pass", [block_noise._BLURRED, 1e9])
+def test_a_span_of_rates_leaves_what_a_damped_mode_does(
+    let_pass: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A span of 1.3 periods of the mode takes most of its rate, and so of what the spring's damping does."""
+    monkeypatch.setattr(block_noise, "_BLURRED", let_pass)
+    write_kind_case(tmp_path, "elastic_joint", (), 0.0, 1103, condition="slow")
+    declared, records = opened(tmp_path)
+    blocks = blocks_of(flatten(declared), records.signals)
+    filters = Bench(records, blocks).filters
+    own = filters["table_side"].span
+    assert own < 0.1 if let_pass < 1.0 else own > 0.15
+    assert filters["axis_1"].span > 0.15, "behind the noise of the current nothing of it is seen"
+
+
+def test_a_shift_that_explains_a_third_is_no_answer(tmp_path: Path) -> None:
+    """Behind coarse counts friction is little beyond noise; a shift takes a third of it, and hid the name."""
+    write_kind_case(tmp_path, "belt_axis", ("load_dependent_friction",), 1.0, 1120, condition="coarse")
+    verdict = diagnose(*opened(tmp_path))
+    assert [effect.name for effect in verdict.effects] == ["load_dependent_friction"]
