@@ -258,18 +258,13 @@ def _draw_causes(axes: Axes, errors: SpreadErrors) -> None:
         axes.plot(
             [factor * sizes[cause] for cause, _ in ranked], places, color=tone, marker=point, linestyle="none"
         )
-    axes.set_yticks(places, [_short(cause) for cause, _ in ranked])
+    axes.set_yticks(places, [".".join(cause.split(".")[-2:]) for cause, _ in ranked])
     axes.tick_params(axis="y", labelsize=8)
     axes.margins(x=0.05)
     axes.set_xlim(left=0.0)
     axes.set_xlabel(f"{unit} rms for one standard deviation")
     axes.set_title(f"Largest causes, {errors.observers[0]}")
     axes.grid(visible=True, axis="y", color=MUTED.light, linewidth=0.3)
-
-
-def _short(cause: str) -> str:
-    """Return the last parts of a long name."""
-    return ".".join(cause.split(".")[-2:])
 
 
 def _range(values: np.ndarray) -> str:
