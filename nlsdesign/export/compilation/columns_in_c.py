@@ -174,10 +174,6 @@ def _crossing(body: ColumnGraph) -> list[int]:
     )
 
 
-def _fixed_arguments(body: ColumnGraph) -> list[int]:
-    return [k for argument in body.arguments for k in argument if k in body.fixed]
-
-
 def _once(number: int, body: ColumnGraph, crossing: Sequence[int], constants: Mapping[int, str]) -> str:
     given = [k for argument in body.arguments for k in argument if k in body.fixed]
     names = dict(constants) | {k: f"a[{i}]" for i, k in enumerate(given)}
