@@ -19,7 +19,7 @@ from nlsdesign.design import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.presentation import figures
 from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
-from nlsdesign.presentation.figures.cam_motion import MARKER, cam_motion, cam_picture
+from nlsdesign.presentation.figures.cam_motion import MARKER, CamMotion, cam_motion, cam_picture
 from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look, significant
 from nlsdesign.presentation.figures.svg import svg_text, thinned
 from tests import figure_samples as samples
@@ -298,9 +298,7 @@ def test_a_cam_that_cannot_be_made_says_so() -> None:
 def test_a_motion_needs_equal_rows() -> None:
     motion = samples.motion()
     with pytest.raises(ValueRangeError, match="one extension, force and torque for each angle"):
-        figures.CamMotion(
-            motion.contour, motion.angles, motion.extensions[1:], motion.forces, motion.torques, 0.01
-        )
+        CamMotion(motion.contour, motion.angles, motion.extensions[1:], motion.forces, motion.torques, 0.01)
 
 
 # --- what the figures compute ---------------------------------------------------------------------
