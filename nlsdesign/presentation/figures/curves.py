@@ -13,6 +13,7 @@ from ...bench.identification.residuals import Agreement
 from ...design import Target
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import typeset_number
 from ...foundation.written_numbers import shared_prefix
 from .style import (
     AFTER,
@@ -26,7 +27,6 @@ from .style import (
     look,
     panels,
     root_mean_square,
-    significant,
     styled,
 )
 from .svg import thinned
@@ -186,7 +186,7 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
     }
     factor, unit = shared_prefix([half, *(root_mean_square(error) for error in errors.values())], "N*m")
     if half > 0.0:
-        label = f"tolerance ± {significant(factor * half, 3)} {unit}"
+        label = f"tolerance ± {typeset_number(factor * half, 3)} {unit}"
         upper.fill_between(degrees, low, high, color=GRID.light, label=label)
         lower.axhspan(-factor * half, factor * half, color=GRID.light)
     upper.plot(
@@ -198,14 +198,14 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
         tone, dash, _ = look(number)
         error = errors[label]
         rms = root_mean_square(error)
-        summaries.append(f"{label} {significant(factor * rms, 2)} {unit}")
+        summaries.append(f"{label} {typeset_number(factor * rms, 2)} {unit}")
         upper.plot(np.degrees(angle), torque, color=tone, linestyle=dash, label=label)
         lower.plot(
             np.degrees(angle),
             factor * error,
             color=tone,
             linestyle=dash,
-            label=f"{label}: rms {significant(factor * rms, 2)} {unit}",
+            label=f"{label}: rms {typeset_number(factor * rms, 2)} {unit}",
         )
     _label(upper, "torque in N·m", "Torque of the spring")
     _label(lower, f"error in {unit}", "Design minus target")
@@ -279,7 +279,7 @@ def torque_loops(loops: Mapping[str, tuple[Curve, Curve]]) -> Figure:
     for panel, (title, (measured, model)) in zip(axes, loops.items(), strict=True):
         panel.plot(*_degrees(measured), color=INK.light, linewidth=1.1, label="measured")
         panel.plot(*_degrees(model), color=AFTER.light, linestyle=DASHES[1], label="model")
-        areas = [significant(1e3 * abs(loop_area(*loop)), 3) for loop in (measured, model)]
+        areas = [typeset_number(1e3 * abs(loop_area(*loop)), 3) for loop in (measured, model)]
         energies.append(f"{title}: {areas[0]} mJ measured, {areas[1]} mJ in the model")
         panel.set_title(f"{title}, lost per cycle: {areas[0]} mJ measured, {areas[1]} mJ model", fontsize=8.5)
         panel.set_xlabel("angle in degrees")
@@ -301,7 +301,7 @@ def metric_note(agreement: Agreement, unit: str = "N·m") -> str:
     unit
         Of the measured quantity.
     """
-    return f"{significant(agreement.relative)} %, {significant(agreement.rmse, 2)} {unit} rms"
+    return f"{typeset_number(agreement.relative)} %, {typeset_number(agreement.rmse, 2)} {unit} rms"
 
 
 def loop_area(angle: Array, torque: Array) -> float:

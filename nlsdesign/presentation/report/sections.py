@@ -14,8 +14,9 @@ from typing import Any, ClassVar, NamedTuple
 from urllib.parse import quote
 
 from ...foundation.errors import ExportError, ValueRangeError
+from ...foundation.quantity import typeset_number
 from ..figures import Figure, inline_svg
-from ..figures.style import alternative_text, compact, significant
+from ..figures.style import alternative_text, compact
 from ..figures.svg import figure_data
 
 _CODE = re.compile(r"`([^`\n]+)`")
@@ -396,5 +397,5 @@ class FileSection(Section):
 def _size(count: int) -> str:
     for unit, factor in (("MB", 1e6), ("kB", 1e3)):
         if count >= factor:
-            return f"{significant(count / factor, 2 if count / factor < 100 else 3)} {unit}"
+            return f"{typeset_number(count / factor, 2 if count / factor < 100 else 3)} {unit}"
     return f"{count} B"
