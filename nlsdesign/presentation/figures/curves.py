@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...bench.identification.residuals import Agreement
@@ -22,6 +21,7 @@ from .style import (
     INK,
     MUTED,
     described,
+    label_panel,
     legend,
     log_axis,
     look,
@@ -207,8 +207,8 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
             linestyle=dash,
             label=f"{label}: rms {typeset_number(factor * rms, 2)} {unit}",
         )
-    _label(upper, "torque in N·m", "Torque of the spring")
-    _label(lower, f"error in {unit}", "Design minus target")
+    label_panel(upper, "torque in N·m", "Torque of the spring")
+    label_panel(lower, f"error in {unit}", "Design minus target")
     lower.set_xlabel("angle in degrees")
     return described(
         figure,
@@ -251,7 +251,7 @@ def torque_against_measured(
         marker = look(position).marker
         upper.plot(np.degrees(at), points, color=INK.light, linestyle="none", marker=marker, label=label,
                    markerfacecolor="none", markeredgewidth=1.2, markersize=5.5)  # fmt: skip
-    _label(upper, "torque in N·m", "Torque of the spring", columns=2)
+    label_panel(upper, "torque in N·m", "Torque of the spring", columns=2)
     lower.set_ylabel("error in N·m")
     lower.set_title("Model minus measurement")
     lower.set_xlabel("angle in degrees")
@@ -320,12 +320,6 @@ def loop_area(angle: Array, torque: Array) -> float:
 
 def _degrees(curve: Curve) -> tuple[Array, Array]:
     return thinned(np.degrees(curve[0]), curve[1])
-
-
-def _label(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> None:
-    axes.set_ylabel(ordinate)
-    axes.set_title(title)
-    legend(axes, columns=columns)
 
 
 def _require(what: str, given: Mapping[str, object]) -> None:

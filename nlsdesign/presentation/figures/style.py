@@ -226,11 +226,11 @@ def legend(axes: Axes, *, columns: int = 4) -> None:
         axes.set_title(title, pad=9.0 + 13.5 * rows)
 
 
-def label_panel(axes: Axes, ordinate: str, title: str) -> None:
+def label_panel(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> None:
     """Give a panel its ordinate, title and legend."""
     axes.set_ylabel(ordinate)
     axes.set_title(title)
-    legend(axes)
+    legend(axes, columns=columns)
 
 
 def log_axis(axes: Axes, *, abscissa: bool = False) -> None:

@@ -24,10 +24,6 @@ _DOTS = re.compile(r"(?<=[a-z\]])(\.)(?=[a-z])|(?<=\w)(_)(?=\w)")
 """Dots within a hierarchical name and underscores, behind which a line may break."""
 
 
-_HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-"""Characters that are not seen, or turn the direction of what follows."""
-
-
 class Html(str):
     """Text that is HTML already; templates escape every other text."""
 
@@ -47,17 +43,6 @@ def words(text: str) -> Html:
     '<code>a.b</code> &lt; 3'
     """
     return Html(_CODE.sub(r"<code>\1</code>", escape(text)))
-
-
-def visible(page: str) -> str:
-    r"""Return a text in which control characters and marks of direction are written out, as ``\x1b``.
-
-    Examples
-    --------
-    >>> print(visible("a" + chr(27) + "[31m"))
-    a\x1b[31m
-    """
-    return _HIDDEN.sub(lambda match: match[0].encode("unicode_escape").decode(), page)
 
 
 def breakable(text: Html) -> Html:
