@@ -31,7 +31,6 @@ from nlsdesign.feedback.control import (
 )
 from nlsdesign.feedback.control.evaluation.linear_loop import LinearLoop
 from nlsdesign.feedback.control.evaluation.margins import CoupledStability
-from nlsdesign.feedback.observer import ErrorStability
 from nlsdesign.foundation.quantity import degrees
 from nlsdesign.model import Variable
 from nlsdesign.presentation import figures
@@ -43,7 +42,6 @@ from nlsdesign.presentation.figures.before_after import (
     held_out_series,
 )
 from nlsdesign.presentation.figures.cam_motion import cam_motion
-from nlsdesign.presentation.figures.over_angle import observer_stability
 from nlsdesign.presentation.figures.sweep_figures import (
     MarkedQuantile,
     PointKinds,
@@ -140,7 +138,6 @@ SHARES = (
     CandidateShare("coulomb_friction", 0.97, True),
     CandidateShare("force_sensor_delay", -0.02),
 )
-STABILITY = ErrorStability(np.linspace(-0.9, 0.9, 31), np.full(31, 0.97), False, True)
 
 
 def against_target() -> figures.Figure:
@@ -284,7 +281,6 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         {"F_M": chart(), "published": chart(3.0, rank=4)}
     ),
     "stability": lambda: figures.stability_over_angle({"model": chart()}),
-    "observer_stability": lambda: observer_stability({"F_M": STABILITY}, sample_time=1e-3),
     "observer_error": lambda: figures.observer_error(TIME, torque(), {"F_M": torque() + 0.01}),
     "closed_loop": lambda: figures.closed_loop(
         closed_loop(), differences={"torque": 1e-8 * TIME}, bound=1e-6

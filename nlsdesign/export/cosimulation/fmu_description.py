@@ -184,10 +184,17 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
     what = f"instance '{instance}' ({archive})"
     try:
         read = fmpy.read_model_description(str(folder))
-        variables = {v.name: _variable(v) for v in read.modelVariables if _usable(v)}
+        variables = {
+            v.name: _variable(v)
+            for v in read.modelVariables
+            if v.type in _KINDS and not getattr(v, "dimensions", None)
+        }
     except Exception as error:
         # Whatever a damaged description makes the XML and FMI libraries raise.
-        raise ExportError(what, f"is not a valid FMU: {_brief(error)}") from error
+        # What Python raises where something is missing names only that.
+        named = isinstance(error, LookupError) or not str(error).strip()
+        said = fit_to_show(f"{type(error).__name__} {error}" if named else error)
+        raise ExportError(what, f"is not a valid FMU: {said}") from error
     offered = read.coSimulation
     if offered is None or read.fmiVersion == "1.0":
         raise ExportError(what, "is not a co-simulation FMU of FMI 2.0 or 3.0")
@@ -223,19 +230,9 @@ def _check_sample_time(what: str, description: FmuDescription) -> None:
         raise ExportError(what, f"states a sample time of {stated.start} s, which is not possible")
 
 
-def _usable(variable: Any) -> bool:
-    return variable.type in _KINDS and not getattr(variable, "dimensions", None)
-
-
 def _variable(read: Any) -> FmuScalar:
     unit = read.unit or (read.declaredType.unit if read.declaredType else None)
     start = None if read.start is None else float(read.start)
     return FmuScalar(
         read.name, int(read.valueReference), read.causality, read.variability, _KINDS[read.type], unit, start
     )
-
-
-def _brief(error: BaseException) -> str:
-    # What Python raises where something is missing names only that.
-    named = isinstance(error, LookupError) or not str(error).strip()
-    return fit_to_show(f"{type(error).__name__} {error}" if named else error)

@@ -20,7 +20,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Switch, Variable
 from ..c.guarded_step import FIRST_INDEX_BIT, STATUS_BITS
-from .expression_walk import EVERYTHING, Interval, ranges
+from .expression_walk import EVERYTHING, ranges
 from .terminals import with_flange_outputs
 from .typical_sizes import typical_sizes, with_sizes
 
@@ -206,7 +206,9 @@ def _as_shown(model: FlatModel, sizes: Mapping[str, float]) -> FlatModel:
         intervals = ranges(ca.Function("shown", groups, [ca.densify(expressions)]), bounds)
         depends = ca.jacobian_sparsity(expressions, s.parameter).row()
         return [
-            _widened(v, interval) if v.bounded and i in depends else v
+            replace(v, minimum=min(v.minimum, interval[0]), maximum=max(v.maximum, interval[1]))
+            if v.bounded and i in depends
+            else v
             for i, (v, interval) in enumerate(zip(variables, intervals, strict=True))
         ]
 
@@ -218,10 +220,6 @@ def _as_shown(model: FlatModel, sizes: Mapping[str, float]) -> FlatModel:
         outputs=with_sizes(tuned(model.outputs, s.output), sizes),
         signals=with_sizes(signals, sizes),
     )
-
-
-def _widened(v: Variable, interval: Interval) -> Variable:
-    return replace(v, minimum=min(v.minimum, interval[0]), maximum=max(v.maximum, interval[1]))
 
 
 def _rate(state: Variable, sizes: Mapping[str, float]) -> Variable:

@@ -54,7 +54,8 @@ def design_picture(design: CamDesign) -> Figure:
     figure, axes = panels(2, 1, height=4.0, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
         _draw(panel, design, angle)
-    low, high = (pick([end(panel) for panel in axes]) for pick, end in ((min, _lowest), (max, _highest)))
+    high = max(float(panel.dataLim.y1) for panel in axes)
+    low = min(float(panel.dataLim.y0) for panel in axes)
     low -= 0.08 * (wide - left) * MM  # room for the dimensions
     for panel in axes:
         panel.set_xlim(left * MM, wide * MM)
@@ -103,14 +104,6 @@ def limit_margins(design: CamDesign) -> Figure:
     return described(figure, f"Bars of {len(states)} limits; the design sits on: {binding}.")
 
 
-def _lowest(axes: Axes) -> float:
-    return float(axes.dataLim.y0)
-
-
-def _highest(axes: Axes) -> float:
-    return float(axes.dataLim.y1)
-
-
 def _used(state: LimitState) -> float:
     """Return the share of a limit that is used; a lower limit is used up where the value falls to it."""
     if state.upper:
@@ -133,7 +126,8 @@ def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
     for half in _halves(contour, parallel):
         axes.fill(*(turn(half, angle) * MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
     arm = float(np.interp(angle, contour.angles, contour.lever_arms))
-    contact = _contact(contour, angle)
+    point = np.array([[np.interp(angle, contour.angles, column) for column in contour.points.T]])
+    contact = np.asarray(turn(point, angle)[0], dtype=float)
     end = _end_of_cable(contour, float(contour.radii.max())) + (contact * [0.0, 1.0] if parallel else 0.0)
     for side in (1.0,) if parallel else (1.0, -1.0):
         line = np.vstack([contact, end]) * side * MM
@@ -167,11 +161,6 @@ def _halves(contour: Contour, parallel: bool) -> list[Array]:
     # Of a cam with a parallel cable only the lip is designed; the body behind it is closed over the centre.
     points = contour.points
     return [np.vstack([points, [[0.0, 0.0]], points[:1]])]
-
-
-def _contact(contour: Contour, angle: float) -> Array:
-    point = np.array([[np.interp(angle, contour.angles, column) for column in contour.points.T]])
-    return np.asarray(turn(point, angle)[0], dtype=float)
 
 
 def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: float) -> None:
@@ -328,7 +317,7 @@ def torque_band(result: ToleranceResult) -> Figure:
                 linestyle=dash, label=f"90 % of the springs, {label}",
             )  # fmt: skip
             axes.plot(degrees, middle, color=tone, linewidth=1.2)
-    _targeted(upper, degrees, wanted)
+    upper.plot(degrees, wanted, color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target")
     lower.axhline(0.0, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)))
     lower.grid(color=GRID.light)
     upper.set_ylabel("torque in N·m")
@@ -344,10 +333,6 @@ def torque_band(result: ToleranceResult) -> Figure:
         f"lie, with the target; at most {significant(factor * widest[0], 3)} {unit} wide as built{after}. "
         "Errors below.",
     )
-
-
-def _targeted(axes: Axes, degrees: np.ndarray, wanted: np.ndarray) -> None:
-    axes.plot(degrees, wanted, color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target")
 
 
 _LABELS = ("rigid", "best linear spring", "this curve")
@@ -456,7 +441,12 @@ def pareto_front(front: ParetoFront) -> Figure:
     if len(labels) == 3:
         axes.set_title(labels[2])
     legend(axes)
-    return described(figure, _title_of_goal(front))
+    low, high = front.shown.min(axis=0), front.shown.max(axis=0)
+    ranges = (
+        f"{goal} {with_unit(f'{significant(float(a))} to {significant(float(b))}', unit)}"
+        for goal, unit, a, b in zip(front.goals, front.units, low, high, strict=True)
+    )
+    return described(figure, f"Front of {len(front.points)} designs: " + ", ".join(ranges) + ".")
 
 
 def _steps(front: ParetoFront) -> list[list[int]]:
@@ -475,12 +465,3 @@ def _range(front: ParetoFront, values: np.ndarray) -> str:
     ends = dict.fromkeys(significant(float(value)) for value in (values.min(), values.max()))
     unit = front.units[2]
     return with_unit(" to ".join(ends), "" if unit == "1" else unit)
-
-
-def _title_of_goal(front: ParetoFront) -> str:
-    low, high = front.shown.min(axis=0), front.shown.max(axis=0)
-    ranges = (
-        f"{goal} {with_unit(f'{significant(float(a))} to {significant(float(b))}', unit)}"
-        for goal, unit, a, b in zip(front.goals, front.units, low, high, strict=True)
-    )
-    return f"Front of {len(front.points)} designs: " + ", ".join(ranges) + "."

@@ -70,7 +70,10 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
     with mpl.rc_context(STYLE), _any_letters():
         figure.savefig(stream, format="svg", metadata={"Date": None})
     root = ET.fromstring(stream.getvalue())
-    _remove_global(root)
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
+                parent.remove(child)
     kept = {name for element in root.iter() for name in _references(element)}
     kept |= {str(artist.get_gid()) for artist in figure.findobj() if artist.get_gid()}
     for element in root.iter():
@@ -134,14 +137,6 @@ def _content(figure: Figure, suffix: str) -> bytes:
         else:
             figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
     return stream.getvalue()
-
-
-def _remove_global(root: ET.Element) -> None:
-    """Remove the style for ``*``, which would act on the whole page, and the metadata."""
-    for parent in list(root.iter()):
-        for child in list(parent):
-            if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
-                parent.remove(child)
 
 
 def _references(element: ET.Element) -> set[str]:

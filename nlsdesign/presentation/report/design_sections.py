@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...design import CamDesign, Cause, ToleranceResult
+from ...design import CamDesign, ToleranceResult
 from ...foundation.errors import NlsError
 from ...foundation.quantity import three_digits
 from ...foundation.written_numbers import prefixed, shared_prefix
@@ -252,7 +252,11 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             caption="95 % of the springs stay below.",
             means=f"95 % of {len(result.errors)} made springs are within {built} rms as "
             f"built{after}. {_advice(result)}",
-            assumed="; ".join(dict.fromkeys(_reason(c.cause) for c in result.causes if c.cause.assumed)),
+            assumed="; ".join(
+                dict.fromkeys(
+                    c.cause.source.removeprefix("assumed: ") for c in result.causes if c.cause.assumed
+                )
+            ),
         ),
         FigureSection(
             "Torque of made springs",
@@ -275,10 +279,6 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             folded=True,
         ),
     ]
-
-
-def _reason(cause: Cause) -> str:
-    return cause.source.removeprefix("assumed: ")
 
 
 def _advice(result: ToleranceResult) -> str:

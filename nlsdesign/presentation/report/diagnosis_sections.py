@@ -147,17 +147,28 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
     verdict
         Result of a diagnosis.
     """
+    reasons = suspicions(verdict)
+    others = [text for text in verdict.findings if text not in reasons]
+    numbers = fitted_numbers(verdict.fits)
+    columns = ("block", "record", "used", "before", "after", "noise", "unit", "after / noise")
+    rows = tuple(_gap_row(g) for g in verdict.gaps)
+    caption = "Root mean square error of every block on every record."
     parts = [
         _blocks(verdict),
-        *_findings(verdict),
+        *_list("Findings", "finding", others, "What was noticed besides the errors of the blocks."),
         *_error_figures(verdict),
         *_candidates(verdict),
         *_shape_figures(verdict),
-        *_numbers(verdict),
-        *_next_steps(verdict),
+        *fitted_table(numbers, f"{'with' if verdict.effects else 'without'} what was added"),
+        *_list(
+            "What to measure next",
+            "experiment",
+            verdict.next_steps,
+            "Experiments that would tell apart what these records leave open.",
+        ),
         *_left_out(verdict),
         *_circumstances(verdict),
-        _all_gaps(verdict),
+        TableSection("All blocks and records", columns, rows, caption=caption, folded=True),
     ]
     card = VerdictSection(
         "Verdict",
@@ -195,13 +206,6 @@ def _blocks(verdict: Verdict) -> TableSection:
     return TableSection("Where", columns, tuple(rows), caption=caption, marked=marked)
 
 
-def _findings(verdict: Verdict) -> list[Section]:
-    """Return what was noticed besides the errors of the blocks and what the card says already."""
-    reasons = suspicions(verdict)
-    others = [text for text in verdict.findings if text not in reasons]
-    return _list("Findings", "finding", others, "What was noticed besides the errors of the blocks.")
-
-
 def _error_figures(verdict: Verdict) -> list[Section]:
     """Return the error of each record, and one record over time, of the summed-up block."""
     gaps = [g for g in verdict.gaps if g.block == verdict.block]
@@ -209,6 +213,11 @@ def _error_figures(verdict: Verdict) -> list[Section]:
     course = verdict.course
     held = "held-out" if course.role == "held_out" else "fitted"
     heading = f"A {held} record: {course.record}"
+    if verdict.gap().changed:
+        when, model = "before and after", "as the model has it before and after"
+    else:
+        when = "of the refitted model, to which nothing was added"
+        model = "as the refitted model has it, to which nothing was added"
     series = HeldOut(
         course.time, course.measured, course.before, course.after, course.quantity, course.unit, course.noise,
         heading,
@@ -216,30 +225,18 @@ def _error_figures(verdict: Verdict) -> list[Section]:
     return [
         FigureSection(
             f"Error of each record: {verdict.block}", gap_bars(errors, unit=gaps[0].unit),
-            caption=f"Root mean square error {_when(verdict)}; the line across is what noise alone leaves.",
+            caption=f"Root mean square error {when}; the line across is what noise alone leaves.",
             means="Where a bar ends at the line, the model explains the record down to its noise. "
             "Records marked as held out were used by no fit.",
         ),
         FigureSection(
             heading, held_out_series(series),
-            caption=f"Above: {course.quantity}, as measured and {_model(verdict)}. Below: the "
+            caption=f"Above: {course.quantity}, as measured and {model}. Below: the "
             "difference. Where a line is interrupted, samples do not count.",
             means="All curves have passed the filter of the block, so the errors in the legend are those "
             "of this record in the bars and tables.",
         ),
     ]  # fmt: skip
-
-
-def _when(verdict: Verdict) -> str:
-    return (
-        "before and after" if verdict.gap().changed else "of the refitted model, to which nothing was added"
-    )
-
-
-def _model(verdict: Verdict) -> str:
-    if verdict.gap().changed:
-        return "as the model has it before and after"
-    return "as the refitted model has it, to which nothing was added"
 
 
 def _candidates(verdict: Verdict) -> list[Section]:
@@ -296,12 +293,6 @@ def _with_unit_of(abscissa: str, model: FlatModel) -> str:
     return f"{abscissa} in {typeset_unit(model.variable(abscissa).unit) or '1'}"
 
 
-def _numbers(verdict: Verdict) -> list[Section]:
-    """Return the declared numbers after the refit, those that left what was declared highlighted."""
-    numbers = fitted_numbers(verdict.fits)
-    return fitted_table(numbers, f"{'with' if verdict.effects else 'without'} what was added")
-
-
 def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
     """Return the table of refitted numbers, highlighted those that left what was declared."""
     if not numbers:
@@ -325,13 +316,6 @@ def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
     )
     columns = ("number", "declared", "spread", "refitted", "unit", "moved")
     return [TableSection("Refitted numbers", columns, rows, caption=caption, marked=beyond)]
-
-
-def _next_steps(verdict: Verdict) -> list[Section]:
-    return _list(
-        "What to measure next", "experiment", verdict.next_steps,
-        "Experiments that would tell apart what these records leave open.",
-    )  # fmt: skip
 
 
 def _left_out(verdict: Verdict) -> list[Section]:
@@ -381,13 +365,6 @@ def _circumstances(verdict: Verdict) -> list[Section]:
         heads = ("criterion", "value", "meaning")
         sections.append(TableSection("Criteria", heads, settings, caption=caption, folded=True))
     return sections
-
-
-def _all_gaps(verdict: Verdict) -> TableSection:
-    columns = ("block", "record", "used", "before", "after", "noise", "unit", "after / noise")
-    rows = tuple(_gap_row(g) for g in verdict.gaps)
-    caption = "Root mean square error of every block on every record."
-    return TableSection("All blocks and records", columns, rows, caption=caption, folded=True)
 
 
 def _gap_row(gap: RecordGap) -> tuple[str, ...]:

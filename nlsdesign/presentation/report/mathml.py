@@ -83,9 +83,16 @@ def _layout(e: Any) -> str:
     if e.is_Mul or (e.is_Pow and e.exp.could_extract_minus_sign()):
         return _product(e)
     if e.is_Pow:
-        return _power(e)
+        if e.exp == sympy.Rational(1, 2):
+            return f"<msqrt>{_layout(e.base)}</msqrt>"
+        base = _layout(e.base) if e.base.is_Symbol or e.base.is_Function else _bracketed(e.base)
+        return f"<msup>{base}{_layout(e.exp)}</msup>"
     if isinstance(e, sympy.Piecewise):
-        return _cases(e)
+        rows = "".join(
+            f"<mtr><mtd>{_layout(value)}</mtd><mtd>{_condition(condition)}</mtd></mtr>"
+            for value, condition in e.args
+        )
+        return _group(f"<mo>{{</mo><mtable>{rows}</mtable>")
     if e.is_Relational:
         relation = escape(_RELATIONS.get(e.rel_op, e.rel_op))
         return _group(f"{_layout(e.lhs)}<mo>{relation}</mo>{_layout(e.rhs)}")
@@ -132,13 +139,6 @@ def _product(e: Any) -> str:
     return _group("<mo>⋅</mo>".join(_bracketed(f) if f.is_Add else _layout(f) for f in factors))
 
 
-def _power(e: Any) -> str:
-    if e.exp == sympy.Rational(1, 2):
-        return f"<msqrt>{_layout(e.base)}</msqrt>"
-    base = _layout(e.base) if e.base.is_Symbol or e.base.is_Function else _bracketed(e.base)
-    return f"<msup>{base}{_layout(e.exp)}</msup>"
-
-
 def _function(e: Any) -> str:
     name = type(e).__name__ if not hasattr(e, "name") else str(e.name)
     arguments = "<mo>,</mo>".join(_layout(a) for a in sorted(e.args, key=str)) if isinstance(
@@ -147,14 +147,6 @@ def _function(e: Any) -> str:
         opening, closing = _FENCES[name]
         return _group(f"<mo>{opening}</mo>{arguments}<mo>{closing}</mo>")
     return _group(f"<mi>{escape(_FUNCTIONS.get(name, name))}</mi><mo>(</mo>{arguments}<mo>)</mo>")
-
-
-def _cases(e: Any) -> str:
-    rows = "".join(
-        f"<mtr><mtd>{_layout(value)}</mtd><mtd>{_condition(condition)}</mtd></mtr>"
-        for value, condition in e.args
-    )
-    return _group(f"<mo>{{</mo><mtable>{rows}</mtable>")
 
 
 def _condition(condition: Any) -> str:

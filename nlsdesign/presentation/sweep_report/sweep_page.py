@@ -164,7 +164,7 @@ def write_sweep_report(
     numbers = [int(table.values["point"][row]) for row in listed[:MOST_DECKS]]
     decks, missing = write_decks(table, numbers, folder)
     remarks += missing
-    names = _answer_order(table, ranked)
+    names = tuple(dict.fromkeys([*ranked.judged, *(column.name for column in table.answers)]))
     sensitivities, refusal = _sensitivities(table, answers, names)
     remarks += refusal
     content = PageContent(table, ranked, shown_points(table, ranked), names, sensitivities, points_file)
@@ -212,10 +212,6 @@ def usual_requirements(table: SweepTable) -> list[Requirement]:
 def _brief(text: str) -> str:
     """Return a text for the head of the page; of a digest its beginning, the whole stands at the end."""
     return text[:12] if len(text) == 64 and not text.strip("0123456789abcdef") else text
-
-
-def _answer_order(table: SweepTable, ranked: RankedPoints) -> tuple[str, ...]:
-    return tuple(dict.fromkeys([*ranked.judged, *(column.name for column in table.answers)]))
 
 
 def _sensitivities(
