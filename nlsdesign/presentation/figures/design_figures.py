@@ -53,10 +53,8 @@ def design_picture(design: CamDesign) -> Figure:
     figure, axes = panels(2, 1, height=4.0, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
         _draw(panel, design, angle)
-    low, high = (
-        min(panel.dataLim.y0 for panel in axes),
-        max(panel.dataLim.y1 for panel in axes),
-    )
+    high = max(float(panel.dataLim.y1) for panel in axes)
+    low = min(float(panel.dataLim.y0) for panel in axes)
     low -= 0.08 * (wide - left) * MM  # room for the dimensions
     for panel in axes:
         panel.set_xlim(left * MM, wide * MM)
@@ -157,6 +155,14 @@ def _end_of_cable(contour: Contour, reach: float) -> Array:
     """Return where the drawn cable ends: at its anchor, or a little outside the cam where it is parallel."""
     near = np.isfinite(contour.anchor_distance) and contour.anchor_distance < 5.0 * reach
     return np.array([contour.anchor_distance if near else 1.9 * reach, 0.0])
+
+
+def _halves(contour: Contour, parallel: bool) -> list[Array]:
+    if not parallel:
+        return list(contour.outlines())
+    # Of a cam with a parallel cable only the lip is designed; the body behind it is closed over the centre.
+    points = contour.points
+    return [np.vstack([points, [[0.0, 0.0]], points[:1]])]
 
 
 def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: float) -> None:
@@ -437,7 +443,12 @@ def pareto_front(front: ParetoFront) -> Figure:
     if len(labels) == 3:
         axes.set_title(labels[2])
     legend(axes)
-    return described(figure, _title_of_goal(front))
+    low, high = front.shown.min(axis=0), front.shown.max(axis=0)
+    ranges = (
+        f"{goal} {with_unit(f'{significant(float(a))} to {significant(float(b))}', unit)}"
+        for goal, unit, a, b in zip(front.goals, front.units, low, high, strict=True)
+    )
+    return described(figure, f"Front of {len(front.points)} designs: " + ", ".join(ranges) + ".")
 
 
 def _steps(front: ParetoFront) -> list[list[int]]:
@@ -456,12 +467,3 @@ def _range(front: ParetoFront, values: np.ndarray) -> str:
     ends = dict.fromkeys(typeset_number(float(value)) for value in (values.min(), values.max()))
     unit = front.units[2]
     return with_unit(" to ".join(ends), "" if unit == "1" else unit)
-
-
-def _title_of_goal(front: ParetoFront) -> str:
-    low, high = front.shown.min(axis=0), front.shown.max(axis=0)
-    ranges = (
-        f"{goal} {with_unit(f'{typeset_number(float(a))} to {typeset_number(float(b))}', unit)}"
-        for goal, unit, a, b in zip(front.goals, front.units, low, high, strict=True)
-    )
-    return f"Front of {len(front.points)} designs: " + ", ".join(ranges) + "."

@@ -73,8 +73,10 @@ def report_text(
     """Return a report as text; the same for the same sections."""
     pieces = list(sections)
     entries = _entries(folder, pieces)
-    scripts = ["report.js", *(piece.script for piece in pieces if piece.script)]
-    script = "\n".join(_source(name) for name in dict.fromkeys(scripts))
+    script = "\n".join(
+        _source(name)
+        for name in dict.fromkeys(["report.js", *[section.script for section in pieces if section.script]])
+    )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     light, dark = (
         {
