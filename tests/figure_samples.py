@@ -41,7 +41,9 @@ from nlsdesign.presentation.figures.before_after import (
     candidate_shares,
     held_out_series,
 )
-from nlsdesign.presentation.figures.cam_motion import cam_motion
+from nlsdesign.presentation.figures.cam_motion import CamMotion, cam_motion
+from nlsdesign.presentation.figures.loop_evaluation import coupled_stability_map
+from nlsdesign.presentation.figures.over_time import ClosedLoopRun
 from nlsdesign.presentation.figures.sweep_figures import (
     MarkedQuantile,
     PointKinds,

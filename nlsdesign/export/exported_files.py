@@ -227,7 +227,6 @@ def _commented(path: Path, size: int, kind: str) -> ExportedFile | None:
     if len(decks) > 1:
         edited = edited or f"it names {len(decks)} decks: {', '.join(sorted(decks))}"
     digest = whole or (line[2] if line else "") or (stamp.deck if stamp else "")
-    kind = "Modelica" if path.suffix == ".mo" else "C"
     return ExportedFile(path, kind, line[1] if line else "", digest, _macro(text, "PARENT_DIGEST"), edited)
 
 

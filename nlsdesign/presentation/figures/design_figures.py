@@ -445,7 +445,7 @@ def pareto_front(front: ParetoFront) -> Figure:
     legend(axes)
     low, high = front.shown.min(axis=0), front.shown.max(axis=0)
     ranges = (
-        f"{goal} {with_unit(f'{significant(float(a))} to {significant(float(b))}', unit)}"
+        f"{goal} {with_unit(f'{typeset_number(float(a))} to {typeset_number(float(b))}', unit)}"
         for goal, unit, a, b in zip(front.goals, front.units, low, high, strict=True)
     )
     return described(figure, f"Front of {len(front.points)} designs: " + ", ".join(ranges) + ".")

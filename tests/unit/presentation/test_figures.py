@@ -20,8 +20,8 @@ from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRang
 from nlsdesign.foundation.quantity import typeset_number
 from nlsdesign.presentation import figures
 from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
-from nlsdesign.presentation.figures.cam_motion import MARKER, cam_motion, cam_picture
-from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look, significant
+from nlsdesign.presentation.figures.cam_motion import MARKER, CamMotion, cam_motion, cam_picture
+from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look
 from nlsdesign.presentation.figures.svg import svg_text, thinned
 from tests import figure_samples as samples
 from tests.selection import quick_only
