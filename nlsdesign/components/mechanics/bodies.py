@@ -152,9 +152,9 @@ class Free(Body):
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the effort that acts on the body from outside, in the unit of the domain."""
 
-    @abstractmethod
     def inertia_of(self, scope: Scope) -> Expression:
         """Return the inertia or mass."""
+        return scope.parameter(self.inertia_name)
 
     def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
         """Newton: inertia × acceleration = sum of efforts."""
@@ -189,10 +189,6 @@ class Inertia(Free):
         """Return the torque from outside, or that of the drive."""
         return self.commanded(scope, motion)
 
-    def inertia_of(self, scope: Scope) -> Expression:
-        """Return J."""
-        return scope.parameter("inertia")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Mass(Free):
@@ -208,10 +204,6 @@ class Mass(Free):
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the force from outside, or that of the drive."""
         return self.commanded(scope, motion)
-
-    def inertia_of(self, scope: Scope) -> Expression:
-        """Return m."""
-        return scope.parameter("mass")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,10 +240,6 @@ class GearedMotor(Free):
         torque = scope.parameter("gear_ratio") * scope.parameter("torque_constant") * current
         scope.signal("drive_torque", torque, "N*m", f"torque of {scope.path} at the gear's output")
         return torque
-
-    def inertia_of(self, scope: Scope) -> Expression:
-        """Return J."""
-        return scope.parameter("inertia")
 
 
 @dataclass(frozen=True, kw_only=True)

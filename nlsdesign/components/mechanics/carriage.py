@@ -46,7 +46,3 @@ class LinearDrive(Free):
         force = scope.parameter("force_constant") * voltage
         scope.signal("drive_force", force, "N", f"force of {scope.path} on the carriage")
         return force
-
-    def inertia_of(self, scope: Scope) -> Expression:
-        """Return m."""
-        return scope.parameter("mass")

@@ -30,10 +30,6 @@ class ElectricMotor(Free):
     current_limit: Quantity = parameter("A", "largest current of the amplifier", minimum=1e-6, maximum=1e4)
     voltage_limit: Quantity = parameter("V", "largest voltage of the supply", minimum=1e-3, maximum=1e5)
 
-    def inertia_of(self, scope: Scope) -> Expression:
-        """Return J."""
-        return scope.parameter("inertia")
-
     def _torque(self, scope: Scope, current: Expression, voltage: Expression) -> Expression:
         """Return k·I and give names to the powers at the winding."""
         loss = scope.parameter("resistance") * current * current

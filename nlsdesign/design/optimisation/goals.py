@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import casadi as ca
 
@@ -56,16 +56,34 @@ class Goal(ABC):
 
 
 @dataclass(frozen=True)
-class TorqueError(Goal):
-    """Mean over the angle of the squared torque error."""
+class SquaredTorqueGoal(Goal):
+    """Base of the goals that are a mean square of a torque."""
 
-    def measured(self, design: DesignPoint) -> GoalMeasure:
-        """Return the rms torque error."""
-        return rms_of_mean_square("rms torque error", design.mean_square_error, design)
+    what: ClassVar[str]
+    """Of which torque its root is."""
+
+    @abstractmethod
+    def mean_square(self, design: DesignPoint) -> Expression:
+        """Return the mean square in (N·m)²."""
 
     def cost(self, design: DesignPoint) -> Expression:
-        """Return (rms error / 0.1 % of the largest torque)²."""
-        return design.mean_square_error / (1e-3 * design.target.largest) ** 2
+        """Return (root of the mean square / 0.1 % of the largest torque)²."""
+        return self.mean_square(design) / (1e-3 * design.target.largest) ** 2
+
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the root of the mean square."""
+        return rms_of_mean_square(self.what, self.mean_square(design), design)
+
+
+@dataclass(frozen=True)
+class TorqueError(SquaredTorqueGoal):
+    """Mean over the angle of the squared torque error."""
+
+    what: ClassVar[str] = "rms torque error"
+
+    def mean_square(self, design: DesignPoint) -> Expression:
+        """Return the mean square error."""
+        return design.mean_square_error
 
 
 @dataclass(frozen=True)
@@ -211,7 +229,7 @@ class LeastMass(Goal):
 
 
 @dataclass(frozen=True)
-class InsensitiveStiffness(Goal):
+class InsensitiveStiffness(SquaredTorqueGoal):
     """Torque error that a deviation of the rubber's stiffness leaves when the pretension is set by its force.
 
     All moduli deviate by one factor. If the pretension stays as a length, the torque deviates by that factor
@@ -227,20 +245,15 @@ class InsensitiveStiffness(Goal):
         Relative deviation of the stiffness; its rms torque error counts as one of :class:`TorqueError` does.
     """
 
+    what: ClassVar[str] = "rms torque error by stiffness"
+
     deviation: float = 0.1
 
     def __post_init__(self) -> None:
         _store(self, "deviation", "1", 1e-6, 1.0)
 
-    def cost(self, design: DesignPoint) -> Expression:
-        """Return (rms error by the deviation / 0.1 % of the largest torque)²."""
-        return self._mean_square(design) / (1e-3 * design.target.largest) ** 2
-
-    def measured(self, design: DesignPoint) -> GoalMeasure:
-        """Return the rms torque error by the deviation."""
-        return rms_of_mean_square("rms torque error by stiffness", self._mean_square(design), design)
-
-    def _mean_square(self, design: DesignPoint) -> Expression:
+    def mean_square(self, design: DesignPoint) -> Expression:
+        """Return the mean square error by the deviation."""
         force, stiffness = design.forces, design.stiffnesses
         per_factor = force - stiffness * force[0] / stiffness[0]
         squared = (self.deviation * design.elements * design.lever_arms * per_factor) ** 2
@@ -294,7 +307,7 @@ class EnergyLost(Goal):
 
 
 @dataclass(frozen=True)
-class BothStrokes(Goal):
+class BothStrokes(SquaredTorqueGoal):
     """Mean square torque error against the target over the angle, both strokes and a band of frequencies.
 
     At a frequency of zero this is the goal :class:`TorqueError`.
@@ -312,6 +325,8 @@ class BothStrokes(Goal):
         If there is no frequency, or a number lies outside its range.
     """
 
+    what: ClassVar[str] = "rms torque error on both strokes"
+
     frequencies: Sequence[Quantity | float]
     amplitude: Quantity | float | None = None
 
@@ -325,15 +340,8 @@ class BothStrokes(Goal):
         object.__setattr__(self, "frequencies", tuple(_frequency(name, f) for f in self.frequencies))
         object.__setattr__(self, "amplitude", _amplitude(name, self.amplitude))
 
-    def cost(self, design: DesignPoint) -> Expression:
-        """Return (rms error / 0.1 % of the largest torque)²."""
-        return self._mean_square(design) / (1e-3 * design.target.largest) ** 2
-
-    def measured(self, design: DesignPoint) -> GoalMeasure:
-        """Return the rms error."""
-        return rms_of_mean_square("rms torque error on both strokes", self._mean_square(design), design)
-
-    def _mean_square(self, design: DesignPoint) -> Expression:
+    def mean_square(self, design: DesignPoint) -> Expression:
+        """Return the mean square error over all strokes."""
         amplitude = None if self.amplitude is None else plain(self.amplitude)
         cycles = [steady_cycle(design, plain(f), amplitude) for f in self.frequencies]
         return sum((cycle.mean_square_error for cycle in cycles), start=Expression(0)) / len(cycles)

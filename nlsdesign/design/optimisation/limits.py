@@ -375,10 +375,14 @@ class ParameterRange(Limit):
         Least and largest value of the parameter, in SI.
     """
 
+    possible: ClassVar[tuple[str, float, float]]
+    """Unit of the parameter, and the least and largest number that either end may be."""
+
     minimum: Quantity | float
     maximum: Quantity | float
 
-    def _checked(self, unit: str, lowest: float, highest: float) -> None:
+    def __post_init__(self) -> None:
+        unit, lowest, highest = self.possible
         self.number("minimum", unit, lowest, highest)
         self.number("maximum", unit, lowest, highest)
         if plain(self.minimum) > plain(self.maximum):
@@ -452,11 +456,7 @@ class PretensionRange(ParameterRange):
         Least and largest extension, in m.
     """
 
-    minimum: Quantity | float
-    maximum: Quantity | float
-
-    def __post_init__(self) -> None:
-        self._checked("m", 0.0, 1.0)
+    possible: ClassVar[tuple[str, float, float]] = ("m", 0.0, 1.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides."""
@@ -474,11 +474,7 @@ class AreaRange(ParameterRange):
         Least and largest cross-section, in m².
     """
 
-    minimum: Quantity | float
-    maximum: Quantity | float
-
-    def __post_init__(self) -> None:
-        self._checked("m^2", 1e-8, 0.1)
+    possible: ClassVar[tuple[str, float, float]] = ("m^2", 1e-8, 0.1)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides for each piece."""
@@ -496,11 +492,7 @@ class RestLengthRange(ParameterRange):
         Least and largest rest length, in m.
     """
 
-    minimum: Quantity | float
-    maximum: Quantity | float
-
-    def __post_init__(self) -> None:
-        self._checked("m", 1e-4, 1.0)
+    possible: ClassVar[tuple[str, float, float]] = ("m", 1e-4, 1.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides for each piece."""
@@ -518,11 +510,7 @@ class AnchorDistance(ParameterRange):
         Least and largest distance, in m.
     """
 
-    minimum: Quantity | float
-    maximum: Quantity | float
-
-    def __post_init__(self) -> None:
-        self._checked("m", 1e-3, 1e6)
+    possible: ClassVar[tuple[str, float, float]] = ("m", 1e-3, 1e6)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides."""
