@@ -223,13 +223,15 @@ _FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "cou
 @analyse.command(
     epilog=examples(
         "nlsdesign analyse loop --deck austin2015_figure_consistent",
-        "nlsdesign analyse loop --deck austin2015_figure_consistent --law scheduled "
+        "nlsdesign analyse loop --deck austin2015_figure_consistent --proportional '32 rad/s/N/m'",
+        "nlsdesign analyse loop --deck austin2015_figure_consistent "
         "--bandwidth '10 Hz' --amplitude '0.5 N*m' --json",
     )
 )
 @deck_option
-@click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
-              help="A PID, or speed by tangent stiffness.")  # fmt: skip
+@click.option("--law", type=click.Choice(list(GAINS)), default=None,
+              help="A PID, or speed by tangent stiffness; by default the latter, as in export, and a PID "
+              "where a gain of it is given.")  # fmt: skip
 @click.option("--bandwidth", type=Number("Hz", above=0.0), default=None,
               help="Of the scheduled law; by default 12 Hz at 1 kHz.")  # fmt: skip
 @click.option("--proportional", type=Number("rad/s/N/m", above=0.0), default=None,
@@ -278,6 +280,8 @@ def loop(
     from ..presentation.figures import write_loop_figures
     from ..regeneration import range_remarks, usual_last
 
+    if options["law"] is None:
+        options["law"] = "scheduled" if all(options[name] is None for name in _GAINS) else "pid"
     law, declared = _law(options), declare(load_deck(deck_name))
     fixed, moved = cascade_loops(
         flatten(declared), flatten(with_moved_load(declared)),
