@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ....foundation.arrays import Array
+from ....foundation.errors import NlsError
 from ....foundation.text_files import write_table
 from ....model import FlatModel
 from ....model.roles import measured_motion, motor_of, series_spring
@@ -43,7 +44,7 @@ from .responses import (
     torque_resolution,
     zero_torque,
 )
-from .spread_margins import SpreadMargins, spread_margins
+from .spread_margins import SpreadMargins, margins_alone, spread_margins
 
 FREQUENCIES = (0.1, 11.0, 20)
 """First and last in Hz, and how many."""
@@ -295,6 +296,40 @@ def cascade_loops(
         for plant in plants
     )
     return first, second
+
+
+def with_margin(
+    plant: FlatModel, gain: str, *, last: float, given: bool, sample_time: float, **law: Any
+) -> tuple[FlatModel, str]:
+    """Return the controller of a plant and a sentence on its margins; a gain that was not given has them.
+
+    Parameters
+    ----------
+    plant
+        The machine as declared.
+    gain
+        Parameter of the controller that is lowered where it was not given and lacks the margins.
+    last
+        Angle to which margins are taken, in rad.
+    given
+        Whether somebody asked for this gain.
+    sample_time
+        In s.
+    **law
+        As for :func:`~nlsdesign.feedback.control.torque_controller`: law, gains, velocity.
+    """
+    controller = torque_controller(plant, sample_time=sample_time, **law)
+    try:
+        loop, _ = cascade_loops(plant, plant, delay=1, sample_time=sample_time, **law)
+        found = margins_alone(loop, gain, last=last)
+    except NlsError as error:  # not every machine has a cascade
+        return controller, f"margins of {gain} are not judged: {error}"
+    if found.kept:
+        return controller, found.margins()
+    (lacks,) = found.findings()
+    if given or math.isnan(found.enough):
+        return controller, lacks
+    return controller.with_values({gain: found.enough}), f"{lacks}, and is taken"
 
 
 def json_number(value: float) -> float | str | None:
