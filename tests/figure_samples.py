@@ -31,7 +31,6 @@ from nlsdesign.feedback.control import (
 )
 from nlsdesign.feedback.control.evaluation.linear_loop import LinearLoop
 from nlsdesign.feedback.control.evaluation.margins import CoupledStability
-from nlsdesign.feedback.observer import ErrorStability
 from nlsdesign.foundation.quantity import degrees
 from nlsdesign.model import Variable
 from nlsdesign.presentation import figures
@@ -42,8 +41,9 @@ from nlsdesign.presentation.figures.before_after import (
     candidate_shares,
     held_out_series,
 )
-from nlsdesign.presentation.figures.cam_motion import cam_motion
-from nlsdesign.presentation.figures.over_angle import observer_stability
+from nlsdesign.presentation.figures.cam_motion import CamMotion, cam_motion
+from nlsdesign.presentation.figures.loop_evaluation import coupled_stability_map
+from nlsdesign.presentation.figures.over_time import ClosedLoopRun
 from nlsdesign.presentation.figures.sweep_figures import (
     MarkedQuantile,
     PointKinds,
@@ -62,7 +62,7 @@ TARGET = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0, toleranc
 TIME = np.linspace(0.0, 1.0, 4001)
 
 
-def motion() -> figures.CamMotion:
+def motion() -> CamMotion:
     """A convex cam whose radius of curvature falls from 9 to 4 mm, with a stiffening rubber."""
     nodes = np.linspace(0.0, 1.3, 14)
     contour = contour_from_curvature(
@@ -107,7 +107,7 @@ def loop(lag: float) -> tuple[np.ndarray, np.ndarray]:
     return 0.7 * np.sin(phase), 2.0 * np.sin(phase + lag)
 
 
-def closed_loop() -> figures.ClosedLoopRun:
+def closed_loop() -> ClosedLoopRun:
     signals = {
         "reference": np.interp(TIME + 0.01, TIME, torque()),
         "plant.spring.torque": torque(),
@@ -140,7 +140,6 @@ SHARES = (
     CandidateShare("coulomb_friction", 0.97, True),
     CandidateShare("force_sensor_delay", -0.02),
 )
-STABILITY = ErrorStability(np.linspace(-0.9, 0.9, 31), np.full(31, 0.97), False, True)
 
 
 def against_target() -> figures.Figure:
@@ -284,7 +283,6 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         {"F_M": chart(), "published": chart(3.0, rank=4)}
     ),
     "stability": lambda: figures.stability_over_angle({"model": chart()}),
-    "observer_stability": lambda: observer_stability({"F_M": STABILITY}, sample_time=1e-3),
     "observer_error": lambda: figures.observer_error(TIME, torque(), {"F_M": torque() + 0.01}),
     "closed_loop": lambda: figures.closed_loop(
         closed_loop(), differences={"torque": 1e-8 * TIME}, bound=1e-6
@@ -304,7 +302,7 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "torque_responses": lambda: figures.torque_responses(loop_responses(), saturation()),
     "impedance": lambda: figures.impedance_over_frequency(impedance()),
     "margins": lambda: figures.margins_over_angle([loop_margins()]),
-    "coupled_stability": lambda: figures.coupled_stability_map(coupled()),
+    "coupled_stability": lambda: coupled_stability_map(coupled()),
     "beside_points": lambda: figures.curves_beside_points(
         [figures.PointPanel("Torque", "torque in N·m", {"one": BESIDE, "two": BESIDE}, {"one": BESIDE})],
         across="frequency in Hz",

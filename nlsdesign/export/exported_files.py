@@ -211,15 +211,7 @@ def _text(path: Path, size: int) -> str:
         raise ExportError(str(path), f"is no text in UTF-8: {error.reason} at byte {error.start}") from None
 
 
-def _c_file(path: Path, size: int) -> ExportedFile | None:
-    return _commented(path, size, "C")
-
-
-def _modelica(path: Path, size: int) -> ExportedFile | None:
-    return _commented(path, size, "Modelica")
-
-
-def _commented(path: Path, size: int, kind: str) -> ExportedFile | None:
+def _commented(path: Path, size: int) -> ExportedFile | None:
     """Return what the comments of a text say; C and Modelica have the same comments."""
     text = _text(path, size)
     stamp, line, whole = stamp_of(text), _DECK_LINE.search(text), _macro(text, "DECK_DIGEST")
@@ -234,6 +226,7 @@ def _commented(path: Path, size: int, kind: str) -> ExportedFile | None:
     if len(decks) > 1:
         edited = edited or f"it names {len(decks)} decks: {', '.join(sorted(decks))}"
     digest = whole or (line[2] if line else "") or (stamp.deck if stamp else "")
+    kind = "Modelica" if path.suffix == ".mo" else "C"
     return ExportedFile(path, kind, line[1] if line else "", digest, _macro(text, "PARENT_DIGEST"), edited)
 
 
@@ -330,4 +323,10 @@ def _deck(path: Path, size: int) -> ExportedFile | None:
     return ExportedFile(path, "deck", assembly.name, digest, parent, edited)
 
 
-_READERS = {".c": _c_file, ".h": _c_file, ".mo": _modelica, ".fmu": _fmu, ".toml": _deck}
+_READERS = {
+    ".c": _commented,
+    ".h": _commented,
+    ".mo": _commented,
+    ".fmu": _fmu,
+    ".toml": _deck,
+}

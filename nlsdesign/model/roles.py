@@ -134,11 +134,6 @@ def moved_load(model: FlatModel, name: str | None = None) -> MovingBody:
     )
 
 
-def is_actuator(model: FlatModel) -> bool:
-    """Tell whether a model has a spring and a motor, as a series elastic actuator does."""
-    return bool(model.springs) and any(body.motor for body in model.bodies)
-
-
 def _named(kind: str, name: str, parts: dict[str, Named]) -> Named:
     if name not in parts:
         raise unknown_name(kind, name, parts)

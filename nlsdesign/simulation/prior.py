@@ -140,7 +140,14 @@ class Prior:
     @property
     def root(self) -> Array:
         """R with R·Rᵀ = covariance, shape (numbers, numbers): the x are R times independent unit normals."""
-        return _root(self.covariance)
+        # Of the correlation the symmetric root, which follows the covariance without jumps: the same random
+        # numbers draw comparable values before and after something was learned.
+        size = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        scale = np.where(size > 0.0, size, 1.0)
+        strength, axes = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        strength = np.where(strength > _LEAST_STRENGTH, strength, 0.0)
+        result: Array = size[:, None] * ((axes * np.sqrt(strength)) @ axes.T)
+        return result
 
     def place(self, name: str) -> int:
         """Return the place of a number in the vectors.
@@ -269,17 +276,3 @@ def declared_prior(model: FlatModel, longest_row: int = LONGEST_ROW) -> Prior:
 
 def _row(name: str) -> str:
     return name.partition("[")[0]
-
-
-def _root(covariance: Array) -> Array:
-    """Return R with R·Rᵀ = covariance, which may be singular.
-
-    For the correlation it is the symmetric one, which follows the covariance without jumps: the same random
-    numbers draw comparable values before and after something was learned.
-    """
-    size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    scale = np.where(size > 0.0, size, 1.0)
-    strength, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
-    strength = np.where(strength > _LEAST_STRENGTH, strength, 0.0)
-    result: Array = size[:, None] * ((axes * np.sqrt(strength)) @ axes.T)
-    return result

@@ -190,7 +190,12 @@ def integrate_explicitly(
             else:
                 proposed = taken * (max(0.2, 0.9 * error**-0.125) if error < np.inf else 0.2)
                 if proposed < SMALLEST_STEP * max(abs(now), end - times[k]):
-                    raise _no_step(model, now)
+                    raise ConvergenceError(
+                        f"simulation of {model.name}",
+                        f"no step is short enough at t = {now:g} s",
+                        next_step="check the inputs for jumps beyond the range of the laws, "
+                        "or start nearer to rest",
+                    )
             done += 1
             if done > budget:
                 if may_change_method and limited_by_stability(model, drives, k, stepper.state, proposed):
@@ -211,11 +216,3 @@ def limited_by_stability(model: FlatModel, drives: Drives, interval: int, x: Arr
     inputs = drives.at(interval, moment)[0]
     jacobian = np.array(slope(moment, x, inputs, model.start(model.parameters)), dtype=float)
     return bool(np.all(np.isfinite(jacobian)) and np.max(np.abs(np.linalg.eigvals(jacobian))) * length > 1.5)
-
-
-def _no_step(model: FlatModel, time: float) -> ConvergenceError:
-    return ConvergenceError(
-        f"simulation of {model.name}",
-        f"no step is short enough at t = {time:g} s",
-        next_step="check the inputs for jumps beyond the range of the laws, or start nearer to rest",
-    )

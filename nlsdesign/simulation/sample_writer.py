@@ -141,7 +141,9 @@ class SampleWriter:
         """Evaluate a block; return its following state."""
         model = self.system.blocks[owner]
         u, columns = self._seen(owner, state)
-        step = ca.Function("step", *_step_of(model))
+        s = model.symbols()
+        results = [ca.densify(s.derivative), ca.densify(s.output)]
+        step = ca.Function("step", [s.state, s.input, s.parameter, s.table], results)
         after, output = step(state, u, self.own_parameters[owner], columns)
         self.known |= {f"{owner}.{v.name}": u[i] for i, v in enumerate(model.inputs)}
         self.known |= {f"{owner}.{v.name}": output[i] for i, v in enumerate(model.outputs)}
@@ -178,11 +180,6 @@ class SampleWriter:
         if own not in places:
             raise unknown_name("variable of the loop", name, [*self.known, *self.system.states])
         return self.own_states[owner][places[own]]
-
-
-def _step_of(model: FlatModel) -> tuple[list[ca.SX], list[ca.SX]]:
-    s = model.symbols()
-    return [s.state, s.input, s.parameter, s.table], [ca.densify(s.derivative), ca.densify(s.output)]
 
 
 def looked_up(table: Table, model: FlatModel, state: ca.MX, u: ca.MX, *, name: str = "look_up") -> ca.MX:

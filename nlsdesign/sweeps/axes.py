@@ -269,14 +269,20 @@ class RandomDraws(AxisSet):
             raise ValueRangeError(f"random draws: names = '{given}'", "is one text, not a list",
                                   next_step=f"write names = ['{given}']")  # fmt: skip
         prior = declared_prior(flatten(subject.base))
-        groups = {key: list(inner) for key, inner in itertools.groupby(prior.names, key=_head)}
+        groups = {
+            key: list(inner)
+            for key, inner in itertools.groupby(prior.names, key=lambda name: name.partition("[")[0])
+        }
         places: dict[str, tuple[int, bool]] = {}
         for head, inner in groups.items():
             shape = len(inner) > LONGEST_ROW
             for name in [f"factor({head})"] if shape else inner:
                 places[name] = (prior.place(inner[0] if shape else name), shape)
         kept = {name: place for name, place in places.items() if not subject.is_chosen(name)}
-        chosen = {name: _chosen(name, places) for name in self.names} if self.names else kept
+        for name in self.names:
+            if name not in places:
+                raise unknown_name("number with a spread", name, places)
+        chosen = {name: places[name] for name in self.names} if self.names else kept
         if not chosen:
             raise ValueRangeError("random draws", "no number of the deck has a spread",
                                   next_step="give numbers a spread")  # fmt: skip
@@ -305,16 +311,6 @@ class RandomDraws(AxisSet):
 
 def _ends_of(ends: Array, at: list[int], shapes: Any, without: float) -> Array:
     return np.where(shapes, without, ends[at]) if len(ends) else np.full(len(at), without)
-
-
-def _head(name: str) -> str:
-    return name.partition("[")[0]
-
-
-def _chosen(name: str, places: Mapping[str, tuple[int, bool]]) -> tuple[int, bool]:
-    if name not in places:
-        raise unknown_name("number with a spread", name, places)
-    return places[name]
 
 
 def _ends(column: SweepColumn, ends: tuple[Any, ...]) -> tuple[float, float]:

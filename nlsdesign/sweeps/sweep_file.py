@@ -43,16 +43,6 @@ _QUESTIONS: Final = {
 }
 
 
-def axis_kinds() -> dict[str, type]:
-    """Return the sets of axes that can stand in a sweep file, by name."""
-    return dict(_AXES)
-
-
-def question_kinds() -> dict[str, type]:
-    """Return the questions that can stand in a sweep file, by name."""
-    return dict(_QUESTIONS)
-
-
 def read_sweep_file(path: Path | str) -> SweepTask:
     """Read and check a sweep.
 

@@ -76,7 +76,9 @@ class Parts:
     def __init__(self, folder: Path, columns: Sequence[SweepColumn]) -> None:
         self._folder, self._columns = folder, tuple(columns)
         self._schema = schema(columns, timed=True)
-        self._next = 1 + max((_number(path) for path in part_files(folder)), default=0)
+        self._next = 1 + max(
+            (int(path.stem) for path in part_files(folder) if path.stem.isdecimal()), default=0
+        )
         self.damaged: list[str] = []
         """Names of parts that could not be read; their points are computed again."""
         self._drop_damaged()
@@ -96,17 +98,14 @@ class Parts:
     def standing(self, count: int, *, with_failed: bool = True) -> Mask:
         """Return which points stand in the parts."""
         mask = np.zeros(count, dtype=bool)
-        for table in self._tables(["point", "status"]):
+        for path in part_files(self._folder):
+            table = read_columns(path, ["point", "status"])
             points = numpy_column(table.column("point"))
             inside = (points >= 0) & (points < count)
             if not with_failed:
                 inside &= numpy_column(table.column("status")) == DONE
             mask[points[inside]] = True
         return mask
-
-    def _tables(self, names: list[str]) -> Iterator[Any]:
-        for path in part_files(self._folder):
-            yield read_columns(path, names)
 
     def write(self, rows: Sequence[Row]) -> None:
         """Write rows as one more part."""
@@ -145,21 +144,15 @@ class Parts:
         order = _Order(self._folder, self._columns)
         target = self._folder / RESULTS_FILE
         pyarrow, _ = libraries()
-        _write(self._folder / TIMINGS_FILE, _timings(order),
+        _write(self._folder / TIMINGS_FILE, (
+            block.rename_columns(["point", "seconds", "worker"])
+            for block in order.blocks(["point", _SECONDS, _WORKER])
+        ),
                pyarrow.schema([("point", pyarrow.int64()), ("seconds", pyarrow.float64()),
                                ("worker", pyarrow.string())]))  # fmt: skip
         names = [column.name for column in self._columns]
         _write(target, order.blocks(names), schema(self._columns))
         return target
-
-
-def _timings(order: _Order) -> Iterator[Any]:
-    for block in order.blocks(["point", _SECONDS, _WORKER]):
-        yield block.rename_columns(["point", "seconds", "worker"])
-
-
-def _number(path: Path) -> int:
-    return int(path.stem) if path.stem.isdecimal() else 0
 
 
 class _Order:

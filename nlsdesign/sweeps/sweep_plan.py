@@ -29,7 +29,12 @@ class PointPlan:
                 "sweep", "has no axes", next_step="give one, such as GridAxis or SobolSample"
             )
         self._sets = [each.bound(subject) for each in axes]
-        _require_room(math.prod(each.count for each in self._sets))
+        count = math.prod(each.count for each in self._sets)
+        if count > _MOST_POINTS:
+            raise ValueRangeError(
+                f"sweep of {count:.4g} points", f"has more than {_MOST_POINTS}, for which no driver has room",
+                next_step="split it by an axis, with a folder for each stretch",
+            )  # fmt: skip
         self.columns: tuple[SweepColumn, ...] = tuple(c for each in self._sets for c in each.columns)
         _require_apart(self.columns)
         _require_alone(self._sets)
@@ -69,14 +74,6 @@ class PointPlan:
             if each.count <= _PROBES**2:
                 content.append([list(map(repr, each.row(k))) for k in range(each.count)])
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
-
-
-def _require_room(count: int) -> None:
-    if count > _MOST_POINTS:
-        raise ValueRangeError(
-            f"sweep of {count:.4g} points", f"has more than {_MOST_POINTS}, for which no driver has room",
-            next_step="split it by an axis, with a folder for each stretch",
-        )  # fmt: skip
 
 
 def _require_apart(columns: Sequence[SweepColumn]) -> None:

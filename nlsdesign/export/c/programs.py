@@ -34,7 +34,10 @@ def sample_inputs(model: FlatModel, real: Real) -> Array:
     """
     columns = np.zeros((SAMPLES, len(model.inputs)))
     for i, variable in enumerate(model.inputs):
-        middle, half = _range(variable)
+        middle, half = variable.start, variable.nominal
+        if variable.plausibility is None and math.isfinite(variable.minimum + variable.maximum):
+            middle = (variable.minimum + variable.maximum) / 2
+            half = (variable.maximum - variable.minimum) / 2
         columns[:, i] = middle + half * _wave(variable, half, float(model.sample_time or 0.0), i)
         for at, bad in ((50, math.nan), (60, math.inf), (70, -math.inf)):
             columns[at + i % 8, i] = bad
@@ -57,12 +60,6 @@ def _wave(variable: Variable, half: float, sample_time: float, number: int) -> A
             1.0, 0.5 * variable.plausibility.largest_rate * sample_time / (half * (0.6 * slow + 0.3 * fast))
         )
     return np.asarray(0.6 * np.sin(slow * k + number) + 0.3 * np.sin(fast * k + 2 * number))
-
-
-def _range(variable: Variable) -> tuple[float, float]:
-    if variable.plausibility is None and math.isfinite(variable.minimum) and math.isfinite(variable.maximum):
-        return (variable.minimum + variable.maximum) / 2, (variable.maximum - variable.minimum) / 2
-    return variable.start, variable.nominal
 
 
 def selftest_source(c: CWriter) -> str:

@@ -6,7 +6,6 @@ import hashlib
 import os
 import re
 import zlib
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -134,9 +133,6 @@ def interface_version(header: str, model: FlatModel) -> str:
     """
     bare = re.sub(r"/\*.*?\*/", " ", header, flags=re.DOTALL)
     lines = [" ".join(line.split()) for line in bare.splitlines() if not line.lstrip().startswith("#")]
-    return f"0x{zlib.crc32(chr(10).join([*filter(None, lines), *_units(model)]).encode()):08x}u"
-
-
-def _units(model: FlatModel) -> Iterator[str]:
-    for group in (model.inputs, model.outputs, model.parameters, model.states):
-        yield from (f"{v.name} {v.unit}" for v in group)
+    groups = (model.inputs, model.outputs, model.parameters, model.states)
+    units = (f"{v.name} {v.unit}" for group in groups for v in group)
+    return f"0x{zlib.crc32(chr(10).join([*filter(None, lines), *units]).encode()):08x}u"

@@ -174,12 +174,9 @@ def _crossing(body: ColumnGraph) -> list[int]:
     )
 
 
-def _fixed_arguments(body: ColumnGraph) -> list[int]:
-    return [k for argument in body.arguments for k in argument if k in body.fixed]
-
-
 def _once(number: int, body: ColumnGraph, crossing: Sequence[int], constants: Mapping[int, str]) -> str:
-    names = dict(constants) | {k: f"a[{i}]" for i, k in enumerate(_fixed_arguments(body))}
+    given = [k for argument in body.arguments for k in argument if k in body.fixed]
+    names = dict(constants) | {k: f"a[{i}]" for i, k in enumerate(given)}
     lines = [_operation(s, body, names) for s in body.steps if _is_fixed(s, body)]
     lines += [f"o[{i}] = {_name(k, names)};" for i, k in enumerate(crossing)]
     text = "\n    ".join(lines)
@@ -216,17 +213,11 @@ def _operation(step: object, graph: ColumnGraph, names: Mapping[int, str]) -> st
         condition = _CONDITIONS[step.code].format(*operands)
         return f"mask m{result} = {condition}; column v{result} = number(m{result}); (void)v{result};"
     if step.code == ca.OP_IF_ELSE_ZERO:
-        where = (
-            f"m{step.operands[0]}" if _is_condition(step.operands[0], graph) else f"({operands[0]} != 0.0)"
-        )
+        where = f"m{step.operands[0]}" if step.operands[0] in graph.conditions else f"({operands[0]} != 0.0)"
         return f"column v{result} = (column)((mask){operands[1]} & {where});"
     if step.code in _LIBRARY:
         return f"column v{result} = {_LIBRARY[step.code]}_of({', '.join(operands)});"
     return f"column v{result} = {_FORMS[step.code].format(*operands)};"
-
-
-def _is_condition(number: int, graph: ColumnGraph) -> bool:
-    return number in graph.conditions
 
 
 def _step(step: object, graph: ColumnGraph, names: Mapping[int, str], held: _Given) -> str:

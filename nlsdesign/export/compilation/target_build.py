@@ -83,7 +83,8 @@ _OWN = ("-std=gnu99",)
 
 def controller_object(source: CSource, processor: Processor, folder: Path) -> Path:
     """Compile the generated code alone, under the warnings that it must pass."""
-    _write_headers(folder)
+    for name in ("math.h", "string.h"):
+        (folder / name).write_text(shell(f"target_{name}"), encoding="utf-8")
     target = folder / f"{source.name}.o"
     run_compiler(
         [*_machine(processor), *_COMMON, *STRICT, "-isystem", folder, "-c", source.source, "-o", target],
@@ -153,8 +154,3 @@ def sized_object(source: CSource, processor: Processor, folder: Path) -> Path:
 
 def _machine(processor: Processor) -> list[str]:
     return ["-target", processor.target, f"-mcpu={processor.features}"]
-
-
-def _write_headers(folder: Path) -> None:
-    for name in ("math.h", "string.h"):
-        (folder / name).write_text(shell(f"target_{name}"), encoding="utf-8")

@@ -177,14 +177,10 @@ def measure_on_target(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-target-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         alone, added = controller_sizes(source, processor, folder)
-        state = _state_size(source, processor, folder)
+        state = section_sizes(sized_object(source, processor, folder)).cleared
         given = sample_inputs(source.model, source.real) if inputs is None else inputs
         run = None if reason else _run(source, processor, folder, np.asarray(given, dtype=float))
     return TargetMeasurement(source, processor, alone, added, state, run, reason)
-
-
-def _state_size(source: CSource, processor: Processor, folder: Path) -> int:
-    return section_sizes(sized_object(source, processor, folder)).cleared
 
 
 def _run(source: CSource, processor: Processor, folder: Path, given: Array) -> TargetRun:

@@ -184,7 +184,8 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
     what = f"instance '{instance}' ({archive})"
     try:
         read = fmpy.read_model_description(str(folder))
-        variables = {v.name: _variable(v) for v in read.modelVariables if _usable(v)}
+        scalars = (v for v in read.modelVariables if v.type in _KINDS and not getattr(v, "dimensions", None))
+        variables = {v.name: _variable(v) for v in scalars}
     except Exception as error:
         # Whatever a damaged description makes the XML and FMI libraries raise.
         raise ExportError(what, f"is not a valid FMU: {_brief(error)}") from error
@@ -221,10 +222,6 @@ def _check_sample_time(what: str, description: FmuDescription) -> None:
         return
     if stated.start is None or not (math.isfinite(stated.start) and stated.start > 0.0):
         raise ExportError(what, f"states a sample time of {stated.start} s, which is not possible")
-
-
-def _usable(variable: Any) -> bool:
-    return variable.type in _KINDS and not getattr(variable, "dimensions", None)
 
 
 def _variable(read: Any) -> FmuScalar:

@@ -189,7 +189,8 @@ class IsolatedWork:
             now = time.monotonic()
             if self.watch.cells[3] != calls:
                 calls, since = self.watch.cells[3], now
-                self._note()
+                row = min(self.watch.cells[2], len(self.times) - 1)
+                self.progress.note(f"{self.times[row]:.3f} of {self.times[-1]:g} s")
             elif now - since > self.patience:
                 raise ExportError(
                     self.watch.thing,
@@ -200,10 +201,6 @@ class IsolatedWork:
             return text[:-1]
         child.ended_within(_GRACE)
         return None
-
-    def _note(self) -> None:
-        row = min(self.watch.cells[2], len(self.times) - 1)
-        self.progress.note(f"{self.times[row]:.3f} of {self.times[-1]:g} s")
 
     def _when(self) -> str:
         row = min(self.watch.cells[2], len(self.times) - 1)

@@ -310,7 +310,7 @@ def write_ssp(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-ssp-") as folder:
         descriptions = unpacked_fmus(fmus, Path(folder))
         check_wires(descriptions, joined)
-        check_signals(descriptions, joined, dict.fromkeys(inputs, _undriven), given)
+        check_signals(descriptions, joined, dict.fromkeys(inputs, lambda time: 0.0), given)
         writer = _Structure(descriptions, joined, given, (tuple(order), tuple(inputs)), version)
         entries: dict[str, bytes] = {STRUCTURE_FILE: writer.structure(Path(path).stem)}
         entries |= writer.values()
@@ -324,10 +324,6 @@ def write_ssp(
             entry.compress_type = zipfile.ZIP_STORED if name.endswith(".fmu") else zipfile.ZIP_DEFLATED
             archive.writestr(entry, content)
     return WrittenSystem(Path(path), tuple(writer.notes))
-
-
-def _undriven(time: float) -> float:
-    return 0.0
 
 
 def _content(file: Path) -> bytes:

@@ -93,7 +93,9 @@ def ranges(function: ca.Function, bounds: Sequence[Sequence[Interval]]) -> list[
         read_graph(function),
         lambda argument, element: bounds[argument][element],
         lambda value: (value, value),
-        combined=lambda operation, operands: _RANGES.get(operation, _anything)(*operands),
+        combined=lambda operation, operands: (
+            _RANGES[operation](*operands) if operation in _RANGES else EVERYTHING
+        ),
     )
     return _of_first_result(values)
 
@@ -128,14 +130,6 @@ def _square(a: Interval) -> Interval:
     return low * low, high * high
 
 
-def _anything(*_: Interval) -> Interval:
-    return EVERYTHING
-
-
-def _choice(_: Interval, a: Interval) -> Interval:
-    return min(a[0], 0.0), max(a[1], 0.0)
-
-
 _RANGES: Mapping[int, Callable[..., Interval]] = {
     ca.OP_ADD: _sum,
     ca.OP_SUB: lambda a, b: _sum(a, _negative(b)),
@@ -146,7 +140,7 @@ _RANGES: Mapping[int, Callable[..., Interval]] = {
     ca.OP_FABS: _size,
     ca.OP_FMIN: lambda a, b: (min(a[0], b[0]), min(a[1], b[1])),
     ca.OP_FMAX: lambda a, b: (max(a[0], b[0]), max(a[1], b[1])),
-    ca.OP_IF_ELSE_ZERO: _choice,
+    ca.OP_IF_ELSE_ZERO: lambda _, a: (min(a[0], 0.0), max(a[1], 0.0)),
     ca.OP_ASSIGN: lambda a: a,
     **dict.fromkeys((ca.OP_SIN, ca.OP_COS, ca.OP_TANH, ca.OP_ERF, ca.OP_SIGN), lambda _: (-1.0, 1.0)),
 }

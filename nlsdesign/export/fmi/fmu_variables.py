@@ -20,7 +20,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Switch, Variable
 from ..c.guarded_step import FIRST_INDEX_BIT, STATUS_BITS
-from .expression_walk import EVERYTHING, Interval, ranges
+from .expression_walk import EVERYTHING, ranges
 from .terminals import with_flange_outputs
 from .typical_sizes import typical_sizes, with_sizes
 
@@ -44,15 +44,12 @@ def indicator_variables(model: FlatModel) -> list[Variable]:
 
 def mode_variables(model: FlatModel) -> list[Variable]:
     """Return the mode of each located switch: −1, 0 or 1."""
-    switches = located_switches(model)
-    return [
-        Variable(f"{name}.mode", "1", f"Mode of {name}: {_words(switch)}", minimum=-1.0, maximum=1.0)
-        for name, switch in zip(_names(switches), switches, strict=True)
-    ]
-
-
-def _words(switch: Switch) -> str:
-    return ", ".join(f"{mode} {text}" for mode, text in sorted(switch.words) if mode in (-1, 0, 1))
+    switches, variables = located_switches(model), []
+    for name, switch in zip(_names(switches), switches, strict=True):
+        modes = ", ".join(f"{mode} {text}" for mode, text in sorted(switch.words) if mode in (-1, 0, 1))
+        text = f"Mode of {name}: {modes}"
+        variables.append(Variable(f"{name}.mode", "1", text, minimum=-1.0, maximum=1.0))
+    return variables
 
 
 def _names(switches: Sequence[Switch]) -> list[str]:
@@ -206,8 +203,10 @@ def _as_shown(model: FlatModel, sizes: Mapping[str, float]) -> FlatModel:
         intervals = ranges(ca.Function("shown", groups, [ca.densify(expressions)]), bounds)
         depends = ca.jacobian_sparsity(expressions, s.parameter).row()
         return [
-            _widened(v, interval) if v.bounded and i in depends else v
-            for i, (v, interval) in enumerate(zip(variables, intervals, strict=True))
+            replace(v, minimum=min(v.minimum, low), maximum=max(v.maximum, high))
+            if v.bounded and i in depends
+            else v
+            for i, (v, (low, high)) in enumerate(zip(variables, intervals, strict=True))
         ]
 
     signals = tuned(model.signals, s.signal) if model.sample_time else model.signals
@@ -218,10 +217,6 @@ def _as_shown(model: FlatModel, sizes: Mapping[str, float]) -> FlatModel:
         outputs=with_sizes(tuned(model.outputs, s.output), sizes),
         signals=with_sizes(signals, sizes),
     )
-
-
-def _widened(v: Variable, interval: Interval) -> Variable:
-    return replace(v, minimum=min(v.minimum, interval[0]), maximum=max(v.maximum, interval[1]))
 
 
 def _rate(state: Variable, sizes: Mapping[str, float]) -> Variable:

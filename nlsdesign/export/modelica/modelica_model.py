@@ -28,8 +28,6 @@ from .modelica_terms import ATOM, SERIES, SIGNED, WRITTEN_TWICE, Term, kept, ter
 LONGEST = 16
 """Operations in one expression; a longer one gets a name of its own."""
 
-_RESULTS = ("derivative", "output", "signal")
-
 
 @dataclass
 class ModelicaEquations:

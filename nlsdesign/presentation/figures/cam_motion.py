@@ -360,7 +360,10 @@ def cam_picture(motion: CamMotion, *, start: float | None = None) -> CamPicture:
     """
     first = motion.nearest(0.6 * float(motion.angles[-1]) if start is None else start)
     curve = torque_curve(motion, at=first)
-    places = _places(curve, motion)
+    # Where the marker stands at each angle, in points of the SVG, y downwards.
+    curve.draw_without_rendering()
+    pixels = curve.axes[0].transData.transform(np.column_stack([np.degrees(motion.angles), motion.torques]))
+    places: Array = pixels * [1.0, -1.0] * 72.0 / curve.dpi
     frames = tuple(_frame(motion, i, places[i] - places[first]) for i in range(len(motion.angles)))
     tallest = max(float(np.max(motion.contour.radii)), 6.5e-3)
     lower, upper = motion.halves
@@ -400,14 +403,6 @@ def torque_curve(motion: CamMotion, *, at: int) -> Figure:
         figure,
         f"Torque over the angle from {degrees[0]:.0f}° to {degrees[-1]:.0f}°, up to {top} N·m, one marked.",
     )
-
-
-def _places(curve: Figure, motion: CamMotion) -> Array:
-    """Return where the marker stands at each angle, in points of the SVG, y downwards."""
-    curve.draw_without_rendering()
-    pixels = curve.axes[0].transData.transform(np.column_stack([np.degrees(motion.angles), motion.torques]))
-    places: Array = pixels * [1.0, -1.0] * 72.0 / curve.dpi
-    return places
 
 
 def _frame(motion: CamMotion, index: int, shift: Array) -> dict[str, Any]:

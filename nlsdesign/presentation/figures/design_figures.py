@@ -54,7 +54,10 @@ def design_picture(design: CamDesign) -> Figure:
     figure, axes = panels(2, 1, height=4.0, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
         _draw(panel, design, angle)
-    low, high = (pick([end(panel) for panel in axes]) for pick, end in ((min, _lowest), (max, _highest)))
+    low, high = (
+        min(panel.dataLim.y0 for panel in axes),
+        max(panel.dataLim.y1 for panel in axes),
+    )
     low -= 0.08 * (wide - left) * MM  # room for the dimensions
     for panel in axes:
         panel.set_xlim(left * MM, wide * MM)
@@ -103,14 +106,6 @@ def limit_margins(design: CamDesign) -> Figure:
     return described(figure, f"Bars of {len(states)} limits; the design sits on: {binding}.")
 
 
-def _lowest(axes: Axes) -> float:
-    return float(axes.dataLim.y0)
-
-
-def _highest(axes: Axes) -> float:
-    return float(axes.dataLim.y1)
-
-
 def _used(state: LimitState) -> float:
     """Return the share of a limit that is used; a lower limit is used up where the value falls to it."""
     if state.upper:
@@ -130,10 +125,14 @@ def _words(state: LimitState) -> str:
 def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
     contour = design.contour
     parallel = not np.isfinite(contour.anchor_distance)
-    for half in _halves(contour, parallel):
+    halves = list(contour.outlines())
+    if parallel:  # only the lip is designed; the body behind it is closed over the centre
+        halves = [np.vstack([contour.points, [[0.0, 0.0]], contour.points[:1]])]
+    for half in halves:
         axes.fill(*(turn(half, angle) * MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
     arm = float(np.interp(angle, contour.angles, contour.lever_arms))
-    contact = _contact(contour, angle)
+    point = np.array([[np.interp(angle, contour.angles, column) for column in contour.points.T]])
+    contact = np.asarray(turn(point, angle)[0], dtype=float)
     end = _end_of_cable(contour, float(contour.radii.max())) + (contact * [0.0, 1.0] if parallel else 0.0)
     for side in (1.0,) if parallel else (1.0, -1.0):
         line = np.vstack([contact, end]) * side * MM
@@ -159,19 +158,6 @@ def _end_of_cable(contour: Contour, reach: float) -> Array:
     """Return where the drawn cable ends: at its anchor, or a little outside the cam where it is parallel."""
     near = np.isfinite(contour.anchor_distance) and contour.anchor_distance < 5.0 * reach
     return np.array([contour.anchor_distance if near else 1.9 * reach, 0.0])
-
-
-def _halves(contour: Contour, parallel: bool) -> list[Array]:
-    if not parallel:
-        return list(contour.outlines())
-    # Of a cam with a parallel cable only the lip is designed; the body behind it is closed over the centre.
-    points = contour.points
-    return [np.vstack([points, [[0.0, 0.0]], points[:1]])]
-
-
-def _contact(contour: Contour, angle: float) -> Array:
-    point = np.array([[np.interp(angle, contour.angles, column) for column in contour.points.T]])
-    return np.asarray(turn(point, angle)[0], dtype=float)
 
 
 def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: float) -> None:
@@ -328,7 +314,7 @@ def torque_band(result: ToleranceResult) -> Figure:
                 linestyle=dash, label=f"90 % of the springs, {label}",
             )  # fmt: skip
             axes.plot(degrees, middle, color=tone, linewidth=1.2)
-    _targeted(upper, degrees, wanted)
+    upper.plot(degrees, wanted, color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target")
     lower.axhline(0.0, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)))
     lower.grid(color=GRID.light)
     upper.set_ylabel("torque in N·m")
@@ -344,10 +330,6 @@ def torque_band(result: ToleranceResult) -> Figure:
         f"lie, with the target; at most {significant(factor * widest[0], 3)} {unit} wide as built{after}. "
         "Errors below.",
     )
-
-
-def _targeted(axes: Axes, degrees: np.ndarray, wanted: np.ndarray) -> None:
-    axes.plot(degrees, wanted, color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target")
 
 
 _LABELS = ("rigid", "best linear spring", "this curve")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...feedback.analysis import Chart, RankDrops
-from ...feedback.observer import ErrorStability, SpreadErrors
+from ...feedback.observer import SpreadErrors
 from ...foundation.errors import ValueRangeError
 from ...foundation.written_numbers import shared_prefix
 from .style import AFTER, DASHES, INK, MUTED, described, legend, log_axis, look, panels, significant, styled
@@ -115,36 +115,6 @@ def _slowest(chart: Chart, mode: str, label: str) -> str:
         pitch = float(chart[f"{mode}.frequency"][least])
         text += f", damping at least {significant(float(ratios[least]), 2)} ({significant(pitch)} Hz)"
     return f"{text}."
-
-
-@styled
-def observer_stability(checks: Mapping[str, ErrorStability], *, sample_time: float) -> Figure:
-    """Draw how fast the error of each observer decays at each angle.
-
-    The decay is −ln(spectral radius)/T: below zero the error would grow. The legend states whether it is
-    proved for a moving angle or checked at frozen angles only.
-    """
-    figure, (axes,) = panels(height=3.0)
-    summaries = []
-    for number, (label, check) in enumerate(checks.items()):
-        color, dash, _ = look(number)
-        decay = -np.log(check.radius) / sample_time
-        known = (
-            "proved" if check.proved else "proved for inner states" if check.proved_inner else "checked only"
-        )
-        axes.plot(np.degrees(check.angles), decay, color=color, linestyle=dash, label=f"{label} ({known})")
-        at = int(np.argmin(decay))
-        where = f"{np.degrees(check.angles[at]):.0f}°"
-        summaries.append(f"{label}: slowest {significant(float(decay[at]))} 1/s at {where}, {known}.")
-    if all(np.all(check.radius < 1.0) for check in checks.values()):
-        log_axis(axes)
-    else:
-        axes.axhline(0.0, color=INK.light, linewidth=0.9, linestyle=(0, (4, 2)))
-    axes.set_title("Slowest decay of the estimation error")
-    axes.set_ylabel("decay in 1/s")
-    axes.set_xlabel("angle in degrees")
-    legend(axes, columns=2)
-    return described(figure, f"Decay of the observers' error over the angle. {' '.join(summaries)}")
 
 
 def _columns(chart: Chart) -> list[str]:
@@ -258,18 +228,13 @@ def _draw_causes(axes: Axes, errors: SpreadErrors) -> None:
         axes.plot(
             [factor * sizes[cause] for cause, _ in ranked], places, color=tone, marker=point, linestyle="none"
         )
-    axes.set_yticks(places, [_short(cause) for cause, _ in ranked])
+    axes.set_yticks(places, [".".join(cause.split(".")[-2:]) for cause, _ in ranked])
     axes.tick_params(axis="y", labelsize=8)
     axes.margins(x=0.05)
     axes.set_xlim(left=0.0)
     axes.set_xlabel(f"{unit} rms for one standard deviation")
     axes.set_title(f"Largest causes, {errors.observers[0]}")
     axes.grid(visible=True, axis="y", color=MUTED.light, linewidth=0.3)
-
-
-def _short(cause: str) -> str:
-    """Return the last parts of a long name."""
-    return ".".join(cause.split(".")[-2:])
 
 
 def _range(values: np.ndarray) -> str:

@@ -183,7 +183,9 @@ def _main_view(page: Sheet, view: _View) -> None:
             linewidth=THIN if hole.base_only else THICK, linestyle=(0, (3, 2)) if hole.base_only else "-",
             facecolor="none" if hole.base_only else SURFACE.light,
         )  # fmt: skip
-        _cross(page, view.at(hole.centre), view.scale * MM * hole.diameter / 2 + 1.2)
+        centre, reach = view.at(hole.centre), view.scale * MM * hole.diameter / 2 + 1.2
+        for step in (np.array([reach, 0.0]), np.array([0.0, reach])):
+            page.line(centre - step, centre + step, color=MUTED.light, width=0.3)
     for cable in part.cables:
         page.line(*view.at(_clipped(cable.points, 1.06 * part.outermost)), color=VERMILLION.light, width=THIN)
     low, high = view.at(view.low) - 4.0, view.at(view.high) + 4.0
@@ -397,11 +399,6 @@ def _column(
 def _circle(page: Sheet, centre: Array, radius: float, **look: Any) -> None:
     style: dict[str, Any] = {"facecolor": "none", "edgecolor": "#1c2127", **look}
     page.axes.add_patch(Circle((float(centre[0]), float(centre[1])), radius, **style))
-
-
-def _cross(page: Sheet, centre: Array, reach: float) -> None:
-    for step in (np.array([reach, 0.0]), np.array([0.0, reach])):
-        page.line(centre - step, centre + step, color=MUTED.light, width=0.3)
 
 
 def _clipped(points: Array, reach: float) -> Array:

@@ -10,22 +10,20 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...design import CamDesign, Cause, ToleranceResult
+from ...design import CamDesign, ToleranceResult
 from ...foundation.errors import NlsError
 from ...foundation.quantity import three_digits
 from ...foundation.written_numbers import prefixed, shared_prefix
 from ...model import flatten
 from ..figures import (
-    CamMotion,
     cam_motion_of,
-    design_picture,
     inline_svg,
-    limit_margins,
     tolerance_bars,
     torque_against_target,
     torque_band,
 )
-from ..figures.cam_motion import MARKER, cam_picture
+from ..figures.cam_motion import MARKER, CamMotion, cam_picture
+from ..figures.design_figures import design_picture, limit_margins
 from .page import write_report
 from .sections import (
     FigureSection,
@@ -252,7 +250,11 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             caption="95 % of the springs stay below.",
             means=f"95 % of {len(result.errors)} made springs are within {built} rms as "
             f"built{after}. {_advice(result)}",
-            assumed="; ".join(dict.fromkeys(_reason(c.cause) for c in result.causes if c.cause.assumed)),
+            assumed="; ".join(
+                dict.fromkeys(
+                    c.cause.source.removeprefix("assumed: ") for c in result.causes if c.cause.assumed
+                )
+            ),
         ),
         FigureSection(
             "Torque of made springs",
@@ -275,10 +277,6 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             folded=True,
         ),
     ]
-
-
-def _reason(cause: Cause) -> str:
-    return cause.source.removeprefix("assumed: ")
 
 
 def _advice(result: ToleranceResult) -> str:

@@ -147,17 +147,32 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
     verdict
         Result of a diagnosis.
     """
+    reasons = suspicions(verdict)  # which the card says already
+    others = [text for text in verdict.findings if text not in reasons]
     parts = [
         _blocks(verdict),
-        *_findings(verdict),
+        *_list("Findings", "finding", others, "What was noticed besides the errors of the blocks."),
         *_error_figures(verdict),
         *_candidates(verdict),
         *_shape_figures(verdict),
-        *_numbers(verdict),
-        *_next_steps(verdict),
+        *fitted_table(
+            fitted_numbers(verdict.fits), f"{'with' if verdict.effects else 'without'} what was added"
+        ),
+        *_list(
+            "What to measure next",
+            "experiment",
+            verdict.next_steps,
+            "Experiments that would tell apart what these records leave open.",
+        ),
         *_left_out(verdict),
         *_circumstances(verdict),
-        _all_gaps(verdict),
+        TableSection(
+            "All blocks and records",
+            ("block", "record", "used", "before", "after", "noise", "unit", "after / noise"),
+            tuple(_gap_row(gap) for gap in verdict.gaps),
+            folded=True,
+            caption="Root mean square error of every block on every record.",
+        ),
     ]
     card = VerdictSection(
         "Verdict",
@@ -193,13 +208,6 @@ def _blocks(verdict: Verdict) -> TableSection:
     )
     marked = frozenset([verdict.blocks.index(verdict.block)])
     return TableSection("Where", columns, tuple(rows), caption=caption, marked=marked)
-
-
-def _findings(verdict: Verdict) -> list[Section]:
-    """Return what was noticed besides the errors of the blocks and what the card says already."""
-    reasons = suspicions(verdict)
-    others = [text for text in verdict.findings if text not in reasons]
-    return _list("Findings", "finding", others, "What was noticed besides the errors of the blocks.")
 
 
 def _error_figures(verdict: Verdict) -> list[Section]:
@@ -296,12 +304,6 @@ def _with_unit_of(abscissa: str, model: FlatModel) -> str:
     return f"{abscissa} in {typeset_unit(model.variable(abscissa).unit) or '1'}"
 
 
-def _numbers(verdict: Verdict) -> list[Section]:
-    """Return the declared numbers after the refit, those that left what was declared highlighted."""
-    numbers = fitted_numbers(verdict.fits)
-    return fitted_table(numbers, f"{'with' if verdict.effects else 'without'} what was added")
-
-
 def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
     """Return the table of refitted numbers, highlighted those that left what was declared."""
     if not numbers:
@@ -325,13 +327,6 @@ def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
     )
     columns = ("number", "declared", "spread", "refitted", "unit", "moved")
     return [TableSection("Refitted numbers", columns, rows, caption=caption, marked=beyond)]
-
-
-def _next_steps(verdict: Verdict) -> list[Section]:
-    return _list(
-        "What to measure next", "experiment", verdict.next_steps,
-        "Experiments that would tell apart what these records leave open.",
-    )  # fmt: skip
 
 
 def _left_out(verdict: Verdict) -> list[Section]:
@@ -381,13 +376,6 @@ def _circumstances(verdict: Verdict) -> list[Section]:
         heads = ("criterion", "value", "meaning")
         sections.append(TableSection("Criteria", heads, settings, caption=caption, folded=True))
     return sections
-
-
-def _all_gaps(verdict: Verdict) -> TableSection:
-    columns = ("block", "record", "used", "before", "after", "noise", "unit", "after / noise")
-    rows = tuple(_gap_row(g) for g in verdict.gaps)
-    caption = "Root mean square error of every block on every record."
-    return TableSection("All blocks and records", columns, rows, caption=caption, folded=True)
 
 
 def _gap_row(gap: RecordGap) -> tuple[str, ...]:

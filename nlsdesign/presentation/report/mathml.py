@@ -85,7 +85,11 @@ def _layout(e: Any) -> str:
     if e.is_Pow:
         return _power(e)
     if isinstance(e, sympy.Piecewise):
-        return _cases(e)
+        rows = "".join(
+            f"<mtr><mtd>{_layout(value)}</mtd><mtd>{_condition(condition)}</mtd></mtr>"
+            for value, condition in e.args
+        )
+        return _group(f"<mo>{{</mo><mtable>{rows}</mtable>")
     if e.is_Relational:
         relation = escape(_RELATIONS.get(e.rel_op, e.rel_op))
         return _group(f"{_layout(e.lhs)}<mo>{relation}</mo>{_layout(e.rhs)}")
@@ -147,14 +151,6 @@ def _function(e: Any) -> str:
         opening, closing = _FENCES[name]
         return _group(f"<mo>{opening}</mo>{arguments}<mo>{closing}</mo>")
     return _group(f"<mi>{escape(_FUNCTIONS.get(name, name))}</mi><mo>(</mo>{arguments}<mo>)</mo>")
-
-
-def _cases(e: Any) -> str:
-    rows = "".join(
-        f"<mtr><mtd>{_layout(value)}</mtd><mtd>{_condition(condition)}</mtd></mtr>"
-        for value, condition in e.args
-    )
-    return _group(f"<mo>{{</mo><mtable>{rows}</mtable>")
 
 
 def _condition(condition: Any) -> str:

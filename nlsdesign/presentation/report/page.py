@@ -73,7 +73,8 @@ def report_text(
     """Return a report as text; the same for the same sections."""
     pieces = list(sections)
     entries = _entries(folder, pieces)
-    script = "\n".join(_source(name) for name in dict.fromkeys(["report.js", *_scripts(pieces)]))
+    scripts = ["report.js", *(piece.script for piece in pieces if piece.script)]
+    script = "\n".join(_source(name) for name in dict.fromkeys(scripts))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     light, dark = (
         {
@@ -87,10 +88,6 @@ def report_text(
         light=light, dark=dark, script=Html(script), script_digest=digest,
     )  # fmt: skip
     return visible(page)
-
-
-def _scripts(sections: Iterable[Section]) -> list[str]:
-    return [section.script for section in sections if section.script]
 
 
 def _entries(folder: Path, sections: list[Section]) -> list[dict[str, Any]]:

@@ -296,7 +296,9 @@ class TableSection(Section):
 
     def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the cells as text, each with whether it is a number."""
-        texts = [[_shown(cell) for cell in row] for row in self.rows]
+        texts = [
+            [compact(cell, 4) if isinstance(cell, float) else str(cell) for cell in row] for row in self.rows
+        ]
         right = [_is_numeric([row[i] for row in texts]) for i in range(len(self.columns))]
         rows = [
             {"cells": list(zip(row, right, strict=True)), "marked": i in self.marked}
@@ -306,10 +308,6 @@ class TableSection(Section):
         return {
             "title": self.title, "head": head, "rows": rows, "caption": self.caption, "folded": self.folded,
         }  # fmt: skip
-
-
-def _shown(cell: Cell) -> str:
-    return compact(cell, 4) if isinstance(cell, float) else str(cell)
 
 
 def _is_numeric(texts: list[str]) -> bool:

@@ -11,7 +11,6 @@ from urllib.parse import quote
 
 from ...foundation.errors import unknown_name, visible
 from ...foundation.quantity import Quantity, sources, typeset_unit
-from ...simulation import Trace
 from ..figures.style import compact, significant
 from .sections import Html, PagePosition, Section, TableSection
 
@@ -83,23 +82,6 @@ class PublishedNumber:
     here: float
     unit: str
     remark: str = ""
-
-
-def range_table(title: str, traces: Mapping[str, Trace]) -> TableSection:
-    """Return the table of laws used beyond their stated range; the caption tells if there are none."""
-    rows = tuple(
-        (label, w.name, f"{w.minimum:g} to {w.maximum:g}", typeset_unit(w.unit), compact(w.furthest, 4),
-         compact(w.time, 4))
-        for label, trace in traces.items()
-        for w in trace.warnings
-    )  # fmt: skip
-    columns = ("result", "signal", "range", "unit", "reaches", "first at s")
-    caption = (
-        "Laws that were used beyond their stated range."
-        if rows
-        else "Every law was used within its stated range."
-    )
-    return TableSection(title, columns, rows, caption=caption, marked=frozenset(range(len(rows))))
 
 
 def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: str = "") -> TableSection:

@@ -313,13 +313,14 @@ def _distribution(content: PageContent, name: str, *, bounded: bool) -> _Distrib
 def _quantile_rows(each: _Distribution) -> list[tuple[Any, ...]]:
     unit = typeset_unit(each.column.unit or "1")
     return [
-        (each.column.name, f"{100 * q.share:g} %", *(_bound(v) for v in (q.value, q.lower, q.upper)), unit)
+        (
+            each.column.name,
+            f"{100 * q.share:g} %",
+            *("–" if np.isnan(v) else v for v in (q.value, q.lower, q.upper)),
+            unit,
+        )
         for q in each.quantiles
     ]
-
-
-def _bound(value: float) -> float | str:
-    return "–" if np.isnan(value) else value
 
 
 def _not_finite(name: str, values: Array) -> str:

@@ -39,7 +39,6 @@ from nlsdesign.foundation.errors import ArrangementError, NlsError, UnknownNameE
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.roles import (
     driven_body,
-    is_actuator,
     measured_motion,
     moved_load,
     series_cam,
@@ -106,12 +105,6 @@ def test_cam_and_motor_decide() -> None:
     assert series_spring(model).name == "tendon"
     assert series_cam(model).name == "tendon.cam"
     assert (driven_body(model).name, measured_motion(model)) == ("finger", "finger.angle")
-    assert is_actuator(model)
-
-
-def test_a_spring_without_a_motor_is_no_actuator() -> None:
-    spring = tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
-    assert not is_actuator(flatten(machine(wheel=Inertia(inertia=1e-3), spring=spring)))
 
 
 def test_a_named_part_is_taken_and_a_wrong_name_has_a_neighbour() -> None:

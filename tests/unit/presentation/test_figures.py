@@ -19,8 +19,7 @@ from nlsdesign.design import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.presentation import figures
 from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
-from nlsdesign.presentation.figures.cam_motion import MARKER, cam_motion, cam_picture
-from nlsdesign.presentation.figures.over_angle import observer_stability
+from nlsdesign.presentation.figures.cam_motion import MARKER, CamMotion, cam_motion, cam_picture
 from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look, significant
 from nlsdesign.presentation.figures.svg import svg_text, thinned
 from tests import figure_samples as samples
@@ -299,9 +298,7 @@ def test_a_cam_that_cannot_be_made_says_so() -> None:
 def test_a_motion_needs_equal_rows() -> None:
     motion = samples.motion()
     with pytest.raises(ValueRangeError, match="one extension, force and torque for each angle"):
-        figures.CamMotion(
-            motion.contour, motion.angles, motion.extensions[1:], motion.forces, motion.torques, 0.01
-        )
+        CamMotion(motion.contour, motion.angles, motion.extensions[1:], motion.forces, motion.torques, 0.01)
 
 
 # --- what the figures compute ---------------------------------------------------------------------
@@ -326,16 +323,6 @@ def test_angles_that_are_not_observable_are_marked() -> None:
     crosses = [line for line in figure.axes[1].lines if line.get_marker() == "x"]
     assert [line.get_xdata().tolist() for line in crosses] == [[0.0]]
     assert figure.axes[1].get_yscale() == "log"
-
-
-def test_an_observer_that_diverges_is_not_hidden_by_the_axis() -> None:
-    bad = observer_stability(
-        {"A": samples.ErrorStability(np.array([-0.5, 0.0, 0.5]), np.array([0.9, 1.02, 0.9]), False, False)},
-        sample_time=1e-3,
-    )
-    assert bad.axes[0].get_yscale() == "linear"
-    assert bad.axes[0].lines[0].get_ydata().min() == pytest.approx(-np.log(1.02) / 1e-3)
-    assert "slowest −19.8 1/s at 0°, checked only" in alternative_text(bad)
 
 
 def test_bars_are_as_high_as_the_errors_and_held_out_records_stand_right() -> None:

@@ -25,8 +25,6 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import Variable, flatten
-from nlsdesign.presentation.report.page import report_text
-from nlsdesign.presentation.report.tables import range_table
 from nlsdesign.simulation import Trace, range_warnings, simulate
 from tests.stretched import LENGTH, pulled, run, stress_at
 
@@ -134,17 +132,6 @@ def test_the_command_line_says_where_a_record_leaves_the_range(
     assert ("warning: rubber.law.strain leaves [-0.4, 0.4]" in result.output) is said
     as_json = CliRunner().invoke(program, [*arguments, "--out", str(tmp_path / "out.csv"), "--json"])
     assert bool(json.loads(as_json.output)["warnings"]) is said
-
-
-def test_the_report_lists_what_was_left_and_says_so_if_nothing_was() -> None:
-    table = range_table("Stated ranges", {"hard pull": stretched_to(0.8), "soft pull": stretched_to(0.2)})
-    (row,) = table.rows
-    assert row[:3] == ("hard pull", "rubber.law.strain", "-0.4 to 0.4")
-    assert table.marked == {0}
-    quiet = range_table("Stated ranges", {"soft pull": stretched_to(0.2)})
-    assert quiet.rows == ()
-    assert "within its stated range" in quiet.caption
-    assert "within its stated range" in report_text(Path(), [quiet], title="quiet")
 
 
 def test_a_piecewise_law_of_tension_says_when_it_is_compressed() -> None:
