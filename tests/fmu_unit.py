@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from ctypes import c_double
 from pathlib import Path
@@ -15,8 +15,21 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
+from nlsdesign.export import export_fmu
+from nlsdesign.model import FlatModel
+
+VERSIONS = ("2.0", "3.0")
 Refused = FMICallException
 Kind = TypeVar("Kind", bound="Unit")
+
+
+def exported(models: Mapping[str, FlatModel], folder: Path) -> dict[tuple[str, str], Path]:
+    """FMU of each model and version."""
+    return {
+        (name, version): export_fmu(model, folder / f"{name}{version}.fmu", version=version)
+        for name, model in models.items()
+        for version in VERSIONS
+    }
 
 
 class Unit:

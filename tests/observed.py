@@ -34,6 +34,12 @@ from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.transform import replace_state, with_signal
 from nlsdesign.simulation import Trace, simulate
 
+WIRES = {
+    "observer.motor.angle": "plant.motor_encoder.reading",
+    "controller.motor.angle": "plant.motor_encoder.reading",
+}
+"""What the encoder of the motor feeds in a closed loop."""
+
 # Austin, Schepelmann, Geyer 2015: A0, L0, k, k*, engaging extensions; two elements share the torque.
 AREA, LENGTH, RELAXING = 1e-4, 12.5e-3, 0.58e6
 MODULI = np.array([0.92e6, 0.58e6, 0.74e6, 0.77e6, 0.47e6, 1.06e6])

@@ -15,6 +15,22 @@ AREA, LENGTH = 1e-4, 0.0125
 VOLUME = AREA * LENGTH
 
 
+def deck_head(name: str, *, area: int) -> str:
+    """Deck of such a piece whose area is given in mm², up to its law."""
+    return f"""[deck]
+name = "{name}"
+description = ""
+[grip]
+component = "Driven"
+domain = "translation"
+[rubber]
+component = "Specimen"
+between = ["grip"]
+area = {{value = {area}, unit = "mm^2", source = "test"}}
+rest_length = {{value = 12.5, unit = "mm", source = "test"}}
+"""
+
+
 def pulled(**laws: Element) -> FlatModel:
     """The flat model of a piece with laws in parallel; its output is the force."""
     rubber = specimen(area=AREA, rest_length=LENGTH, **laws)

@@ -15,15 +15,7 @@ _ROW = re.compile(r"^\| `nls\.(\w+)` \|", re.M)
 
 
 def pages(root: Path, folder: Path) -> dict[str, str]:
-    """Return a page for each section of the reference, one for each room, and one that lists them.
-
-    Parameters
-    ----------
-    root
-        Of the project.
-    folder
-        Of the staged sources; not needed here.
-    """
+    """Return a page for each section of the reference, one for each room, and one that lists them."""
     made: dict[str, str] = {}
     listed = ""
     for title, names in sections(root):

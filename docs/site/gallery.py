@@ -12,15 +12,7 @@ from . import collect, markup
 
 
 def pages(root: Path, folder: Path) -> dict[str, str]:
-    """Return one page for each study and one that shows them all.
-
-    Parameters
-    ----------
-    root
-        Of the project.
-    folder
-        Of the staged sources; not needed here.
-    """
+    """Return one page for each study and one that shows them all."""
     made = collect.read_made()
     names = study_names()
     shown = {f"gallery/{name}.md": _study(root, name, made.get(name, {})) for name in names}

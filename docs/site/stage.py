@@ -33,15 +33,7 @@ Pages = dict[str, str]
 
 
 def stage(root: Path, folder: Path) -> set[str]:
-    """Write all sources and return the files of the project that they link to.
-
-    Parameters
-    ----------
-    root
-        Of the project.
-    folder
-        Where to write.
-    """
+    """Write all sources and return the files of the project that they link to."""
     linked: set[str] = set()
     pages = {_named(name): _text(root, root / "docs" / name, linked) for name in _written(root)}
     pages["changelog.md"] = _text(root, root / "CHANGELOG.md", linked, at="docs/changelog.md")

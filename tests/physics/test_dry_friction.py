@@ -205,15 +205,20 @@ def test_a_loaded_gear_holds_its_load() -> None:
     assert np.all(run["wheel.angle"][times < 1.33] == start)
 
 
-def test_two_frictions_on_one_shaft_share_the_load() -> None:
-    """Their torques add: it slips at the sum, and while it sticks each carries its share."""
+def pulled_on_two_bearings(rate: float) -> Trace:
+    """A wheel whose two frictions add, and whose torque grows by so many N·m/s from zero."""
     made = assembly(
         "two_bearings",
         wheel=Inertia(inertia=J), bench=Fixed(),
         rub=tie(CoulombFriction(sliding_effort=T), "wheel"),
         more=tie(CoulombFriction(sliding_effort=3 * T), "wheel", "bench"),
     )  # fmt: skip
-    run = simulate(flatten(made), np.linspace(0.0, 1.0, 11), inputs={"wheel.torque": lambda t: 0.4 * t})
+    return simulate(flatten(made), np.linspace(0.0, 1.0, 11), inputs={"wheel.torque": lambda t: rate * t})
+
+
+def test_two_frictions_on_one_shaft_share_the_load() -> None:
+    """Their torques add: it slips at the sum, and while it sticks each carries its share."""
+    run = pulled_on_two_bearings(0.4)
     (event,) = run.events
     assert event.time == pytest.approx(4 * T / 0.4, rel=1e-11)
     assert event.name == "rub+more"
@@ -223,13 +228,7 @@ def test_two_frictions_on_one_shaft_share_the_load() -> None:
 
 def test_two_frictions_on_one_shaft_let_go_backward_too() -> None:
     """Pulled backward by a weight they slip backward at their sum, then slow it down with both torques."""
-    made = assembly(
-        "two_bearings",
-        wheel=Inertia(inertia=J), bench=Fixed(),
-        rub=tie(CoulombFriction(sliding_effort=T), "wheel"),
-        more=tie(CoulombFriction(sliding_effort=3 * T), "wheel", "bench"),
-    )  # fmt: skip
-    run = simulate(flatten(made), np.linspace(0.0, 1.0, 11), inputs={"wheel.torque": lambda t: -0.4 * t})
+    run = pulled_on_two_bearings(-0.4)
     slip = 4 * T / 0.4
     assert told(run, "rub+more") == [("slips backward", pytest.approx(slip, rel=1e-11))]
     sliding = np.maximum(run.time - slip, 0.0)

@@ -28,10 +28,9 @@ from nlsdesign.export import export_fmu
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
-from tests.fmu_unit import Unit, opened
+from tests.fmu_unit import VERSIONS, Unit, opened
 from tests.hand_built import plant
 
-VERSIONS = ("2.0", "3.0")
 STEP = 1e-3
 both = pytest.mark.parametrize("version", VERSIONS)
 

@@ -20,6 +20,7 @@ from .part_numbers import Reading, parameter, read_as
 from .switches import dry
 
 Pair = tuple[Expression, Expression]
+Level = Callable[[Expression], Expression]
 
 
 @dataclass(frozen=True)
@@ -52,13 +53,7 @@ class FrictionContact(Reading):
     """Base of contacts of laws that act against the motion."""
 
     @abstractmethod
-    def against(
-        self,
-        scope: Scope,
-        rate: Expression,
-        level: Callable[[Expression], Expression],
-        sticking: Expression,
-    ) -> Expression:
+    def against(self, scope: Scope, rate: Expression, level: Level, sticking: Expression) -> Expression:
         """Return the effort of dry friction.
 
         Parameters
@@ -102,13 +97,7 @@ class Sharp(CornerContact, FrictionContact):
         scope.kink(value, above=words[0], below=words[1], name=name)
         return ca.fmax(value, 0), ca.if_else(value > 0, 1, 0)
 
-    def against(
-        self,
-        scope: Scope,
-        rate: Expression,
-        level: Callable[[Expression], Expression],
-        sticking: Expression,
-    ) -> Expression:
+    def against(self, scope: Scope, rate: Expression, level: Level, sticking: Expression) -> Expression:
         """Return level·sgn(rate), or while the rate is zero what keeps it there."""
         return dry(scope, rate, level, sticking)
 
@@ -168,13 +157,7 @@ class Regularised(FrictionContact):
         maximum=10.0,
     )
 
-    def against(
-        self,
-        scope: Scope,
-        rate: Expression,
-        level: Callable[[Expression], Expression],
-        sticking: Expression,
-    ) -> Expression:
+    def against(self, scope: Scope, rate: Expression, level: Level, sticking: Expression) -> Expression:
         """Return level·tanh(v/v_s)."""
         return level(rate) * smooth_sign(rate, scope.parameter("creep_speed"))
 

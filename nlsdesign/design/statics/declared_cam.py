@@ -61,9 +61,9 @@ class DeclaredCam(ABC, Generic[Made]):
     part: Made
 
     @property
-    @abstractmethod
     def through_centre(self) -> bool:
         """Whether the cable passes through the centre, so that the lever arm is zero at angle zero."""
+        return math.isfinite(self.anchor_distance)
 
     @property
     @abstractmethod
@@ -88,11 +88,6 @@ class DeclaredCam(ABC, Generic[Made]):
 
 @dataclass(frozen=True)
 class _TwoSided(DeclaredCam[TwoSidedCam]):
-    @property
-    def through_centre(self) -> bool:
-        """True."""
-        return True
-
     @property
     def anchor_distance(self) -> float:
         """Distance of the anchor in m."""
@@ -129,11 +124,6 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
 @dataclass(frozen=True)
 class _OneSided(DeclaredCam[OneSidedCam]):
     @property
-    def through_centre(self) -> bool:
-        """False: the cable stays parallel."""
-        return False
-
-    @property
     def anchor_distance(self) -> float:
         """Distance of the anchor in m."""
         return math.inf
@@ -164,11 +154,6 @@ class _OneSided(DeclaredCam[OneSidedCam]):
 
 @dataclass(frozen=True)
 class _Anchored(DeclaredCam[AnchoredCam]):
-    @property
-    def through_centre(self) -> bool:
-        """True."""
-        return True
-
     @property
     def anchor_distance(self) -> float:
         """Distance of the anchor in m."""

@@ -15,6 +15,14 @@ CURVE = ("--maximum", "5 N*m", "--angle", "53 deg")
 SIMULATE = ("simulate", "--deck", SOFT, "--stop", "1 s", "--input")
 
 
+def error_of(run: Run, words: tuple[str, ...], folder: Path) -> str:
+    """What a refused command says; it prints nothing else and writes nothing."""
+    status, out, err = run(*words)
+    assert (status, out) == (2, "")
+    assert not list(folder.iterdir())
+    return err
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -54,10 +62,7 @@ SIMULATE = ("simulate", "--deck", SOFT, "--stop", "1 s", "--input")
 def test_a_number_without_sense_is_refused_by_its_name(
     run: Run, tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
-    status, out, err = run(*words)
-    assert (status, out) == (2, "")
-    assert said in err
-    assert not list(tmp_path.iterdir())
+    assert said in error_of(run, words, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -76,10 +81,7 @@ def test_a_number_without_sense_is_refused_by_its_name(
 def test_what_would_be_ignored_or_misread_is_refused(
     run: Run, tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
-    status, out, err = run(*words)
-    assert (status, out) == (2, "")
-    assert said in err
-    assert not list(tmp_path.iterdir())
+    assert said in error_of(run, words, tmp_path)
 
 
 def test_a_path_with_quotes_is_a_path(run: Run, tmp_path: Path) -> None:

@@ -42,6 +42,7 @@ from nlsdesign.foundation.deck import read_deck
 from nlsdesign.foundation.errors import ArrangementError, NlsError, UnitError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten
+from tests.stretched import deck_head
 
 OUT_OF_RANGE: dict[str, tuple[Callable[[], Element], str]] = {
     "negative stiffness": (lambda: Spring(stiffness=-100.0), "stiffness = -100 N/m"),
@@ -146,22 +147,14 @@ def test_arrangements_without_a_solution_are_named(name: str) -> None:
         make()
 
 
-DECK = """[deck]
-name = "gum"
-description = ""
-[grip]
-component = "Driven"
-domain = "translation"
-[rubber]
-component = "Specimen"
-between = ["grip"]
-area = {value = 100, unit = "mm^2", source = "test"}
-rest_length = {value = 12.5, unit = "mm", source = "test"}
-[rubber.law]
+DECK = (
+    deck_head("gum", area=100)
+    + """[rubber.law]
 component = "Ogden"
 moduli = {value = [0.6, 0.001], unit = "MPa", source = "test"}
 exponents = {value = [1.3, 5.0], unit = "1", source = "test"}
 """
+)
 
 
 def problem(old: str, new: str) -> NlsError:

@@ -10,19 +10,9 @@ from nlsdesign.components import Assembly, Specimen, material
 from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
 from nlsdesign.components.assembly.library_rubber import with_rubber
 from nlsdesign.foundation.deck import read_deck
+from tests.stretched import deck_head
 
-HEAD = """
-[deck]
-name = "strip"
-[grip]
-component = "Driven"
-domain = "translation"
-[rubber]
-component = "Specimen"
-between = ["grip"]
-area = {value = 20, unit = "mm^2", source = "test"}
-rest_length = {value = 12.5, unit = "mm", source = "test"}
-"""
+HEAD = deck_head("strip", area=20)
 MATERIAL = 'material = "PMC-770"\n'
 ENGAGING = 'using = "engaging_moduli_2015"\n'
 PLAIN = '[rubber.law]\ncomponent = "LinearElastic"\nmodulus = {value = 1, unit = "MPa", source = "test"}\n'

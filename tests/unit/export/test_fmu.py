@@ -23,10 +23,9 @@ from nlsdesign.export.fmi.fmu import fmi_headers, universal_binary
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import parse_unit
 from nlsdesign.model.flat import FlatModel, Variable
-from tests.fmu_unit import Refused, Unit, opened, unpacked
+from tests.fmu_unit import VERSIONS, Refused, Unit, exported, opened, unpacked
 from tests.hand_built import SAMPLE_TIME, controller, observer, plant
 
-VERSIONS = ("2.0", "3.0")
 MODELS = {
     "plant": plant(outputs=("motor.angle", "spring.torque", "motor.power")),
     "observer": observer(),
@@ -37,13 +36,7 @@ SCHEMAS = Path(fmpy.__file__).parent / "schema"
 
 @pytest.fixture(scope="module")
 def units(tmp_path_factory) -> dict[tuple[str, str], Path]:
-    """FMU of each model and version."""
-    folder = tmp_path_factory.mktemp("fmu")
-    return {
-        (name, version): export_fmu(model, folder / f"{name}{version}.fmu", version=version)
-        for name, model in MODELS.items()
-        for version in VERSIONS
-    }
+    return exported(MODELS, tmp_path_factory.mktemp("fmu"))
 
 
 both = pytest.mark.parametrize("version", VERSIONS)

@@ -16,10 +16,9 @@ import pytest
 
 from nlsdesign.export import export_fmu
 from nlsdesign.model.flat import FlatModel, Variable
-from tests.fmu_unit import Refused, Unit, opened, unpacked
+from tests.fmu_unit import VERSIONS, Refused, Unit, exported, opened, unpacked
 from tests.hand_built import SAMPLE_TIME, controller, observer, plant
 
-VERSIONS = ("2.0", "3.0")
 MODELS = {"plant": plant(), "observer": observer(points=5), "controller": controller()}
 UNIX = 1.7e9
 """A start time in s since 1970; neighbouring numbers are 0.24 µs apart there."""
@@ -27,13 +26,7 @@ UNIX = 1.7e9
 
 @pytest.fixture(scope="module")
 def units(tmp_path_factory) -> dict[tuple[str, str], Path]:
-    """FMU of each model and version."""
-    folder = tmp_path_factory.mktemp("fmu")
-    return {
-        (name, version): export_fmu(model, folder / f"{name}{version}.fmu", version=version)
-        for name, model in MODELS.items()
-        for version in VERSIONS
-    }
+    return exported(MODELS, tmp_path_factory.mktemp("fmu"))
 
 
 both = pytest.mark.parametrize("version", VERSIONS)

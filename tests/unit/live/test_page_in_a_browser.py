@@ -6,6 +6,7 @@ import functools
 import http.server
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -36,13 +37,19 @@ def server() -> Iterator[Server]:
         yield one
 
 
-@pytest.fixture(scope="module")
-def opened(server: Server) -> Iterator[Tab]:
+@contextmanager
+def answered(server: Server, **patience: float) -> Iterator[Tab]:
     """A browser whose first tab shows the page; what it asked for and wrote is kept."""
     with browser() as tab:
         tab.look(1400)
         tab.visit(server.address)
-        tab.until(f"{ANSWERED} && !document.getElementById('gallery').disabled")
+        tab.until(f"{ANSWERED} && !document.getElementById('gallery').disabled", **patience)
+        yield tab
+
+
+@pytest.fixture(scope="module")
+def opened(server: Server) -> Iterator[Tab]:
+    with answered(server) as tab:
         yield tab
 
 

@@ -13,7 +13,14 @@ from tests.browser import Tab, browser, chromium
 from tests.live_server import Server, running
 from tests.live_session import as_csv, bench_records
 from tests.unit.bench.identification.test_tables import as_hdf5, as_mat
-from tests.unit.live.test_page_in_a_browser import ANSWERED, HANDLE, POINT, resting, session_of, settled
+from tests.unit.live.test_page_in_a_browser import (
+    HANDLE,
+    POINT,
+    answered,
+    resting,
+    session_of,
+    settled,
+)
 
 pytest.importorskip("uvicorn")
 pytest.importorskip("starlette")
@@ -37,10 +44,7 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def opened(server: Server) -> Iterator[Tab]:
-    with browser() as tab:
-        tab.look(1400)
-        tab.visit(server.address)
-        tab.until(f"{ANSWERED} && !document.getElementById('gallery').disabled", seconds=120)
+    with answered(server, seconds=120) as tab:
         yield tab
 
 

@@ -19,7 +19,6 @@ from nlsdesign.components import (
     TRANSLATION,
     Assembly,
     Dashpot,
-    Domain,
     Driven,
     Encoder,
     Fixed,
@@ -38,7 +37,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.components.core.element import Element, Scope
+from nlsdesign.components.core.element import Scope
 from nlsdesign.components.core.part import parameter
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import (
@@ -52,22 +51,15 @@ from nlsdesign.foundation.quantity import Quantity, quantity
 from nlsdesign.foundation.spread import RelativeSpread
 from nlsdesign.foundation.symbolic import Expression
 from nlsdesign.model import FlatModel, Table, Variable, flatten
+from tests.physics.fed_by_rate import OneDimensional
 
 
 @dataclass(frozen=True, kw_only=True)
-class Backwards(Element):
+class Backwards(OneDimensional):
     """A spring with two numbers that asks for the second first."""
 
     first: Quantity = parameter("N/m", "first")
     second: Quantity = parameter("N/m", "second")
-
-    @property
-    def domain(self) -> Domain:
-        return TRANSLATION
-
-    @property
-    def needs_rate(self) -> bool:
-        return False
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         later = scope.parameter("second") * motion

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,7 @@ from nlsdesign.model.equations import equations
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 from tests import figure_samples as samples
-from tests.browser import Tab, browser, chromium
+from tests.browser import Tab, chromium
 
 pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
 
@@ -30,12 +29,6 @@ WIDEST = """(() => {
     .filter((e) => e.getBoundingClientRect().right > width + 1 && !scrolls(e) && !e.closest('.skip'))
     .map((e) => `${e.tagName} ${e.className} ${(e.textContent || '').slice(0, 40)}`);
 })()"""
-
-
-@pytest.fixture(scope="module")
-def tab() -> Iterator[Tab]:
-    with browser() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from nlsdesign.presentation.sweep_report import write_sweep_report
 from nlsdesign.sweeps import SmallerIsBetter
 from nlsdesign.sweeps.sweep_table import SweepTable
-from tests.browser import Tab, browser, chromium
+from tests.browser import Tab, chromium
 from tests.sweep_tables import HOSTILE, spread_table
 from tests.unit.presentation.test_report_in_a_browser import WIDEST
 
@@ -20,12 +19,6 @@ pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this 
 
 KEYS = {"Tab": 9, "Enter": 13, "Escape": 27, "End": 35, "Home": 36, "ArrowLeft": 37, "ArrowRight": 39}
 CHOSEN = "document.querySelector('aside.chosen')"
-
-
-@pytest.fixture(scope="module")
-def tab() -> Iterator[Tab]:
-    with browser() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import Variable, flatten
 from nlsdesign.simulation import Trace, range_warnings, simulate
-from tests.stretched import LENGTH, pulled, run, stress_at
+from tests.stretched import LENGTH, deck_head, pulled, run, stress_at
 
 TIMES = np.linspace(0.0, 1.0, 101)
 
@@ -91,25 +91,16 @@ def test_rounding_at_the_edge_is_no_warning_but_a_small_excess_is() -> None:
     assert found.time == 1.0
 
 
-DECK = """
-[deck]
-name = "pulled"
-description = "a piece of rubber in a grip"
-[grip]
-component = "Driven"
-domain = "translation"
-[rubber]
-component = "Specimen"
-between = ["grip"]
-area = {value = 100, unit = "mm^2", source = "test"}
-rest_length = {value = 12.5, unit = "mm", source = "test"}
-[rubber.law]
+DECK = (
+    deck_head("pulled", area=100)
+    + """[rubber.law]
 component = "NeoHooke"
 shear_modulus = {value = 0.4, unit = "MPa", source = "test"}
 [cell]
 component = "ForceSensor"
 of = "rubber.force"
 """
+)
 
 
 @pytest.mark.parametrize(("most", "said"), [(0.3, False), (0.8, True)])

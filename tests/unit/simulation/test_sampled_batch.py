@@ -24,10 +24,6 @@ from tests import observed as ob
 
 DESIRED = "controller.spring.torque.desired"
 KEPT = ("plant.spring.torque", "observer.spring.torque", "plant.motor.current")
-WIRES = {
-    "observer.motor.angle": "plant.motor_encoder.reading",
-    "controller.motor.angle": "plant.motor_encoder.reading",
-}
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +34,7 @@ def plant() -> FlatModel:
 @pytest.fixture(scope="module")
 def loop(plant: FlatModel) -> ClosedLoop:
     observer = design_observer(plant, gain=CascadeGain(), grid=FixedGrid(-1.2, 1.2, points=241))
-    return ClosedLoop(plant=plant, observer=observer, controller=torque_controller(plant), wires=WIRES)
+    return ClosedLoop(plant=plant, observer=observer, controller=torque_controller(plant), wires=ob.WIRES)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +64,7 @@ def test_each_run_of_a_batch_is_the_run_alone(loop: ClosedLoop, system: SampledS
             plant=loop.plant.with_values({"motor.inertia": inertias[i]}),
             observer=loop.observer,
             controller=loop.controller.with_values({"controller.proportional": gains[i]}),
-            wires=WIRES,
+            wires=ob.WIRES,
         ).run(0.3, inputs={DESIRED: lambda t, size=sizes[i]: size * wanted(t)})
         for name in KEPT:
             size = np.max(np.abs(alone[name]))
@@ -162,7 +158,7 @@ def test_observers_of_other_numbers_share_compiled_code(
         machine = plant.with_values({"motor.inertia": inertia})
         observer = design_observer(machine, gain=CascadeGain(), grid=FixedGrid(-1.2, 1.2, points=31))
         made = ClosedLoop(
-            plant=machine, observer=observer, controller=torque_controller(machine), wires=WIRES
+            plant=machine, observer=observer, controller=torque_controller(machine), wires=ob.WIRES
         ).system([DESIRED])
         given = {"inputs": {DESIRED: wanted}, "keep": KEPT, "start": {"plant.motor.angle": np.zeros(8)}}
         batch = run_batch(made, 0.02, translate=natively, **given)
@@ -190,7 +186,7 @@ def test_a_run_that_diverges_is_marked_and_leaves_the_others_alone(
 ) -> None:
     """One Runge-Kutta step per sample is unstable for a damping of 50 N·m·s/rad on the printed inertia."""
     coarse = ClosedLoop(
-        plant=loop.plant, observer=loop.observer, controller=loop.controller, wires=WIRES, substeps=1
+        plant=loop.plant, observer=loop.observer, controller=loop.controller, wires=ob.WIRES, substeps=1
     )
     batch = run_batch(
         coarse.system([DESIRED]), 2.0, inputs={DESIRED: 0.0}, start={"plant.motor.speed": 1.0},

@@ -24,10 +24,6 @@ from nlsdesign.simulation import simulate
 from tests import observed as ob
 
 DESIRED = "controller.spring.torque.desired"
-WIRES = {
-    "observer.motor.angle": "plant.motor_encoder.reading",
-    "controller.motor.angle": "plant.motor_encoder.reading",
-}
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +35,7 @@ def plant() -> FlatModel:
 def loop(plant: FlatModel) -> ClosedLoop:
     observer = design_observer_with_details(plant, grid=FixedGrid(-1.2, 1.2, points=241)).model
     controller = torque_controller(plant, gains=REPRODUCED_GAINS)
-    return ClosedLoop(plant=plant, observer=observer, controller=controller, wires=WIRES)
+    return ClosedLoop(plant=plant, observer=observer, controller=controller, wires=ob.WIRES)
 
 
 def wanted(time: float) -> float:
@@ -145,7 +141,7 @@ def test_bad_wires_and_names(loop: ClosedLoop, plant: FlatModel) -> None:
 
 
 def test_a_wire_from_a_variable_that_does_not_exist(loop: ClosedLoop) -> None:
-    wires = WIRES | {"controller.spring.torque": "observer.spring.tork"}
+    wires = ob.WIRES | {"controller.spring.torque": "observer.spring.tork"}
     with pytest.raises(UnknownNameError, match=r"did you mean 'observer\.spring\.torque'"):
         changed(loop, wires=wires).run(0.01, inputs={DESIRED: 0.0})
 
