@@ -65,7 +65,8 @@ def _advice(name: str) -> str:
     for home, inner in (place for place in homes.values() if place[0] != "models"):
         value = _value(home, inner)
         module = value if isinstance(value, ModuleType) else importlib.import_module(home, __name__)
-        if name in _public(module):
+        own = [n for n, v in vars(module).items() if getattr(v, "__module__", None) == module.__name__]
+        if name in getattr(module, "__all__", [n for n in own if not n.startswith("_")]):
             return f"{text}; it is {module.__name__}.{name}"
     from .components.assembly.renamed import renamed  # here, as components take time to load
 
@@ -74,8 +75,3 @@ def _advice(name: str) -> str:
         return f"{text}; {old}"
     near = nearest(name, homes)
     return f"{text}; did you mean '{near}'?" if near else f"{text}; dir(nlsdesign) lists the public names"
-
-
-def _public(module: ModuleType) -> list[str]:
-    own = [n for n, v in vars(module).items() if getattr(v, "__module__", None) == module.__name__]
-    return getattr(module, "__all__", [n for n in own if not n.startswith("_")])

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import fmpy
+import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Model, FMU3Slave
@@ -19,6 +20,7 @@ from nlsdesign.export import export_fmu
 from nlsdesign.model import FlatModel
 
 VERSIONS = ("2.0", "3.0")
+both = pytest.mark.parametrize("version", VERSIONS)
 Refused = FMICallException
 Kind = TypeVar("Kind", bound="Unit")
 

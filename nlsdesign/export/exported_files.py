@@ -13,8 +13,9 @@ import re
 import stat
 import tomllib
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +212,7 @@ def _text(path: Path, size: int) -> str:
         raise ExportError(str(path), f"is no text in UTF-8: {error.reason} at byte {error.start}") from None
 
 
-def _commented(path: Path, size: int) -> ExportedFile | None:
+def _commented(path: Path, size: int, kind: str) -> ExportedFile | None:
     """Return what the comments of a text say; C and Modelica have the same comments."""
     text = _text(path, size)
     stamp, line, whole = stamp_of(text), _DECK_LINE.search(text), _macro(text, "DECK_DIGEST")
@@ -226,7 +227,6 @@ def _commented(path: Path, size: int) -> ExportedFile | None:
     if len(decks) > 1:
         edited = edited or f"it names {len(decks)} decks: {', '.join(sorted(decks))}"
     digest = whole or (line[2] if line else "") or (stamp.deck if stamp else "")
-    kind = "Modelica" if path.suffix == ".mo" else "C"
     return ExportedFile(path, kind, line[1] if line else "", digest, _macro(text, "PARENT_DIGEST"), edited)
 
 
@@ -323,10 +323,11 @@ def _deck(path: Path, size: int) -> ExportedFile | None:
     return ExportedFile(path, "deck", assembly.name, digest, parent, edited)
 
 
-_READERS = {
-    ".c": _commented,
-    ".h": _commented,
-    ".mo": _commented,
+_C = partial(_commented, kind="C")
+_READERS: Mapping[str, Callable[[Path, int], ExportedFile | None]] = {
+    ".c": _C,
+    ".h": _C,
+    ".mo": partial(_commented, kind="Modelica"),
     ".fmu": _fmu,
     ".toml": _deck,
 }

@@ -172,7 +172,9 @@ class _Guard:
     def end(self, *, announced: bool = False) -> None:
         """End the processes that were started, remove what is temporary, and end this process."""
         self._ending.acquire()  # never released: whoever comes second waits for the end
-        _end_children()
+        for number in _descendants():  # none where the system does not list them
+            with contextlib.suppress(OSError):
+                os.kill(number, signal.SIGKILL)
         self._sweep()
         with contextlib.suppress(OSError, ValueError):
             sys.stdout.flush()
@@ -198,13 +200,6 @@ class _Guard:
             if not self._folder.exists():
                 return
             time.sleep(0.02)  # a process that was ended just now may still have written
-
-
-def _end_children() -> None:
-    """End all processes that descend from this one, where the system lists them."""
-    for number in _descendants():
-        with contextlib.suppress(OSError):
-            os.kill(number, signal.SIGKILL)
 
 
 def _descendants() -> list[int]:

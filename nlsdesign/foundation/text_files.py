@@ -271,7 +271,8 @@ def draft(target: Path) -> Iterator[Path]:
         os.replace(name, place)
         note_written(place)
     except OSError as error:
-        raise _not_writable(target, error) from error
+        rule = f"cannot be written ({error.strerror or error})"
+        raise ExportError(str(target), rule, next_step="name another file or folder") from error
     finally:
         with contextlib.suppress(OSError):  # where its folder could not be made
             name.unlink(missing_ok=True)
@@ -322,9 +323,3 @@ def write_table(path: Path, rows: Iterable[Sequence[str]]) -> None:
     """
     with draft(path) as name, name.open("w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows(rows)
-
-
-def _not_writable(target: Path, error: OSError) -> ExportError:
-    return ExportError(
-        str(target), f"cannot be written ({error.strerror or error})", next_step="name another file or folder"
-    )

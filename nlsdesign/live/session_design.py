@@ -45,17 +45,14 @@ class PageQuestions:
     def answer(self, asked: Asked) -> None:
         """Answer a message; what cannot be done is refused in words."""
         try:
-            self._do(asked)
+            what = asked.get("what")
+            if not isinstance(what, str) or what not in self._kinds:
+                raise unknown_name("message", str(what)[:80], self._kinds)
+            self._kinds[what](asked)
         except NlsError as error:
             self._news.refuse(str(error), _number(asked))
         except Exception as error:  # a fault of ours must not take the design with it
             self._news.refuse(f"a fault of the program: {type(error).__name__}: {error}", _number(asked))
-
-    def _do(self, asked: Asked) -> None:
-        what = asked.get("what")
-        if not isinstance(what, str) or what not in self._kinds:
-            raise unknown_name("message", str(what)[:80], self._kinds)
-        self._kinds[what](asked)
 
     def _show(self, asked: Asked) -> None:
         self._news.everything(_number(asked))

@@ -337,7 +337,9 @@ class SessionNews:
         try:
             if self._look_due:
                 self._look_due = False
-                self._look()
+                if self.live.shown is not None and self._angle is not None:
+                    at = angle_data(self.live.at(self._angle))
+                    self._outbox.page({"what": "at", "number": None, "at": at})
             if self._settle_at is not None and time.monotonic() >= self._settle_at:
                 self._settle_at = None
                 self.live.start(SettleDesign())
@@ -354,11 +356,6 @@ class SessionNews:
                 self._look_due = True
         if self.live.answer is not before:
             self.answer(self.live.answer, None, None)
-
-    def _look(self) -> None:
-        if self.live.shown is not None and self._angle is not None:
-            at = angle_data(self.live.at(self._angle))
-            self._outbox.page({"what": "at", "number": None, "at": at})
 
 
 @functools.cache

@@ -192,7 +192,9 @@ class Sessions:
     async def new(self) -> Session | None:
         """Return a new session; ``None`` where the largest number is open, each in a tab of its own."""
         if len(self._sessions) >= MOST:
-            alone = sorted((each for each in self._sessions.values() if not each.shown), key=_touched)
+            alone = sorted(
+                (each for each in self._sessions.values() if not each.shown), key=lambda each: each.touched
+            )
             if not alone:
                 return None
             self.end(alone[0])
@@ -226,7 +228,3 @@ class Sessions:
         for each in processes:
             each.kill()
         return processes
-
-
-def _touched(session: Session) -> float:
-    return session.touched

@@ -490,7 +490,11 @@ def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDes
     with tempfile.TemporaryDirectory() as folder:
         files = export_c(both, folder, name="observer_and_controller")
         head = f"/* {design.note} */\n" if design.note else ""
-        content = _archive([files.header, files.source, files.selftest], head)
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+            for file in [files.header, files.source, files.selftest]:
+                archive.writestr(zipfile.ZipInfo(file.name, _OLD), head.encode() + file.read_bytes())
+        content = buffer.getvalue()
     return ExportedDesign("observer_and_controller.zip", "application/zip", content)
 
 
@@ -529,11 +533,3 @@ def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
         files = write_drawings(Path(folder), design.contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
     return ExportedDesign(f"cam.{ending}", _MEDIA[ending], content)
-
-
-def _archive(files: list[Path], head: str) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in files:
-            archive.writestr(zipfile.ZipInfo(file.name, _OLD), head.encode() + file.read_bytes())
-    return buffer.getvalue()

@@ -26,7 +26,7 @@ from ..feedback.observer import (
 )
 from ..feedback.observer.scheduling.scheduled import whole_contour
 from ..foundation.errors import ArrangementError, NlsError, ValueRangeError
-from ..model import FlatModel, flatten
+from ..model import flatten
 from ..model.roles import series_cam, series_spring
 from ..simulation import Prior
 from .range_remarks import swept_angle
@@ -93,7 +93,12 @@ def readiness(declared: Assembly) -> list[Readiness]:
         blocks_of(model, measured)
 
     def design() -> None:
-        _begin_design(declared, model)
+        # What a design does before its search.
+        cam = series_cam(model)
+        angle = 0.8 * model.values[cam.last_angle] if cam.last_angle else 0.5
+        target = ExponentialTorque(maximum=1.0, angle=angle, shape=1.0)
+        question, free = Wanted(target, None, (), None, GOALS).question(declared, USUAL)
+        question.search(free)
 
     asked: dict[str, Callable[[], None]] = {
         "simulate": plant,
@@ -121,15 +126,6 @@ def errors_while_running(actuator: Assembly) -> dict[str, Callable[[Prior], floa
     except (ArrangementError, ValueRangeError):
         return {}
     return {"torque while running, best estimate": least}
-
-
-def _begin_design(declared: Assembly, model: FlatModel) -> None:
-    """Do what a design does before its search."""
-    cam = series_cam(model)
-    angle = 0.8 * model.values[cam.last_angle] if cam.last_angle else 0.5
-    target = ExponentialTorque(maximum=1.0, angle=angle, shape=1.0)
-    question, free = Wanted(target, None, (), None, GOALS).question(declared, USUAL)
-    question.search(free)
 
 
 def _refusal(check: Callable[[], None]) -> NlsError | None:

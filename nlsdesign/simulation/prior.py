@@ -140,8 +140,8 @@ class Prior:
     @property
     def root(self) -> Array:
         """R with R·Rᵀ = covariance, shape (numbers, numbers): the x are R times independent unit normals."""
-        # Of the correlation the symmetric root, which follows the covariance without jumps: the same random
-        # numbers draw comparable values before and after something was learned.
+        # For the correlation it is the symmetric one, which follows the covariance without jumps: the same
+        # random numbers draw comparable values before and after something was learned.
         size = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         scale = np.where(size > 0.0, size, 1.0)
         strength, axes = np.linalg.eigh(self.covariance / np.outer(scale, scale))

@@ -193,8 +193,8 @@ def integrate_explicitly(
                     raise ConvergenceError(
                         f"simulation of {model.name}",
                         f"no step is short enough at t = {now:g} s",
-                        next_step="check the inputs for jumps beyond the range of the laws, "
-                        "or start nearer to rest",
+                        next_step="check the inputs for jumps beyond the range of the laws, or "
+                        "start nearer to rest",
                     )
             done += 1
             if done > budget:

@@ -142,8 +142,11 @@ class SampleWriter:
         model = self.system.blocks[owner]
         u, columns = self._seen(owner, state)
         s = model.symbols()
-        results = [ca.densify(s.derivative), ca.densify(s.output)]
-        step = ca.Function("step", [s.state, s.input, s.parameter, s.table], results)
+        step = ca.Function(
+            "step",
+            [s.state, s.input, s.parameter, s.table],
+            [ca.densify(s.derivative), ca.densify(s.output)],
+        )
         after, output = step(state, u, self.own_parameters[owner], columns)
         self.known |= {f"{owner}.{v.name}": u[i] for i, v in enumerate(model.inputs)}
         self.known |= {f"{owner}.{v.name}": output[i] for i, v in enumerate(model.outputs)}

@@ -269,10 +269,8 @@ class RandomDraws(AxisSet):
             raise ValueRangeError(f"random draws: names = '{given}'", "is one text, not a list",
                                   next_step=f"write names = ['{given}']")  # fmt: skip
         prior = declared_prior(flatten(subject.base))
-        groups = {
-            key: list(inner)
-            for key, inner in itertools.groupby(prior.names, key=lambda name: name.partition("[")[0])
-        }
+        by_head = itertools.groupby(prior.names, key=lambda name: name.partition("[")[0])
+        groups = {head: list(inner) for head, inner in by_head}
         places: dict[str, tuple[int, bool]] = {}
         for head, inner in groups.items():
             shape = len(inner) > LONGEST_ROW
@@ -311,6 +309,12 @@ class RandomDraws(AxisSet):
 
 def _ends_of(ends: Array, at: list[int], shapes: Any, without: float) -> Array:
     return np.where(shapes, without, ends[at]) if len(ends) else np.full(len(at), without)
+
+
+def _chosen(name: str, places: Mapping[str, tuple[int, bool]]) -> tuple[int, bool]:
+    if name not in places:
+        raise unknown_name("number with a spread", name, places)
+    return places[name]
 
 
 def _ends(column: SweepColumn, ends: tuple[Any, ...]) -> tuple[float, float]:

@@ -126,7 +126,12 @@ def _of_answer(
         )
     kept = {axis: column[good] for axis, column in axes.items()}
     remarks = [f"{lost} points without a finite answer are left out"] if lost else []
-    grid = _full_grid(kept)
+    # Whether every combination of the values of the axes stands there, and once.
+    columns = np.column_stack([codes(values) for values in kept.values()])
+    sizes = [len(np.unique(column)) for column in columns.T]
+    grid = bool(np.prod(np.array(sizes, dtype=float)) == len(columns)) and len(
+        np.unique(columns, axis=0)
+    ) == len(columns)
     if grid and not lost:
         method = (
             "exact shares of the variance over all points of the grid, all of the same weight, no interval"
@@ -157,15 +162,6 @@ def _ordered(indices: Sequence[SensitivityIndex]) -> tuple[SensitivityIndex, ...
     return tuple(
         sorted(indices, key=lambda each: -np.nan_to_num(max(each.first, each.total, key=np.nan_to_num)))
     )
-
-
-def _full_grid(axes: Mapping[str, NDArray[Any]]) -> bool:
-    """Tell whether every combination of the values of the axes stands there once."""
-    columns = np.column_stack([codes(values) for values in axes.values()])
-    sizes = [len(np.unique(column)) for column in columns.T]
-    return bool(np.prod(np.array(sizes, dtype=float)) == len(columns)) and len(
-        np.unique(columns, axis=0)
-    ) == len(columns)
 
 
 def _by_grid(axes: Mapping[str, NDArray[Any]], values: Array) -> list[SensitivityIndex]:

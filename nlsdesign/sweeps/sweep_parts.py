@@ -77,7 +77,7 @@ class Parts:
         self._folder, self._columns = folder, tuple(columns)
         self._schema = schema(columns, timed=True)
         self._next = 1 + max(
-            (int(path.stem) for path in part_files(folder) if path.stem.isdecimal()), default=0
+            (int(path.stem) if path.stem.isdecimal() else 0 for path in part_files(folder)), default=0
         )
         self.damaged: list[str] = []
         """Names of parts that could not be read; their points are computed again."""
@@ -144,10 +144,11 @@ class Parts:
         order = _Order(self._folder, self._columns)
         target = self._folder / RESULTS_FILE
         pyarrow, _ = libraries()
-        _write(self._folder / TIMINGS_FILE, (
+        timings = (
             block.rename_columns(["point", "seconds", "worker"])
             for block in order.blocks(["point", _SECONDS, _WORKER])
-        ),
+        )
+        _write(self._folder / TIMINGS_FILE, timings,
                pyarrow.schema([("point", pyarrow.int64()), ("seconds", pyarrow.float64()),
                                ("worker", pyarrow.string())]))  # fmt: skip
         names = [column.name for column in self._columns]

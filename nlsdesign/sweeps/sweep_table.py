@@ -143,8 +143,10 @@ class SweepTable:
             raise MeasurementError("sweep", f"has no {DECK_FILE} beside its table",
                                    next_step="run the sweep again into another folder")  # fmt: skip
         values = {axis.name: self.values[axis.name][row] for axis in self.axes}
-        decks = {name: read_deck(text, Path(f"{name}.toml")) for name, text in self.decks.items()}
-        return changed_assembly({name: declare(deck) for name, deck in decks.items()}, values)
+        return changed_assembly(
+            {name: declare(read_deck(text, Path(f"{name}.toml"))) for name, text in self.decks.items()},
+            values,
+        )
 
 
 def about_text(about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> str:

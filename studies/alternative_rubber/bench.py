@@ -231,7 +231,7 @@ class Bench:
             "plant.load.angle": moved * np.sin(turn * time),
             "plant.load.speed": moved * turn * np.cos(turn * time),
         }
-        shares = np.array([_shares(r.rubber.loss_tangent) for r in runs])
+        shares = np.array([flat_relaxation(r.rubber.loss_tangent, branches=BRANCHES).shares for r in runs])
         names = [f"plant.spring.rubber.relaxing.shares[{i + 1}]" for i in range(BRANCHES)]
         parameters = dict(zip(names, shares.T, strict=True))
         area = self.actuator.quantities()["spring.rubber.area"].number
@@ -250,7 +250,3 @@ class Bench:
             tuple(runs), batch.time, batch[loop.torque], modulus * batch[loop.estimate], batch[CURRENT],
             batch["plant.motor.angle"] - batch["plant.load.angle"], torque * wave[:, : len(batch.time)],
         )  # fmt: skip
-
-
-def _shares(loss_tangent: float) -> tuple[float, ...]:
-    return flat_relaxation(loss_tangent, branches=BRANCHES).shares

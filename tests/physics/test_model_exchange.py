@@ -28,11 +28,10 @@ from nlsdesign.export import export_fmu
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
-from tests.fmu_unit import VERSIONS, Unit, opened
+from tests.fmu_unit import VERSIONS, Unit, both, opened
 from tests.hand_built import plant
 
 STEP = 1e-3
-both = pytest.mark.parametrize("version", VERSIONS)
 
 
 def stairs(times: np.ndarray, values: np.ndarray, name: str) -> np.ndarray:

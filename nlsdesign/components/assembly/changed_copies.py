@@ -72,7 +72,11 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
     'CoulombFriction(sliding_effort = 0.05 N·m, creep_speed = 0.01 rad/s)'
     """
     asked = dict(widths or {})
-    sharp = {path: part for path, part in assembly.walk() if not _smooth(_law(part))}
+    sharp = {
+        path: part
+        for path, part in assembly.walk()
+        if isinstance(law := _law(part), Element) and not law.is_smooth
+    }
     for name in asked:
         if name not in sharp:
             raise unknown_name("element that is not smooth", name, sharp)
@@ -107,7 +111,3 @@ def sharpened(assembly: Assembly) -> Assembly:
 
 def _law(part: Part) -> Part:
     return part.element if isinstance(part, Tie) else part
-
-
-def _smooth(law: Part) -> bool:
-    return not isinstance(law, Element) or law.is_smooth

@@ -113,8 +113,9 @@ def _inertias(machine: Assembly) -> Iterator[str]:
                 reflected = Quantity(float(f"{part.inertia.number * n * n:.4g}"), part.inertia.unit)
                 yield (
                     f"{name}.inertia: {part.inertia} is that at the gear's output; the rotor would then have "
-                    f"{_in_grams(part.inertia.number / n**2)} and speed up with {fast:.2g} rad/s², more than "
-                    f"motors do -> if {part.inertia} is that of the rotor, write {reflected}, times {n:g}^2"
+                    f"{Quantity(part.inertia.number / n**2, 'g*cm^2')} and speed up with {fast:.2g} rad/s², "
+                    f"more than motors do -> if {part.inertia} is that of the rotor, write {reflected}, "
+                    f"times {n:g}^2"
                 )
         elif isinstance(part, ElectricMotor) and name in gears and abs(gears[name].ratio.number) > 1.0:
             n = abs(gears[name].ratio.number)
@@ -127,7 +128,3 @@ def _inertias(machine: Assembly) -> Iterator[str]:
                     f"largest current speeds up with {slow:.2g} rad/s² only -> if it is that at the gear's "
                     f"output, write {own}, divided by {n:g}^2"
                 )
-
-
-def _in_grams(inertia: float) -> str:
-    return str(Quantity(inertia, "g*cm^2"))

@@ -144,7 +144,9 @@ class Assembly(NotebookCircuits):
             if old is None:
                 raise unknown_name("part", path, (where for where, _ in self.walk()))
             inner = old.element if isinstance(old, Tie) else old
-            inside = _with_inner(inner, tail, new)
+            owner, _, name = tail.rpartition(".")
+            holder = find(inner, owner)
+            inside = replaced(inner, owner, holder.with_children({**holder.children(), name: new}))
             parts[head] = old.around(inside) if isinstance(old, Tie) else inside
         elif isinstance(old, Tie) and isinstance(new, Element):
             parts[head] = old.around(new)
@@ -217,12 +219,6 @@ class Assembly(NotebookCircuits):
 
     def __str__(self) -> str:
         return draw(f"{self.name}: {self.description}".rstrip(": "), self.parts)
-
-
-def _with_inner(root: Part, path: str, new: Part) -> Part:
-    owner, _, name = path.rpartition(".")
-    holder = find(root, owner)
-    return replaced(root, owner, holder.with_children({**holder.children(), name: new}))
 
 
 def arrangement_problems(

@@ -25,10 +25,8 @@ def kelvin_voigt(*, modulus: Number, viscosity: Number) -> Parallel:
 
     Parameters
     ----------
-    modulus
-        E in Pa.
-    viscosity
-        η in Pa·s.
+    modulus, viscosity
+        E in Pa and η in Pa·s.
 
     Examples
     --------
@@ -45,10 +43,8 @@ def maxwell(*, modulus: Number, viscosity: Number) -> Series:
 
     Parameters
     ----------
-    modulus
-        E in Pa.
-    viscosity
-        η in Pa·s.
+    modulus, viscosity
+        E in Pa and η in Pa·s.
 
     Examples
     --------

@@ -34,7 +34,13 @@ class StretchyCable(Combination):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_pulled(self)
+        kind = type(self).__name__
+        for name, member in self.members:
+            if member.needs_rate:
+                raise ArrangementError(
+                    f"{kind} member '{name}'", "its force depends directly on the rate",
+                    next_step="use series(cable=Spring(...), ...) inside pull_only(...) instead",
+                )  # fmt: skip
 
     @property
     def needs_rate(self) -> bool:
@@ -69,13 +75,3 @@ def newton_root(residual: Expression, unknown: Expression, start: Expression) ->
     for _ in range(_STEPS):
         start = newton(start, *others)
     return start
-
-
-def _check_pulled(cable: Combination) -> None:
-    kind = type(cable).__name__
-    for name, member in cable.members:
-        if member.needs_rate:
-            raise ArrangementError(
-                f"{kind} member '{name}'", "its force depends directly on the rate",
-                next_step="use series(cable=Spring(...), ...) inside pull_only(...) instead",
-            )  # fmt: skip

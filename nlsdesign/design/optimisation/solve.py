@@ -21,7 +21,6 @@ from .finish import SolvedSearch, finished, narrowed
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Limit
 from .problem import contour_names
-from .program import Solution
 from .result import Alternative, CamDesign
 from .settings import DesignSettings, no_progress
 from .several_starts import SeveralStarts
@@ -158,7 +157,14 @@ class Wanted:
         if not any(outcome.solved for outcome in outcomes):
             # Whether there is any cam at all is found out with softened limits.
             outcomes.append(search.program.solve(feasible_point(search, free)))
-        taken = _best(outcomes)
+        solved = [i for i, outcome in enumerate(outcomes) if outcome.solved]
+        if not solved:
+            raise ConvergenceError(
+                "design",
+                f"IPOPT stopped with '{outcomes[0].status}' after {outcomes[0].iterations} iterations",
+                next_step="widen the narrowest limit, free one number more, or smooth the rubber's law",
+            )
+        taken = min(solved, key=lambda i: outcomes[i].cost)
         return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
@@ -190,13 +196,3 @@ class Wanted:
             raise errors[0].at(place)
         best = min(costs, key=lambda i: (not table[i].met, costs[i]))
         return replace(self.designed(options[best][1], settings), alternatives=tuple(table))
-
-
-def _best(outcomes: Sequence[Solution]) -> int:
-    solved = [i for i, outcome in enumerate(outcomes) if outcome.solved]
-    if not solved:
-        raise ConvergenceError(
-            "design", f"IPOPT stopped with '{outcomes[0].status}' after {outcomes[0].iterations} iterations",
-            next_step="widen the narrowest limit, free one number more, or smooth the rubber's law",
-        )  # fmt: skip
-    return min(solved, key=lambda i: outcomes[i].cost)

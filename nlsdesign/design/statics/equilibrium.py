@@ -68,19 +68,15 @@ def _rewritten(
         a, b = operands if len(operands) == 2 else (operands[0], ca.SX(0))
         width = widths[len(distances)] if widths else 0.0
         distances.append(a - b)
-        return _corner(operation, a, b, width)
+        away = a - b
+        sharp = not isinstance(width, ca.SX) and width <= 0.0
+        size = ca.fabs(away) if sharp else ca.sqrt(away**2 + width**2)
+        if operation == ca.OP_FABS:
+            return size
+        return (a + b + size) / 2 if operation == ca.OP_FMAX else (a + b - size) / 2
 
     values = fold(read_graph(function), lambda i, k: arguments[i].nz[k], ca.SX, combined=written)
     return as_results(function, values), distances
-
-
-def _corner(code: int, a: Expression, b: Expression, width: float | Expression) -> Expression:
-    away = a - b
-    sharp = not isinstance(width, ca.SX) and width <= 0.0
-    size = ca.fabs(away) if sharp else ca.sqrt(away**2 + width**2)
-    if code == ca.OP_FABS:
-        return size
-    return (a + b + size) / 2 if code == ca.OP_FMAX else (a + b - size) / 2
 
 
 @dataclass(frozen=True, eq=False)

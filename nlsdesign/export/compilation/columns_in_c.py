@@ -175,8 +175,10 @@ def _crossing(body: ColumnGraph) -> list[int]:
 
 
 def _once(number: int, body: ColumnGraph, crossing: Sequence[int], constants: Mapping[int, str]) -> str:
-    given = [k for argument in body.arguments for k in argument if k in body.fixed]
-    names = dict(constants) | {k: f"a[{i}]" for i, k in enumerate(given)}
+    names = dict(constants) | {
+        k: f"a[{i}]"
+        for i, k in enumerate(k for argument in body.arguments for k in argument if k in body.fixed)
+    }
     lines = [_operation(s, body, names) for s in body.steps if _is_fixed(s, body)]
     lines += [f"o[{i}] = {_name(k, names)};" for i, k in enumerate(crossing)]
     text = "\n    ".join(lines)

@@ -184,11 +184,17 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
     what = f"instance '{instance}' ({archive})"
     try:
         read = fmpy.read_model_description(str(folder))
-        scalars = (v for v in read.modelVariables if v.type in _KINDS and not getattr(v, "dimensions", None))
-        variables = {v.name: _variable(v) for v in scalars}
+        variables = {
+            v.name: _variable(v)
+            for v in read.modelVariables
+            if v.type in _KINDS and not getattr(v, "dimensions", None)
+        }
     except Exception as error:
         # Whatever a damaged description makes the XML and FMI libraries raise.
-        raise ExportError(what, f"is not a valid FMU: {_brief(error)}") from error
+        # What Python raises where something is missing names only that.
+        named = isinstance(error, LookupError) or not str(error).strip()
+        said = fit_to_show(f"{type(error).__name__} {error}" if named else error)
+        raise ExportError(what, f"is not a valid FMU: {said}") from error
     offered = read.coSimulation
     if offered is None or read.fmiVersion == "1.0":
         raise ExportError(what, "is not a co-simulation FMU of FMI 2.0 or 3.0")
@@ -230,9 +236,3 @@ def _variable(read: Any) -> FmuScalar:
     return FmuScalar(
         read.name, int(read.valueReference), read.causality, read.variability, _KINDS[read.type], unit, start
     )
-
-
-def _brief(error: BaseException) -> str:
-    # What Python raises where something is missing names only that.
-    named = isinstance(error, LookupError) or not str(error).strip()
-    return fit_to_show(f"{type(error).__name__} {error}" if named else error)

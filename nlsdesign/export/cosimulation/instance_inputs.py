@@ -116,7 +116,10 @@ class ConnectedInputs:
         return feeds
 
     def _feed(self, name: str, variable: str, link: Link) -> Feed:
-        first = self._start(name, variable)
+        value = np.zeros(1)
+        instance = self._instances[name]
+        instance.reader([instance.description.variables[variable]], value)()
+        first = float(value[0])
         held = HeldFeed(self._now, self._columns[link.source], link.gain)
         if self._plan.curved(link):
             if not link.delay and self._plan.sampled(name):
@@ -132,12 +135,6 @@ class ConnectedInputs:
             # Without an order as with every master that passes initial values on.
             return LateFeed(held, samples, period, period, first if self._plan.order else None)
         return replace(held, samples=samples, first=first) if self._plan.order else held
-
-    def _start(self, name: str, variable: str) -> float:
-        value = np.zeros(1)
-        instance = self._instances[name]
-        instance.reader([instance.description.variables[variable]], value)()
-        return float(value[0])
 
     def _curve(self, source: str) -> Curve:
         instance, variable = split_name(source)

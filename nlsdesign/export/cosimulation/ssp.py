@@ -310,7 +310,7 @@ def write_ssp(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-ssp-") as folder:
         descriptions = unpacked_fmus(fmus, Path(folder))
         check_wires(descriptions, joined)
-        check_signals(descriptions, joined, dict.fromkeys(inputs, lambda time: 0.0), given)
+        check_signals(descriptions, joined, dict.fromkeys(inputs, lambda _: 0.0), given)
         writer = _Structure(descriptions, joined, given, (tuple(order), tuple(inputs)), version)
         entries: dict[str, bytes] = {STRUCTURE_FILE: writer.structure(Path(path).stem)}
         entries |= writer.values()

@@ -203,10 +203,10 @@ def _as_shown(model: FlatModel, sizes: Mapping[str, float]) -> FlatModel:
         intervals = ranges(ca.Function("shown", groups, [ca.densify(expressions)]), bounds)
         depends = ca.jacobian_sparsity(expressions, s.parameter).row()
         return [
-            replace(v, minimum=min(v.minimum, low), maximum=max(v.maximum, high))
+            replace(v, minimum=min(v.minimum, interval[0]), maximum=max(v.maximum, interval[1]))
             if v.bounded and i in depends
             else v
-            for i, (v, (low, high)) in enumerate(zip(variables, intervals, strict=True))
+            for i, (v, interval) in enumerate(zip(variables, intervals, strict=True))
         ]
 
     signals = tuned(model.signals, s.signal) if model.sample_time else model.signals

@@ -204,7 +204,11 @@ class _Team:
     def finished(self, seconds: float) -> list[Finished]:
         if not self._alive():
             return self._connected_again()
-        ended = self._waited_for(seconds)
+        ended: list[Any] = []
+        with contextlib.suppress(queue.Empty):
+            ended.append(self._ended.get(timeout=seconds))
+            while True:
+                ended.append(self._ended.get_nowait())
         finished: list[Finished] = []
         for future in ended:
             if future.key in self._flying:
@@ -214,14 +218,6 @@ class _Team:
                 finished.append((self._flying.pop(future.key)[1], outcome))
         self._look_for_workers(bool(finished))
         return finished
-
-    def _waited_for(self, seconds: float) -> list[Any]:
-        ended = []
-        with contextlib.suppress(queue.Empty):
-            ended.append(self._ended.get(timeout=seconds))
-            while True:
-                ended.append(self._ended.get_nowait())
-        return ended
 
     def _look_for_workers(self, moving: bool) -> None:
         """End with a message when there has been no worker for a long time."""

@@ -201,7 +201,7 @@ class _Team:
 
     def submit(self, chunk: Chunk) -> None:
         while True:
-            worker = self._idle.pop() if self._idle else self._new()
+            worker = self._idle.pop() if self._idle else _Worker(self._work, [*self._idle, *self._busy])
             try:
                 worker.connection.send(chunk)
             except OSError:  # it was killed while it had nothing to do
@@ -210,9 +210,6 @@ class _Team:
             worker.chunk = chunk
             self._busy.append(worker)
             return
-
-    def _new(self) -> _Worker:
-        return _Worker(self._work, [*self._idle, *self._busy])
 
     def finished(self, seconds: float) -> list[Finished]:
         ends: list[Any] = [end for each in self._busy for end in (each.connection, each.process.sentinel)]

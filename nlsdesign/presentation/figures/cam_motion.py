@@ -15,7 +15,7 @@ from ...design import Contour, elastic_law
 from ...design.statics.contour import turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import MM
+from ...foundation.quantity import MM, typeset_number
 from ...model import FlatModel
 from .style import (
     BLUE,
@@ -29,7 +29,6 @@ from .style import (
     WIDTH,
     described,
     panels,
-    significant,
     styled,
 )
 
@@ -398,7 +397,7 @@ def torque_curve(motion: CamMotion, *, at: int) -> Figure:
     axes.margins(x=0.03)
     axes.set_xlabel("angle in degrees")
     axes.set_ylabel("torque in N·m")
-    top = significant(float(np.max(motion.torques)))
+    top = typeset_number(float(np.max(motion.torques)))
     return described(
         figure,
         f"Torque over the angle from {degrees[0]:.0f}° to {degrees[-1]:.0f}°, up to {top} N·m, one marked.",

@@ -70,13 +70,11 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
     with mpl.rc_context(STYLE), _any_letters():
         figure.savefig(stream, format="svg", metadata={"Date": None})
     root = ET.fromstring(stream.getvalue())
-    # The style for ``*`` would act on the whole page, and the metadata are not shown.
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
                 parent.remove(child)
-    links = (e.get(a, "") for e in root.iter() for a in (_LINK, "clip-path", "style"))
-    kept = {name for text in links for name in _REFERENCE.findall(text)}
+    kept = {name for element in root.iter() for name in _references(element)}
     kept |= {str(artist.get_gid()) for artist in figure.findobj() if artist.get_gid()}
     for element in root.iter():
         _adapt(element, key, kept)
@@ -139,6 +137,11 @@ def _content(figure: Figure, suffix: str) -> bytes:
         else:
             figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
     return stream.getvalue()
+
+
+def _references(element: ET.Element) -> set[str]:
+    links = [element.get(_LINK, ""), element.get("clip-path", ""), element.get("style", "")]
+    return {name for text in links for name in _REFERENCE.findall(text)}
 
 
 def _adapt(element: ET.Element, key: str, kept: set[str]) -> None:

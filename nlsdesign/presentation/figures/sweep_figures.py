@@ -282,9 +282,9 @@ def answers_against(
     for number, (column, panel) in enumerate(zip(others, axes, strict=False)):
         across = column.numbers()
         if len(columns) == 2:
-            order = np.argsort(across[kinds.front], kind="stable")
-            front = across[kinds.front][order], up[kinds.front][order]
-            panel.plot(*front, color=HOLDS.light, linewidth=1.0, alpha=0.6, zorder=1)
+            x, y = across[kinds.front], up[kinds.front]
+            order = np.argsort(x, kind="stable")
+            panel.plot(x[order], y[order], color=HOLDS.light, linewidth=1.0, alpha=0.6, zorder=1)
         scatter_points(panel, across, up, kinds=kinds)
         for value, draw in ((wanted[0], panel.axhline), (wanted[number + 1], panel.axvline)):
             if value is not None:

@@ -183,7 +183,8 @@ def _main_view(page: Sheet, view: _View) -> None:
             linewidth=THIN if hole.base_only else THICK, linestyle=(0, (3, 2)) if hole.base_only else "-",
             facecolor="none" if hole.base_only else SURFACE.light,
         )  # fmt: skip
-        centre, reach = view.at(hole.centre), view.scale * MM * hole.diameter / 2 + 1.2
+        centre = view.at(hole.centre)
+        reach = view.scale * MM * hole.diameter / 2 + 1.2
         for step in (np.array([reach, 0.0]), np.array([0.0, reach])):
             page.line(centre - step, centre + step, color=MUTED.light, width=0.3)
     for cable in part.cables:

@@ -23,7 +23,7 @@ from ...bench.discrepancy.reporting.verdict import (
     suspicions,
 )
 from ...foundation.errors import unknown_name
-from ...foundation.quantity import three_digits, typeset_unit, with_error
+from ...foundation.quantity import three_digits, typeset_number, typeset_unit, with_error
 from ...model import FlatModel, flatten
 from ..figures import RecordError, compact, gap_bars
 from ..figures.before_after import (
@@ -33,7 +33,6 @@ from ..figures.before_after import (
     candidate_shares,
     held_out_series,
 )
-from ..figures.style import significant
 from .sections import (
     Chapter,
     FigureSection,
@@ -147,17 +146,19 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
     verdict
         Result of a diagnosis.
     """
-    reasons = suspicions(verdict)  # which the card says already
+    reasons = suspicions(verdict)
     others = [text for text in verdict.findings if text not in reasons]
+    numbers = fitted_numbers(verdict.fits)
+    columns = ("block", "record", "used", "before", "after", "noise", "unit", "after / noise")
+    rows = tuple(_gap_row(g) for g in verdict.gaps)
+    caption = "Root mean square error of every block on every record."
     parts = [
         _blocks(verdict),
         *_list("Findings", "finding", others, "What was noticed besides the errors of the blocks."),
         *_error_figures(verdict),
         *_candidates(verdict),
         *_shape_figures(verdict),
-        *fitted_table(
-            fitted_numbers(verdict.fits), f"{'with' if verdict.effects else 'without'} what was added"
-        ),
+        *fitted_table(numbers, f"{'with' if verdict.effects else 'without'} what was added"),
         *_list(
             "What to measure next",
             "experiment",
@@ -166,13 +167,7 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
         ),
         *_left_out(verdict),
         *_circumstances(verdict),
-        TableSection(
-            "All blocks and records",
-            ("block", "record", "used", "before", "after", "noise", "unit", "after / noise"),
-            tuple(_gap_row(gap) for gap in verdict.gaps),
-            folded=True,
-            caption="Root mean square error of every block on every record.",
-        ),
+        TableSection("All blocks and records", columns, rows, caption=caption, folded=True),
     ]
     card = VerdictSection(
         "Verdict",
@@ -196,8 +191,8 @@ def _blocks(verdict: Verdict) -> TableSection:
     rows = []
     for name in verdict.blocks:
         gap, kind = verdict.gap(name), kind_in_words(verdict.actuator, name)
-        size = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
-        times = (significant(each) for each in gap.times)
+        size = (typeset_number(each) for each in (gap.before, gap.after, gap.noise_floor))
+        times = (typeset_number(each) for each in gap.times)
         unit = typeset_unit(gap.unit) or "1"
         rows.append((f"`{name}`{f', {kind}' if kind else ''}", *size, unit, *times))
     columns = ("block", "before", "after", "noise", "unit", "before / noise", "after / noise")
@@ -217,6 +212,11 @@ def _error_figures(verdict: Verdict) -> list[Section]:
     course = verdict.course
     held = "held-out" if course.role == "held_out" else "fitted"
     heading = f"A {held} record: {course.record}"
+    if verdict.gap().changed:
+        when, model = "before and after", "as the model has it before and after"
+    else:
+        when = "of the refitted model, to which nothing was added"
+        model = "as the refitted model has it, to which nothing was added"
     series = HeldOut(
         course.time, course.measured, course.before, course.after, course.quantity, course.unit, course.noise,
         heading,
@@ -224,30 +224,18 @@ def _error_figures(verdict: Verdict) -> list[Section]:
     return [
         FigureSection(
             f"Error of each record: {verdict.block}", gap_bars(errors, unit=gaps[0].unit),
-            caption=f"Root mean square error {_when(verdict)}; the line across is what noise alone leaves.",
+            caption=f"Root mean square error {when}; the line across is what noise alone leaves.",
             means="Where a bar ends at the line, the model explains the record down to its noise. "
             "Records marked as held out were used by no fit.",
         ),
         FigureSection(
             heading, held_out_series(series),
-            caption=f"Above: {course.quantity}, as measured and {_model(verdict)}. Below: the "
+            caption=f"Above: {course.quantity}, as measured and {model}. Below: the "
             "difference. Where a line is interrupted, samples do not count.",
             means="All curves have passed the filter of the block, so the errors in the legend are those "
             "of this record in the bars and tables.",
         ),
     ]  # fmt: skip
-
-
-def _when(verdict: Verdict) -> str:
-    return (
-        "before and after" if verdict.gap().changed else "of the refitted model, to which nothing was added"
-    )
-
-
-def _model(verdict: Verdict) -> str:
-    if verdict.gap().changed:
-        return "as the model has it before and after"
-    return "as the refitted model has it, to which nothing was added"
 
 
 def _candidates(verdict: Verdict) -> list[Section]:
@@ -379,8 +367,8 @@ def _circumstances(verdict: Verdict) -> list[Section]:
 
 
 def _gap_row(gap: RecordGap) -> tuple[str, ...]:
-    numbers = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
-    times = significant(gap.after / gap.noise_floor)
+    numbers = (typeset_number(each) for each in (gap.before, gap.after, gap.noise_floor))
+    times = typeset_number(gap.after / gap.noise_floor)
     return (
         gap.block,
         gap.record,

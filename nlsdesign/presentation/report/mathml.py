@@ -83,7 +83,10 @@ def _layout(e: Any) -> str:
     if e.is_Mul or (e.is_Pow and e.exp.could_extract_minus_sign()):
         return _product(e)
     if e.is_Pow:
-        return _power(e)
+        if e.exp == sympy.Rational(1, 2):
+            return f"<msqrt>{_layout(e.base)}</msqrt>"
+        base = _layout(e.base) if e.base.is_Symbol or e.base.is_Function else _bracketed(e.base)
+        return f"<msup>{base}{_layout(e.exp)}</msup>"
     if isinstance(e, sympy.Piecewise):
         rows = "".join(
             f"<mtr><mtd>{_layout(value)}</mtd><mtd>{_condition(condition)}</mtd></mtr>"
@@ -134,13 +137,6 @@ def _product(e: Any) -> str:
         return f"<mfrac>{_layout(above)}{_layout(below)}</mfrac>"
     factors = above.as_ordered_factors() if above.is_Mul else [above]
     return _group("<mo>⋅</mo>".join(_bracketed(f) if f.is_Add else _layout(f) for f in factors))
-
-
-def _power(e: Any) -> str:
-    if e.exp == sympy.Rational(1, 2):
-        return f"<msqrt>{_layout(e.base)}</msqrt>"
-    base = _layout(e.base) if e.base.is_Symbol or e.base.is_Function else _bracketed(e.base)
-    return f"<msup>{base}{_layout(e.exp)}</msup>"
 
 
 def _function(e: Any) -> str:

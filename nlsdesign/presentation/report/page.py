@@ -11,11 +11,11 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from ...foundation.errors import ExportError, ValueRangeError
+from ...foundation.errors import ExportError, ValueRangeError, visible
 from ...foundation.locations import version
 from ...foundation.text_files import write_text
 from ..figures.style import TONES
-from .sections import Chapter, Html, PagePosition, Section, breakable, prose, visible, words
+from .sections import Chapter, Html, PagePosition, Section, breakable, prose, words
 
 _PAGE_TONES = {
     "page": ("#f4f6f8", "#0e1217"),
@@ -73,8 +73,10 @@ def report_text(
     """Return a report as text; the same for the same sections."""
     pieces = list(sections)
     entries = _entries(folder, pieces)
-    scripts = ["report.js", *(piece.script for piece in pieces if piece.script)]
-    script = "\n".join(_source(name) for name in dict.fromkeys(scripts))
+    script = "\n".join(
+        _source(name)
+        for name in dict.fromkeys(["report.js", *[section.script for section in pieces if section.script]])
+    )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     light, dark = (
         {

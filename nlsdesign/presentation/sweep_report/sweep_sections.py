@@ -41,7 +41,19 @@ def point_list(points: list[int], most: int = 6) -> str:
 
 def asked_sections(table: SweepTable, ranked: RankedPoints) -> list[Section]:
     """Return the sections in the order of the page."""
-    return [_numbers(table, ranked), _axes(table), *_directions(table, ranked), *_failures(table)]
+    rows = tuple(
+        (axis.name, axis.kind.replace("_", " ") or "–", *_range(table, axis), axis.description)
+        for axis in table.axes
+    )
+    caption = "Axes of the sweep: what was changed, how the values were chosen, and what stands in the table."
+    return [
+        _numbers(table, ranked),
+        TableSection(
+            "What was changed", ("axis", "chosen as", "values", "range", "what it is"), rows, caption=caption
+        ),
+        *_directions(table, ranked),
+        *_failures(table),
+    ]
 
 
 def _numbers(table: SweepTable, ranked: RankedPoints) -> Section:
@@ -69,15 +81,6 @@ def _of_asked(table: SweepTable) -> str:
     if isinstance(asked, int) and asked > len(table):
         return f"of {len(table)} so far; {asked} are asked for, so all that follows is of a part of them"
     return f"of {len(table)}"
-
-
-def _axes(table: SweepTable) -> Section:
-    rows = tuple((axis.name, axis.kind.replace("_", " ") or "–", *_range(table, axis), axis.description)
-                 for axis in table.axes)  # fmt: skip
-    caption = "Axes of the sweep: what was changed, how the values were chosen, and what stands in the table."
-    return TableSection(
-        "What was changed", ("axis", "chosen as", "values", "range", "what it is"), rows, caption=caption
-    )
 
 
 def _range(table: SweepTable, axis: SweepColumn) -> tuple[str, str]:
@@ -259,7 +262,13 @@ class _Distribution(NamedTuple):
 
 def histogram_sections(content: PageContent) -> list[Section]:
     """Return histograms and quantiles of the answers, and the quantiles as a table."""
-    bounded = _are_draws(content)
+    # Whether all axes were drawn at once: samples that are crossed repeat their values.
+    axes = content.varying_axes()
+    count = len(content.table)
+    bounded = all(
+        axis.kind in _DRAWN_AT_RANDOM and 2 * len(np.unique(content.table.values[axis.name])) > count
+        for axis in axes
+    )
     names = content.answers[:MOST_HISTOGRAMS]
     everything = [_distribution(content, name, bounded=bounded) for name in names]
     drawn = [each for each in everything if len(np.unique(each.column.values)) > 1]
@@ -284,16 +293,6 @@ def histogram_sections(content: PageContent) -> list[Section]:
         TableSection("Quantiles", heads, rows, folded=True,
                      caption="Quantiles of each answer; no bound where the points are too few for one."),
     ]  # fmt: skip
-
-
-def _are_draws(content: PageContent) -> bool:
-    """Return whether all axes were drawn at once; samples that are crossed repeat their values."""
-    axes = content.varying_axes()
-    count = len(content.table)
-    return all(
-        axis.kind in _DRAWN_AT_RANDOM and 2 * len(np.unique(content.table.values[axis.name])) > count
-        for axis in axes
-    )
 
 
 def _distribution(content: PageContent, name: str, *, bounded: bool) -> _Distribution:

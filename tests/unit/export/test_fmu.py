@@ -23,7 +23,7 @@ from nlsdesign.export.fmi.fmu import fmi_headers, universal_binary
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import parse_unit
 from nlsdesign.model.flat import FlatModel, Variable
-from tests.fmu_unit import VERSIONS, Refused, Unit, exported, opened, unpacked
+from tests.fmu_unit import VERSIONS, Refused, Unit, both, exported, opened, unpacked
 from tests.hand_built import SAMPLE_TIME, controller, observer, plant
 
 MODELS = {
@@ -39,7 +39,6 @@ def units(tmp_path_factory) -> dict[tuple[str, str], Path]:
     return exported(MODELS, tmp_path_factory.mktemp("fmu"))
 
 
-both = pytest.mark.parametrize("version", VERSIONS)
 each_model = pytest.mark.parametrize("name", MODELS)
 
 

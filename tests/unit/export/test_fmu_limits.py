@@ -16,7 +16,7 @@ import pytest
 
 from nlsdesign.export import export_fmu
 from nlsdesign.model.flat import FlatModel, Variable
-from tests.fmu_unit import VERSIONS, Refused, Unit, exported, opened, unpacked
+from tests.fmu_unit import Refused, Unit, both, exported, opened, unpacked
 from tests.hand_built import SAMPLE_TIME, controller, observer, plant
 
 MODELS = {"plant": plant(), "observer": observer(points=5), "controller": controller()}
@@ -29,7 +29,6 @@ def units(tmp_path_factory) -> dict[tuple[str, str], Path]:
     return exported(MODELS, tmp_path_factory.mktemp("fmu"))
 
 
-both = pytest.mark.parametrize("version", VERSIONS)
 each_model = pytest.mark.parametrize("name", MODELS)
 
 

@@ -29,11 +29,10 @@ from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
 from nlsdesign.export.fmi.fmu import fmi_headers
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
-from tests.fmu_unit import VERSIONS, ExchangeUnit, Refused, exchanging, freed, opened, unpacked
+from tests.fmu_unit import VERSIONS, ExchangeUnit, Refused, both, exchanging, freed, opened, unpacked
 from tests.hand_built import observer, plant
 
 J, K, T = 1e-3, 2.0, 0.05
-both = pytest.mark.parametrize("version", VERSIONS)
 
 
 def rubbing() -> FlatModel:
