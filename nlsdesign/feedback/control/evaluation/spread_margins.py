@@ -102,16 +102,16 @@ def spread_margins(
     loop: ClosedLoop, gain: str, *, last: float, translate: Translate = as_it_is
 ) -> SpreadMargins:
     """Return :func:`margins_alone`, and which machines settle after a kick."""
-    found = margins_alone(loop, gain, last=last)
+    margins = margins_alone(loop, gain, last=last)
     if not declared_prior(loop.plant).names:
-        return found
+        return margins
     side = only_side(loop.plant) or 1.0
     held = LARGEST * largest_torque(loop.plant)
     kicked = loop_over_spread(
         loop, amplitude=side * held, frequency=0.0, draws=KICKED, kick=side * min(KICK, 0.3 * held),
         translate=translate,
     )  # fmt: skip
-    return replace(found, kicked=kicked)
+    return replace(margins, kicked=kicked)
 
 
 def margins_alone(loop: ClosedLoop, gain: str, *, last: float) -> SpreadMargins:

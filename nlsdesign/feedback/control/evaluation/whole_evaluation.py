@@ -301,35 +301,23 @@ def cascade_loops(
 def with_margin(
     plant: FlatModel, gain: str, *, last: float, given: bool, sample_time: float, **law: Any
 ) -> tuple[FlatModel, str]:
-    """Return the controller of a plant and a sentence on its margins; a gain that was not given has them.
+    """Return the controller of a plant and a sentence on its margins.
 
-    Parameters
-    ----------
-    plant
-        The machine as declared.
-    gain
-        Parameter of the controller that is lowered where it was not given and lacks the margins.
-    last
-        Angle to which margins are taken, in rad.
-    given
-        Whether somebody asked for this gain.
-    sample_time
-        In s.
-    **law
-        As for :func:`~nlsdesign.feedback.control.torque_controller`: law, gains, velocity.
+    The gain is lowered where it was not ``given`` and lacks them; ``last`` is the angle to which they are taken,
+    ``law`` as for :func:`~nlsdesign.feedback.control.torque_controller`.
     """
     controller = torque_controller(plant, sample_time=sample_time, **law)
     try:
         loop, _ = cascade_loops(plant, plant, delay=1, sample_time=sample_time, **law)
-        found = margins_alone(loop, gain, last=last)
+        margins = margins_alone(loop, gain, last=last)
     except NlsError as error:  # not every machine has a cascade
         return controller, f"margins of {gain} are not judged: {error}"
-    if found.kept:
-        return controller, found.margins()
-    (lacks,) = found.findings()
-    if given or math.isnan(found.enough):
+    if margins.kept:
+        return controller, margins.margins()
+    (lacks,) = margins.findings()
+    if given or math.isnan(margins.enough):
         return controller, lacks
-    return controller.with_values({gain: found.enough}), f"{lacks}, and is taken"
+    return controller.with_values({gain: margins.enough}), f"{lacks}, and is taken"
 
 
 def json_number(value: float) -> float | str | None:
