@@ -303,8 +303,8 @@ def with_margin(
 ) -> tuple[FlatModel, str]:
     """Return the controller of a plant and a sentence on its margins.
 
-    The gain is lowered where it was not ``given`` and lacks them; ``last`` is the angle to which they are taken,
-    ``law`` as for :func:`~nlsdesign.feedback.control.torque_controller`.
+    The gain is lowered where it was not ``given`` and lacks them; ``last`` is the angle to which they are
+    taken, ``law`` as for :func:`~nlsdesign.feedback.control.torque_controller`.
     """
     controller = torque_controller(plant, sample_time=sample_time, **law)
     try:
