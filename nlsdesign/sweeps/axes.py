@@ -261,6 +261,8 @@ class RandomDraws(AxisSet):
         ------
         ValueRangeError
             If no number of the deck has a spread.
+        UnknownNameError
+            If a named number has none.
         """
         _count("random draws", self.count, 1, _MOST_SOBOL)
         require_seed("random draws", self.seed)

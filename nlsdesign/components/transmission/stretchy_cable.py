@@ -24,6 +24,11 @@ class StretchyCable(Combination):
     The same as ``series(cable=Spring(...), ...)``, but solved by six Newton steps from y = e, which is exact
     where the law inside is piecewise linear and softer than the cable; the remainder is checked. So it is
     four times cheaper in simulation and in C. Source: Hooke 1678.
+
+    Raises
+    ------
+    ArrangementError
+        If the force of an element depends directly on the rate.
     """
 
     takes: ClassVar[tuple[Domain, ...]] = (TRANSLATION,)

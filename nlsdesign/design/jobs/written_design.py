@@ -26,20 +26,8 @@ from .job_file import DesignJob, built
 def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam:
     """Return the sizes of the part for a finished design: those of the design file, the cable as declared.
 
-    Parameters
-    ----------
-    design
-        Finished.
-    job
-        Its table ``[drawing]`` names the sizes as :class:`MachinedTwoSidedCam` does; without it all sizes
-        are those that are usual.
-
-    Raises
-    ------
-    DeckError
-        If the cable is neither declared nor in the file.
-    NlsError
-        If a size is refused.
+    The table ``[drawing]`` names the sizes as :class:`MachinedTwoSidedCam` does; without a file they are
+    those that are usual. A cable that is neither declared nor in the file is a ``DeckError``.
     """
     kind, radius = declared_edge(design.actuator, design.cam)
     sizes: dict[str, object] = {} if job is None else dict(job.drawing)

@@ -373,6 +373,11 @@ class ParameterRange(Limit):
     ----------
     minimum, maximum
         Least and largest value of the parameter, in SI.
+
+    Raises
+    ------
+    ValueRangeError
+        If the minimum exceeds the maximum.
     """
 
     possible: ClassVar[tuple[str, float, float]]
@@ -458,6 +463,9 @@ class PretensionRange(ParameterRange):
 
     possible: ClassVar[tuple[str, float, float]] = ("m", 0.0, 1.0)
 
+    minimum: Quantity | float
+    maximum: Quantity | float
+
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides."""
         name = design.cam.pretension
@@ -475,6 +483,9 @@ class AreaRange(ParameterRange):
     """
 
     possible: ClassVar[tuple[str, float, float]] = ("m^2", 1e-8, 0.1)
+
+    minimum: Quantity | float
+    maximum: Quantity | float
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides for each piece."""
@@ -494,6 +505,9 @@ class RestLengthRange(ParameterRange):
 
     possible: ClassVar[tuple[str, float, float]] = ("m", 1e-4, 1.0)
 
+    minimum: Quantity | float
+    maximum: Quantity | float
+
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides for each piece."""
         for name, value in design.of_rubber("rest_length").items():
@@ -511,6 +525,9 @@ class AnchorDistance(ParameterRange):
     """
 
     possible: ClassVar[tuple[str, float, float]] = ("m", 1e-3, 1e6)
+
+    minimum: Quantity | float
+    maximum: Quantity | float
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides."""

@@ -184,20 +184,8 @@ def unmakeable_parts(
     With D the distance of the anchor and h the lever arm, the direction of the cable on the cam turns by
     φ = θ + asin(h/D) and ρ = h + d²h/dφ²; a taut cable lies on convex contours only, ρ ≥ 0.
 
-    Parameters
-    ----------
-    profile
-        Of :func:`energy_profile`.
-    cam
-        Declared cam for which it was made: it says whether the cable passes through the centre, and where
-        its anchor is.
-    minimum_radius
-        Smallest radius of curvature, of tool and cable, in m.
-
-    Raises
-    ------
-    ArrangementError
-        If the cam has no contour.
+    ``cam``: the declared cam for which the profile was made; one without a contour is an
+    ``ArrangementError``. ``minimum_radius``: smallest radius of curvature, of tool and cable, in m.
     """
     made, radius = declared_cam(cam), in_si("minimum_radius", minimum_radius, "m", maximum=0.5)
     anchor = made.anchor_distance

@@ -58,11 +58,6 @@ class CamMotion:
         Length of the rubber without force in m.
     pretension
         Extension in m at angle zero.
-
-    Raises
-    ------
-    ValueRangeError
-        If the rows differ in length.
     """
 
     contour: Contour
@@ -127,13 +122,7 @@ class CamMotion:
         return lower, -lower
 
     def rubber(self, index: int) -> tuple[float, float]:
-        """Return length and height in m at which the rubber is drawn; its extension is to scale.
-
-        Parameters
-        ----------
-        index
-            Number of the angle.
-        """
+        """Return length and height in m at which the rubber is drawn; its extension is to scale."""
         length = self.rest_length + self.pretension + float(self.extensions[index])
         shown = self._shown_length + float(self.extensions[index])
         return shown, _THICKNESS * float(np.sqrt(self.rest_length / length))
@@ -144,30 +133,15 @@ class CamMotion:
         return min(self.rest_length + self.pretension, self.guide)
 
     def nearest(self, angle: float) -> int:
-        """Return the number of the sampled angle that is nearest to an angle.
-
-        Parameters
-        ----------
-        angle
-            In rad.
-        """
+        """Return the number of the sampled angle that is nearest to an angle in rad."""
         return int(np.argmin(np.abs(self.angles - angle)))
 
     def cable(self, index: int) -> Array:
         """Return the right-hand cable from the centre of the cam to the guide, in the resting frame.
 
         Through the channel to the lip, along the lip to the contact point, straight to the guide. The
-        left-hand cable is the same turned by half a turn.
-
-        Parameters
-        ----------
-        index
-            Number of the angle.
-
-        Returns
-        -------
-        numpy.ndarray
-            Shape (n, 2) in m; the last point but one is the contact point.
+        left-hand cable is the same turned by half a turn. Shape (n, 2) in m; the last point but one is the
+        contact point.
         """
         angle = float(self.angles[index])
         touched = self.contour.points[self.contour.angles < abs(angle)]

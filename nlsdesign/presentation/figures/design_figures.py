@@ -38,13 +38,7 @@ from .style import (
 
 @styled
 def design_picture(design: CamDesign) -> Figure:
-    """Draw cam, cable and rubber to scale, at angle zero and at the last angle, with dimensions.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    """
+    """Draw cam, cable and rubber to scale, at angle zero and at the last angle, with dimensions."""
     last = float(design.contour.angles[-1])
     reach = float(design.contour.radii.max())
     length, _ = next(iter(_pieces(design)), (0.0, 0.0))
@@ -73,13 +67,7 @@ def design_picture(design: CamDesign) -> Figure:
 
 @styled
 def limit_margins(design: CamDesign) -> Figure:
-    """Draw how far each limit is used: the bar ends at 100 % where the design sits on it.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    """
+    """Draw how far each limit is used: the bar ends at 100 % where the design sits on it."""
     states = list(design.limits)
     figure, (axes,) = panels(height=0.9 + 0.34 * max(1, len(states)))
     places = -np.arange(len(states), dtype=float)

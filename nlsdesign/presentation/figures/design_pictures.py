@@ -67,12 +67,7 @@ class DesignPictures:
 def inspection_rows(design: CamDesign, count: int) -> list[InspectionRow]:
     """Return torque, lever arm and cable tension at some angles, to be measured on the finished spring.
 
-    Parameters
-    ----------
-    design
-        Finished.
-    count
-        Number of angles, from zero to the last one.
+    ``count``: number of angles, from zero to the last one.
     """
     curves, check, contour = design.curves, design.check, design.contour
     return [

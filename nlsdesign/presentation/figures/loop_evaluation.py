@@ -135,13 +135,7 @@ def margins_over_angle(result: Sequence[LoopMargins]) -> Figure:
 
 @styled
 def coupled_stability_map(result: CoupledStability) -> Figure:
-    """Draw on which loads the loop is stable.
-
-    Parameters
-    ----------
-    result
-        Over inertias and stiffnesses, both ascending.
-    """
+    """Draw on which loads the loop is stable; their inertias and stiffnesses ascend."""
     figure, (axes,) = panels(1, height=3.6)
     stable = result.stable
     masses, springs = np.meshgrid(result.inertias, result.stiffnesses, indexing="ij")

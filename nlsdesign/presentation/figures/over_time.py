@@ -256,19 +256,8 @@ def groups_of_signals(run: Trace, names: Sequence[str]) -> dict[str, tuple[str, 
 def run_over_time(run: Trace, names: Sequence[str]) -> Figure:
     """Draw signals of a run, those of one unit in one panel.
 
-    Parameters
-    ----------
-    run
-        Simulated or measured.
-    names
-        What is drawn, in this order; of more than six units those of the first six.
-
-    Raises
-    ------
-    ValueRangeError
-        If there is none.
-    UnknownNameError
-        If the run has no such signal.
+    ``names``: what is drawn, in this order; of more than six units those of the first six. None at all is a
+    ``ValueRangeError``.
     """
     groups = list(groups_of_signals(run, names).items())[:MOST_PANELS]
     if not groups:
