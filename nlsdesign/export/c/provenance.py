@@ -134,7 +134,8 @@ def interface_version(header: str, model: FlatModel) -> str:
     """
     bare = re.sub(r"/\*.*?\*/", " ", header, flags=re.DOTALL)
     lines = [" ".join(line.split()) for line in bare.splitlines() if not line.lstrip().startswith("#")]
-    return f"0x{zlib.crc32(chr(10).join([*filter(None, lines), *_units(model)]).encode()):08x}u"
+    # A state that was never started is most often zero, and this number marks one that was.
+    return f"0x{zlib.crc32(chr(10).join([*filter(None, lines), *_units(model)]).encode()) or 1:08x}u"
 
 
 def _units(model: FlatModel) -> Iterator[str]:
