@@ -1,4 +1,4 @@
-"""What the live page shows is read at a glance: a bar that stays in its place, scales, round numbers, reasons once."""
+"""What the live page shows is read at a glance: a bar that keeps its place, round numbers, reasons once."""
 
 from __future__ import annotations
 
