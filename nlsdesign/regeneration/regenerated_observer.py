@@ -254,16 +254,10 @@ def regenerate(
     draws = [*_draws(declared, ()), *_draws(better, fits)]
     models = [*[declared] * DRAWS, *[better] * DRAWS]
     spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
-    failed = sum(not math.isfinite(error) for error in spread)
-    if failed:
-        lacking = (
-            *lacking,
-            f"for {failed} of {len(spread)} draws of the numbers no observer can be designed",
-        )
     return Regeneration(
         better,
         generated.model,
-        lacking,
+        (*lacking, *_failures(spread)),
         errors=errors,
         corrected=corrected,
         chosen=chosen,
@@ -468,6 +462,12 @@ def _drawn_error(
         return _rms([run.error(run.estimate(design)) for run in runs])
     except NlsError:
         return math.nan
+
+
+def _failures(spread: Sequence[float]) -> tuple[str, ...]:
+    count = sum(not math.isfinite(error) for error in spread)
+    words = f"for {count} of {len(spread)} draws of the numbers no observer can be designed"
+    return (words,) if count else ()
 
 
 def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration, dict[Path, str]]:
