@@ -19,7 +19,7 @@ from ..curves.target import Target
 from ..statics.equilibrium import elastic_law, has_corners, with_smooth_cables
 from .goals import Goal
 from .limits import Bound, Limit, MinimumRadiusOfCurvature
-from .problem import DesignProblem, SymbolicRounding, contour_names, design_problem, movable_numbers
+from .problem import DesignProblem, contour_names, design_problem, movable_numbers
 from .program import Program, Rows
 from .settings import DesignSettings
 from .shape import starts
@@ -162,7 +162,7 @@ class Search:
         width = ca.SX.sym("rounding")
         problem = design_problem(
             question.model, question.cam, target=question.target, free=[*shape, *names],
-            spring=question.drive, rounding=SymbolicRounding(self.rounding, width),
+            spring=question.drive, rounding=(self.rounding, width),
         )  # fmt: skip
         return replace(Search(question, problem, self.rounding).program, parameters=width)
 

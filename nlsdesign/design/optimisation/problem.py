@@ -40,13 +40,6 @@ class SymbolicTarget(NamedTuple):
     last_angle: Expression
 
 
-class SymbolicRounding(NamedTuple):
-    """A width of rounded knots that is a symbol for the torque over the contour; goals see the number."""
-
-    share: float
-    width: Expression
-
-
 @dataclass(frozen=True, eq=False)
 class DesignProblem:
     """Variables and what follows from them.
@@ -136,20 +129,22 @@ def design_problem(
     target: Target,
     free: Sequence[str],
     spring: str | None = None,
-    rounding: float | SymbolicRounding = 0.0,
+    rounding: float | tuple[float, Expression] = 0.0,
     symbols: SymbolicTarget | None = None,
 ) -> DesignProblem:
     """Write the design problem of a cam spring.
 
     ``free``: full names of what may change; the contour is ``<cam>.contour`` or ``<cam>.lever_arm``.
-    ``spring``: path of the cam spring; decided from the structure if it is left out.
+    ``spring``: path of the cam spring; decided from the structure if it is left out. ``rounding``: width over
+    which knots are rounded, and with it, where it is one, the symbol that stands for it in the torque over
+    the contour; goals see the number.
     """
     made = declared_cam(cam)
     sharp = law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
     arm, stretch = _sizes(law, target if symbols is None else symbols.sized_for)
     end = ca.SX(target.last_angle) if symbols is None else symbols.last_angle
-    share, width = rounding if isinstance(rounding, SymbolicRounding) else (rounding, None)
+    share, width = rounding if isinstance(rounding, tuple) else (rounding, None)
     if share > 0.0:
         law = law.without_knots(2.0 * stretch, share)
     scalars = {number.name: scalar(number, 0.3 * stretch) for number in numbers}

@@ -69,7 +69,11 @@ def reference_results(model: FlatModel, *, step: float | None = None) -> Referen
     shown = layout(model).model
     time = np.array([length * k for k in range(STEPS + 1)], dtype=np.float64)
     inputs = _inputs(shown, time)
-    names = _important(shown)
+    important = [v.name for v in shown.outputs]
+    if shown.sample_time is None:
+        important += [v.name for v in shown.states]
+        important += [name for spring in shown.springs for name in (spring.effort, spring.motion)]
+    names = tuple(dict.fromkeys(important))[:MOST_VARIABLES]
     results = _sampled(shown, inputs, names) if model.sample_time else _continuous(shown, time, inputs, names)
     return ReferenceResults(time, tuple(v.name for v in model.inputs), inputs, names, results)
 
@@ -141,15 +145,6 @@ def _inputs(model: FlatModel, time: Array) -> Array:
             columns[body.rate] = 0.125 * v.nominal * speed * np.sin(speed * time)
     limited = [np.clip(columns[v.name], v.minimum, v.maximum) for v in model.inputs]
     return np.array(limited).reshape(len(model.inputs), len(time)).T
-
-
-def _important(model: FlatModel) -> tuple[str, ...]:
-    """Return the outputs and, of a plant, states and springs, at most ten."""
-    names = [v.name for v in model.outputs]
-    if model.sample_time is None:
-        names += [v.name for v in model.states]
-        names += [name for spring in model.springs for name in (spring.effort, spring.motion)]
-    return tuple(dict.fromkeys(names))[:MOST_VARIABLES]
 
 
 def _continuous(model: FlatModel, time: Array, inputs: Array, names: Sequence[str]) -> Array:
