@@ -41,7 +41,9 @@ from nlsdesign.presentation.figures.before_after import (
     candidate_shares,
     held_out_series,
 )
-from nlsdesign.presentation.figures.cam_motion import cam_motion
+from nlsdesign.presentation.figures.cam_motion import CamMotion, cam_motion
+from nlsdesign.presentation.figures.loop_evaluation import coupled_stability_map
+from nlsdesign.presentation.figures.over_time import ClosedLoopRun
 from nlsdesign.presentation.figures.sweep_figures import (
     MarkedQuantile,
     PointKinds,
@@ -60,7 +62,7 @@ TARGET = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0, toleranc
 TIME = np.linspace(0.0, 1.0, 4001)
 
 
-def motion() -> figures.CamMotion:
+def motion() -> CamMotion:
     """A convex cam whose radius of curvature falls from 9 to 4 mm, with a stiffening rubber."""
     nodes = np.linspace(0.0, 1.3, 14)
     contour = contour_from_curvature(
@@ -105,7 +107,7 @@ def loop(lag: float) -> tuple[np.ndarray, np.ndarray]:
     return 0.7 * np.sin(phase), 2.0 * np.sin(phase + lag)
 
 
-def closed_loop() -> figures.ClosedLoopRun:
+def closed_loop() -> ClosedLoopRun:
     signals = {
         "reference": np.interp(TIME + 0.01, TIME, torque()),
         "plant.spring.torque": torque(),
@@ -300,7 +302,7 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "torque_responses": lambda: figures.torque_responses(loop_responses(), saturation()),
     "impedance": lambda: figures.impedance_over_frequency(impedance()),
     "margins": lambda: figures.margins_over_angle([loop_margins()]),
-    "coupled_stability": lambda: figures.coupled_stability_map(coupled()),
+    "coupled_stability": lambda: coupled_stability_map(coupled()),
     "beside_points": lambda: figures.curves_beside_points(
         [figures.PointPanel("Torque", "torque in N·m", {"one": BESIDE, "two": BESIDE}, {"one": BESIDE})],
         across="frequency in Hz",

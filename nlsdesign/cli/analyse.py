@@ -11,7 +11,7 @@ import click
 from ..foundation.errors import ValueRangeError
 from ..foundation.quantity import typeset_unit
 from ..foundation.text_files import make_folder
-from .options import deck_option, json_option, measured_option, spring_option
+from .options import LAWS, deck_option, json_option, law_of, measured_option, spring_option
 from .output import examples, show_json, show_table, warn
 from .overwriting import out_option
 from .typed_values import Number
@@ -214,8 +214,6 @@ def _table(title: str, chart: Chart, columns: list[Variable]) -> None:
     show_table(title, headings, rows)
 
 
-GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
-"""Number of the controller whose onset of limit cycling is looked for, by law."""
 _GAINS = ("proportional", "integral", "derivative")
 _FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "coupled_stability.svg")
 
@@ -223,18 +221,22 @@ _FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "cou
 @analyse.command(
     epilog=examples(
         "nlsdesign analyse loop --deck austin2015_figure_consistent",
-        "nlsdesign analyse loop --deck austin2015_figure_consistent --law scheduled "
+        "nlsdesign analyse loop --deck austin2015_figure_consistent --proportional '32 rad/s/N/m'",
+        "nlsdesign analyse loop --deck austin2015_figure_consistent "
         "--bandwidth '10 Hz' --amplitude '0.5 N*m' --json",
     )
 )
 @deck_option
-@click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
-              help="A PID, or speed by tangent stiffness.")  # fmt: skip
+@click.option("--law", type=click.Choice(list(LAWS)), default=None,
+              help="As for export: speed by tangent stiffness, the default; a PID, the default where a gain "
+              "of it is given; or reproduced, the PID of the studies.")  # fmt: skip
 @click.option("--bandwidth", type=Number("Hz", above=0.0), default=None,
               help="Of the scheduled law; by default 12 Hz at 1 kHz.")  # fmt: skip
 @click.option("--proportional", type=Number("rad/s/N/m", above=0.0), default=None,
-              help="Gain Kp of the torque loop.")  # fmt: skip
-@click.option("--integral", type=Number("rad/s^2/N/m"), default=None, help="Gain Ki of the torque loop.")
+              help="Gain Kp of the torque loop; by default 12 Hz at 1 kHz where the spring is "
+              "stiffest.")  # fmt: skip
+@click.option("--integral", type=Number("rad/s^2/N/m"), default=None,
+              help="Gain Ki of the torque loop; by default 3.125 1/s times Kp.")  # fmt: skip
 @click.option("--derivative", type=Number("rad/N/m"), default=None, help="Gain Kd of the torque loop.")
 @click.option("--amplitude", "amplitudes", type=Number("N*m", above=0.0), multiple=True,
               help="Of the desired torque; several times for several. By default a fifth and three fifths of "
@@ -278,6 +280,8 @@ def loop(
     from ..presentation.figures import write_loop_figures
     from ..regeneration import range_remarks, usual_last
 
+    if options["law"] is None:
+        options["law"] = "scheduled" if all(options[name] is None for name in _GAINS) else "pid"
     law, declared = _law(options), declare(load_deck(deck_name))
     fixed, moved = cascade_loops(
         flatten(declared), flatten(with_moved_load(declared)),
@@ -289,7 +293,7 @@ def loop(
     names = ("last", "amplitudes", "inertias", "load_amplitude")
     over = LoopRange(**{name: options[name] for name in names})
     with Steps().step("evaluation of the loop"):
-        result = evaluate_loop(fixed, moved, GAINS[options["law"]], over, translate=quickest())
+        result = evaluate_loop(fixed, moved, LAWS[options["law"]], over, translate=quickest())
     files = [*write_loop_figures(result, out), *result.write(out)]
     remarks = range_remarks(declared, last=options["last"])
     warn(remarks)
@@ -304,17 +308,14 @@ def loop(
 
 def _law(options: dict[str, Any]) -> dict[str, Any]:
     """Return what the controller is made of, as arguments of its function."""
-    from ..feedback.control import ScheduledTorque, TorqueGains
+    from ..feedback.control import PidTorque
 
     gains = {name: options[name] for name in _GAINS if options[name] is not None}
-    if options["law"] == "scheduled":
-        if gains:
-            raise click.BadParameter(f"the scheduled law has a --bandwidth and no --{next(iter(gains))}")
-        return {"law": ScheduledTorque(bandwidth=options["bandwidth"])}
-    if options["bandwidth"] is not None:
-        raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
-    # Without gains the controller picks a velocity loop that the sample time carries.
-    return {"gains": TorqueGains(**gains) if gains else None}
+    if gains and options["law"] != "pid":
+        own = "a --bandwidth" if options["law"] == "scheduled" else "gains of its own"
+        raise click.BadParameter(f"the {options['law']} law has {own} and no --{next(iter(gains))}")
+    chosen = law_of(options["law"], options["bandwidth"], None)
+    return {"law": PidTorque(**gains)} if gains else chosen
 
 
 def _show_loop(result: LoopEvaluation) -> None:

@@ -112,16 +112,17 @@ def sampled_part(
     if what == CONTROLLER:
         if chosen["table_error"] is not None:
             raise click.BadParameter("--table-error is of an observer; leave it out, or take --what both")
-        controller = controller_of(plant, sample_time, **law)
-        return CONTROLLER, controller, (require_flash(controller, chosen["real"], chosen["flash"]),)
+        controller, margins = controller_of(plant, sample_time, **law)
+        flash = require_flash(controller, chosen["real"], chosen["flash"])
+        return CONTROLLER, controller, (flash, margins)
     if what == OBSERVER:
         sized = sized_observer(plant, sample_time, **others)
         return OBSERVER, sized.designed.model, sized.findings()
-    controller = controller_of(plant, sample_time, **law)
+    controller, margins = controller_of(plant, sample_time, **law)
     sized = sized_observer(
         plant, sample_time, part_of=lambda observer: joined(observer, controller), **others
     )
-    return "torque_loop", joined(sized.designed.model, controller), sized.findings()
+    return "torque_loop", joined(sized.designed.model, controller), (*sized.findings(), margins)
 
 
 @export.command(
@@ -154,13 +155,13 @@ def export_controller(
 
     declared = declare(load_deck(deck_name))
     plant = flatten(declared)
-    model = controller_of(plant, sample_time, **chosen)
+    model, margins = controller_of(plant, sample_time, **chosen)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")
     written = [source.header, source.source, source.selftest]
     if fmu:
         written.append(export_fmu(model, out / "controller.fmu"))
-    sentences = (str(model), f"largest torque that the drive can hold: {most:.4g} N·m")
+    sentences = (str(model), margins, f"largest torque that the drive can hold: {most:.4g} N·m")
     remarks = range_remarks(declared)
     warn(remarks)
     show_written(as_json, sentences, written, largest_torque=most, warnings=remarks)

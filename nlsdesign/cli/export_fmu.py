@@ -116,7 +116,7 @@ def export_fmus(
     declared, steps = declare(load_deck(deck_name)), Steps()
     # Before anything is written: not every system has an observer.
     with steps.step("models"):
-        models, reasons = _models(flatten(declared), what, sample_time, others)
+        models, reasons, sentences = _models(flatten(declared), what, sample_time, others)
     about = Authorship(others["author"], others["copyright_"], others["licence"], date=others["date"]).dated()
     systems, version = (ALL_PLATFORMS if "all" in platforms else platforms) or None, others["version"]
     with steps.step("FMUs"):
@@ -130,7 +130,7 @@ def export_fmus(
         written += [
             file for name in models for file in write_reference(models[name], out / f"{FILES[name]}.fmu")
         ]
-    show_written(as_json, (), written, left_out=reasons)
+    show_written(as_json, sentences, written, left_out=reasons)
     for name, reason in {} if as_json else reasons.items():
         click.echo(f"left out: {name}: {reason}")
     warn(range_remarks(declared, measured=others["measured"]))
@@ -138,10 +138,15 @@ def export_fmus(
 
 def _models(
     plant: FlatModel, what: Sequence[str], sample_time: float, chosen: Mapping[str, Any]
-) -> tuple[dict[str, FlatModel], dict[str, str]]:
-    """Return what is asked for; if nothing is, what this deck allows, and why the rest is left out."""
+) -> tuple[dict[str, FlatModel], dict[str, str], list[str]]:
+    """Return what is asked for; if nothing is, what this deck allows, and why the rest is left out.
+
+    Also in a sentence which margins a controller has.
+    """
     from ..feedback.control import joined
     from ..feedback.observer import designed_observer
+
+    sentences: list[str] = []
 
     @cache
     def observer() -> FlatModel:
@@ -151,7 +156,9 @@ def _models(
     @cache
     def controller() -> FlatModel:
         law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
-        return controller_of(plant, sample_time, **law)
+        made, margins = controller_of(plant, sample_time, **law)
+        sentences.append(margins)
+        return made
 
     makers: dict[str, Callable[[], FlatModel]] = {
         "plant": lambda: plant,
@@ -160,7 +167,7 @@ def _models(
         "both": lambda: joined(observer(), controller()),
     }
     if what:
-        return {name: makers[name]() for name in dict.fromkeys(what)}, {}
+        return {name: makers[name]() for name in dict.fromkeys(what)}, {}, sentences
     models: dict[str, FlatModel] = {}
     reasons: dict[str, str] = {}
     for name, make in makers.items():
@@ -168,4 +175,4 @@ def _models(
             models[name] = make()
         except NlsError as error:  # not every machine has one; the reason is printed
             reasons[name] = str(error)
-    return models, reasons
+    return models, reasons, sentences

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -96,12 +97,18 @@ def flash_options(command: F) -> F:
     )(command)  # fmt: skip
 
 
+LAWS = {
+    "scheduled": "controller.bandwidth", "pid": "controller.proportional",
+    "reproduced": "controller.proportional",
+}  # fmt: skip
+"""Number of the controller that decides its margins, by law."""
 _LAW = click.option(
     "--law",
-    type=click.Choice(["scheduled", "pid"]),
+    type=click.Choice(list(LAWS)),
     default="scheduled",
     show_default=True,
-    help="Of the controller: speed by tangent stiffness, or a PID.",
+    help="Of the controller: speed by tangent stiffness; a PID with the gain that the spring allows; or the "
+    "PID with which the studies reproduce the published loop, Kp 32, which has little margin.",
 )
 _BANDWIDTH = click.option(
     "--bandwidth",
@@ -129,12 +136,29 @@ def controller_of(
     law: str,
     bandwidth: float | None,
     velocity_bandwidth: float | None,
-) -> FlatModel:
-    """Return the torque controller that the options of a command ask for."""
-    from ..feedback.control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
+) -> tuple[FlatModel, str]:
+    """Return the torque controller that the options of a command ask for, and a sentence on its margins.
 
-    if law == "pid" and bandwidth is not None:
+    A gain that nobody has given is lowered to one that has them.
+    """
+    from ..feedback.control import with_margin
+    from ..regeneration import usual_last
+
+    return with_margin(
+        plant, LAWS[law], last=usual_last(plant), given=law == "reproduced" or bandwidth is not None,
+        sample_time=sample_time, **law_of(law, bandwidth, velocity_bandwidth),
+    )  # fmt: skip
+
+
+def law_of(law: str, bandwidth: float | None, velocity_bandwidth: float | None) -> dict[str, Any]:
+    """Return what a torque controller is made of, as arguments of its function."""
+    from ..feedback.control import REPRODUCED_GAINS, PidTorque, ScheduledTorque, VelocityLoop
+
+    if law != "scheduled" and bandwidth is not None:
         raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
+    if law == "reproduced":
+        if velocity_bandwidth is None:
+            return {"gains": REPRODUCED_GAINS}
+        return {"gains": replace(REPRODUCED_GAINS, velocity_bandwidth=velocity_bandwidth)}
     outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
-    inner = VelocityLoop(bandwidth=velocity_bandwidth)
-    return torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
+    return {"law": outer, "velocity": VelocityLoop(bandwidth=velocity_bandwidth)}

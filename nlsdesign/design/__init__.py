@@ -25,7 +25,7 @@ from .curves.task_curve import (
     scan_gear_ratio,
 )
 from .drawing.cam_drawing import fingerprint, write_drawings
-from .drawing.cam_part import CamPart, Hole
+from .drawing.cam_part import CamPart
 from .drawing.machined_cam import (
     BoltCircle,
     ClampScrew,
@@ -45,10 +45,7 @@ from .jobs.job_file import target_of_file as target_of_file
 from .jobs.task_target import TaskTarget
 from .jobs.written_design import (
     DESIGN_FILES,
-    PicturesOfDesign,
-    WrittenDesign,
     design_summary,
-    machined_cam,
     write_design,
     write_part,
 )
@@ -93,7 +90,6 @@ from .optimisation.stock import RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import cam_from_profile, contour_of_cam
-from .statics.energy import UnmakeablePart, unmakeable_parts
 from .statics.equilibrium import elastic_law, equilibrium_torque
 from .tolerance.causes import Cause, MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
@@ -118,7 +114,6 @@ __all__ = [
     "ExponentialTorque",
     "FerruleSeat",
     "Goal",
-    "Hole",
     "InsensitiveStiffness",
     "LeastEnergy",
     "LeastMass",
@@ -148,7 +143,6 @@ __all__ = [
     "OneSidedSpring",
     "OverTravel",
     "ParetoFront",
-    "PicturesOfDesign",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
@@ -180,8 +174,6 @@ __all__ = [
     "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
-    "UnmakeablePart",
-    "WrittenDesign",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
@@ -193,7 +185,6 @@ __all__ = [
     "equilibrium_torque",
     "fingerprint",
     "job_of",
-    "machined_cam",
     "motor_and_gear",
     "motor_cycle",
     "pareto",
@@ -204,7 +195,6 @@ __all__ = [
     "safe_limits",
     "scan_gear_ratio",
     "tolerance_analysis",
-    "unmakeable_parts",
     "walking_task",
     "write_design",
     "write_drawings",

@@ -10,15 +10,15 @@ from .compilation.compiled_step import natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS
 from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
 from .compilation.target_build import controller_sizes as controller_sizes
-from .compilation.target_run import TargetMeasurement, measure_on_target
+from .compilation.target_run import measure_on_target
 from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Coupling as Coupling
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
-from .cosimulation.ssp import WrittenSystem, read_ssp, write_ssp
+from .cosimulation.ssp import read_ssp, write_ssp
 from .cosimulation.wires import Late, SamplesOf, Wire
 from .cosimulation.wires import as_wire as as_wire
-from .exported_files import ExportedFile, ExportedFolder, read_exports
+from .exported_files import read_exports
 from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
 from .fmi.reference_results import write_reference
@@ -33,8 +33,6 @@ __all__ = [
     "CSource",
     "CoSimulation",
     "Convergence",
-    "ExportedFile",
-    "ExportedFolder",
     "Extrapolated",
     "FmuSystem",
     "Held",
@@ -43,9 +41,7 @@ __all__ = [
     "Processor",
     "SamplesOf",
     "Stepping",
-    "TargetMeasurement",
     "Wire",
-    "WrittenSystem",
     "convergence",
     "cosimulate",
     "export_c",

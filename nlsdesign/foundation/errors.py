@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import difflib
 import re
-import unicodedata
 from collections.abc import Iterable
 
 _LONGEST_NAME = 120
 """Longer names are compared with nothing: no name that exists is as long."""
 _LONGEST_RUN, _LONGEST_TEXT = 300, 2500
 """Most characters of a run without blanks, and of a text; what is longer is cut in its middle."""
-_TURNING = "\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
-"""Marks that turn the direction of writing, so that a text reads otherwise than it is."""
+_UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""Control characters, halves of characters, and marks that turn the direction of writing."""
 
 
 def visible(text: str) -> str:
@@ -30,14 +29,7 @@ def visible(text: str) -> str:
     >>> print(visible("red \x1b[31m"))
     red \x1b[31m
     """
-    if text.isprintable():
-        return text
-    return "".join(
-        _code(each)
-        if (unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t") or each in _TURNING
-        else each
-        for each in text
-    )
+    return _UNSEEN.sub(lambda each: _code(each[0]), text)
 
 
 def _code(character: str) -> str:

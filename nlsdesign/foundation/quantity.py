@@ -446,12 +446,32 @@ def three_digits(value: float) -> str:
     >>> three_digits(26.0), three_digits(0.011422), three_digits(12345.6), three_digits(2e-7)
     ('26.0', '0.0114', '12300', '2.00·10⁻⁷')
     """
-    mantissa, _, exponent = f"{value:.2e}".partition("e")
-    if not math.isfinite(value) or -5 < int(exponent) < 6:
-        text = f"{float(f'{value:.3g}'):.{max(0, 2 - int(exponent or 0))}f}"
-    else:
-        text = f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return "0.00" if value == 0.0 else typeset_number(value)
+
+
+def typeset_number(value: float, digits: int = 3) -> str:
+    """Return a number with the given number of significant digits, typeset.
+
+    Examples
+    --------
+    >>> typeset_number(0.012345), typeset_number(1234.5), typeset_number(-3.4e-9, 2), typeset_number(0.0)
+    ('0.0123', '1230', '−3.4·10⁻⁹', '0')
+    """
+    if value == 0.0:
+        return "0"
+    if not math.isfinite(value):
+        return "not a number" if math.isnan(value) else "∞" if value > 0 else "−∞"
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    places = digits - 1 - int(power)
+    text = f"{round(value, places):.{max(0, places)}f}"
+    if not -5 < int(power) < 6:
+        text = f"{mantissa}·10{superscript(int(power))}"
     return text.replace("-", "−")
+
+
+def superscript(number: int) -> str:
+    """Return an integer in superscript digits."""
+    return str(number).translate(_SUPERSCRIPTS)
 
 
 def with_error(value: float, error: float) -> str:
@@ -472,7 +492,7 @@ def with_error(value: float, error: float) -> str:
     digit = 1 - math.floor(math.log10(error / scale))
     pair = [f"{round(number / scale, digit):.{max(0, digit)}f}" for number in (value, error)]
     text = " ± ".join(pair).replace("-", "−")
-    return f"({text})·10{str(exponent).translate(_SUPERSCRIPTS)}" if small else text
+    return f"({text})·10{superscript(exponent)}" if small else text
 
 
 def degrees(value: float) -> float:

@@ -12,6 +12,9 @@ from functools import cache
 from typing import TypeAlias
 
 import casadi as ca
+import numpy as np
+
+from .arrays import Mask
 
 Expression: TypeAlias = ca.SX
 
@@ -27,6 +30,11 @@ def symbol(name: str) -> Expression:
 def depends(expression: Expression, on: Expression) -> bool:
     """Tell whether an expression contains any of the symbols."""
     return bool(ca.depends_on(expression, on))
+
+
+def dependence(column: Expression, on: Expression) -> Mask:
+    """Return which items of a column contain which symbols, shape (items, symbols)."""
+    return np.asarray(ca.DM(ca.jacobian_sparsity(column, on), 1.0).full() > 0.0)
 
 
 def positive_part(value: Expression, width: Expression | float) -> Expression:

@@ -12,9 +12,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from ..foundation.errors import ArrangementError, unknown_name
-from ..foundation.symbolic import Expression, depends
+from ..foundation.symbolic import Expression, dependence, depends
 from .flat import FlatModel, Switching, Symbols, Variable
 from .graph import applied
 from .structure import ModelParts
@@ -156,22 +157,21 @@ def without_idle_states(model: FlatModel, roots: Sequence[str]) -> FlatModel:
     known = named(model, s)
     outputs = tuple(model.variable(name) for name in roots)
     s = s._replace(output=_column([known[name] for name in roots]))
-    needed: set[int] = set()
-    wanted = [s.output]
-    while wanted:
-        expression = wanted.pop()
-        for i in range(len(model.states)):
-            if i not in needed and depends(expression, s.state[i]):
-                needed.add(i)
-                wanted.append(s.derivative[i])
-    kept = sorted(needed)
-    dropped = _column([s.state[i] for i in range(len(model.states)) if i not in needed])
-    visible = [i for i in range(len(model.signals)) if not depends(s.signal[i], dropped)]
+    shown, moved, seen, left = np.split(
+        dependence(_column([s.output, s.derivative, s.signal, s.residual]), s.state),
+        np.cumsum([s.output.numel(), s.derivative.numel(), s.signal.numel()]),
+    )
+    needed = shown.any(axis=0)
+    for _ in model.states:
+        needed = needed | moved[needed].any(axis=0)
+    kept = np.flatnonzero(needed)
+    visible = np.flatnonzero(~seen[:, ~needed].any(axis=1))
+    closed = np.flatnonzero(~left[:, ~needed].any(axis=1))
     changed = s._replace(
-        state=_column([s.state[i] for i in kept]),
-        derivative=_column([s.derivative[i] for i in kept]),
-        signal=_column([s.signal[i] for i in visible]),
-        residual=_column([r for r in ca.vertsplit(s.residual) if not depends(r, dropped)]),
+        state=_column([s.state[int(i)] for i in kept]),
+        derivative=_column([s.derivative[int(i)] for i in kept]),
+        signal=_column([s.signal[int(i)] for i in visible]),
+        residual=_column([s.residual[int(i)] for i in closed]),
     )
     states, signals = tuple(model.states[i] for i in kept), tuple(model.signals[i] for i in visible)
     return _rebuilt(model, changed, states=states, outputs=outputs, signals=signals)

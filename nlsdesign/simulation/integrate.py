@@ -73,7 +73,11 @@ def simulate(
     """
     times = checked_times(times)
     drives = drives_of(model, times, inputs or {}, hold=hold)
-    x0 = _start(model, start or {})
+    names, x0 = [v.name for v in model.states], model.start(model.states)
+    for name, value in (start or {}).items():
+        if name not in names:
+            raise unknown_name("state", name, names)
+        x0[names.index(name)] = value
     events: list[Event] = []
     if model.sample_time is not None:
         x = _stepped(model, times, drives.samples, x0)
@@ -88,16 +92,6 @@ def checked_times(times: Array) -> Array:
     if grid.ndim != 1 or len(grid) < 2 or np.any(np.diff(grid) <= 0.0) or not np.all(np.isfinite(grid)):
         raise ValueRangeError("times", "must be at least two strictly ascending finite numbers in s")
     return grid
-
-
-def _start(model: FlatModel, start: Mapping[str, float]) -> Array:
-    names = [v.name for v in model.states]
-    x = model.start(model.states)
-    for name, value in start.items():
-        if name not in names:
-            raise unknown_name("state", name, names)
-        x[names.index(name)] = value
-    return x
 
 
 def _integrated(
@@ -136,17 +130,7 @@ def _evaluated(model: FlatModel, times: Array, x: Array, u: Array) -> Trace:
         w = np.array([model.look_up(list(x[:, k]), list(u[:, k])) for k in range(len(times))]).T
     # With one column of parameters and many of the others CasADi maps over the columns.
     _, y, s, r = model.equations(times[None, :], x, u, model.start(model.parameters), w)
-    _check_residuals(model, times, np.array(r))
-    signals: dict[str, Array] = {}
-    for group, rows in ((model.signals, s), (model.outputs, y), (model.inputs, u), (model.states, x)):
-        values = np.array(rows)
-        signals |= {v.name: values[i] for i, v in enumerate(group)}
-    everything = model.signals + model.outputs + model.inputs + model.states
-    warnings = range_warnings(model.signals + model.states, times, signals)
-    return Trace(times, signals, {v.name: v.unit for v in everything}, model.name, warnings)
-
-
-def _check_residuals(model: FlatModel, times: Array, residuals: Array) -> None:
+    residuals = np.array(r)
     if residuals.size and not np.max(np.abs(residuals)) <= RESIDUAL_LIMIT:
         worst = int(np.nanargmax(np.max(np.abs(residuals), axis=0)))
         raise ConvergenceError(
@@ -154,3 +138,10 @@ def _check_residuals(model: FlatModel, times: Array, residuals: Array) -> None:
             f"an implicit equation was not solved at t = {times[worst]:g} s",
             next_step="check for an element in series whose effort saturates",
         )
+    signals: dict[str, Array] = {}
+    for group, rows in ((model.signals, s), (model.outputs, y), (model.inputs, u), (model.states, x)):
+        values = np.array(rows)
+        signals |= {v.name: values[i] for i, v in enumerate(group)}
+    everything = model.signals + model.outputs + model.inputs + model.states
+    warnings = range_warnings(model.signals + model.states, times, signals)
+    return Trace(times, signals, {v.name: v.unit for v in everything}, model.name, warnings)

@@ -250,7 +250,8 @@ def dependent_axes(axes: Mapping[str, NDArray[Any]]) -> str:
     worst, words = 0.0, ""
     for one, other in combinations(ranks, 2):
         for first, second in _views(ranks[one], ranks[other]):
-            size = _correlation(first, second)
+            constant = np.ptp(first) == 0.0 or np.ptp(second) == 0.0
+            size = 0.0 if constant else float(abs(np.corrcoef(first, second)[0, 1]))
             limit = max(LEAST_CORRELATION, _DEVIATIONS / np.sqrt(len(first)))
             if size > max(limit, worst):
                 worst, words = (
@@ -263,9 +264,3 @@ def dependent_axes(axes: Mapping[str, NDArray[Any]]) -> str:
 def _views(first: Any, second: Any) -> list[tuple[Any, Any]]:
     wide = [np.abs(each - np.median(each)) for each in (first, second)]
     return [(first, second), (wide[0], wide[1]), (wide[0], second), (first, wide[1])]
-
-
-def _correlation(first: Any, second: Any) -> float:
-    if np.ptp(first) == 0.0 or np.ptp(second) == 0.0:
-        return 0.0
-    return float(abs(np.corrcoef(first, second)[0, 1]))

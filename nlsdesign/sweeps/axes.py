@@ -277,7 +277,10 @@ class RandomDraws(AxisSet):
             for name in [f"factor({head})"] if shape else inner:
                 places[name] = (prior.place(inner[0] if shape else name), shape)
         kept = {name: place for name, place in places.items() if not subject.is_chosen(name)}
-        chosen = {name: _chosen(name, places) for name in self.names} if self.names else kept
+        for name in self.names:
+            if name not in places:
+                raise unknown_name("number with a spread", name, places)
+        chosen = {name: places[name] for name in self.names} if self.names else kept
         if not chosen:
             raise ValueRangeError("random draws", "no number of the deck has a spread",
                                   next_step="give numbers a spread")  # fmt: skip

@@ -108,7 +108,11 @@ class Subject:
         ValueRangeError
             If a value is no finite number, or the question chooses the number itself.
         """
-        self._require_kept(name)
+        if self.is_chosen(name):  # its column would read as if the answers did not depend on it
+            raise ValueRangeError(
+                f"axis '{name}'", "is chosen by the question itself at each point, so it has no effect",
+                next_step="leave the axis out, or take it out of what is free",
+            )  # fmt: skip
         words = self._words_for(name)
         if words is not None:
             given = tuple(str(each) for each in values)
@@ -150,14 +154,6 @@ class Subject:
             Of a number, an item of a row, or ``factor(NAME)``.
         """
         return (row_of_factor(name) or name.partition("[")[0]) in self.question.chosen(self.base)
-
-    def _require_kept(self, name: str) -> None:
-        """Refuse an axis without effect: its column would read as if the answers did not depend on it."""
-        if self.is_chosen(name):
-            raise ValueRangeError(
-                f"axis '{name}'", "is chosen by the question itself at each point, so it has no effect",
-                next_step="leave the axis out, or take it out of what is free",
-            )  # fmt: skip
 
     def _require_unit(self, name: str, first: tuple[float, ...], unit: str) -> None:
         """Refuse a unit that the question would refuse at every point; a value out of range fails its own."""

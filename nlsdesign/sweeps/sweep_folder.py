@@ -110,7 +110,11 @@ def opened(
     ``folder``: of the sweep; held by this run.
     """
     if again:
-        _emptied(folder)
+        # What a sweep has written, and nothing else.
+        for name in (RESULTS_FILE, TIMINGS_FILE, ABOUT_FILE, CODE_FILE, DECK_FILE):
+            (folder / name).unlink(missing_ok=True)
+        for name in (PARTS_FOLDER, DECKS_FOLDER):
+            shutil.rmtree(folder / name, ignore_errors=True)
     if not (folder / ABOUT_FILE).exists():
         foreign = [name for name in (RESULTS_FILE, TIMINGS_FILE, PARTS_FOLDER) if (folder / name).exists()]
         if foreign:
@@ -201,14 +205,6 @@ def _another(folder: Path, why: str) -> ExportError:
         str(folder), f"holds another sweep: {why}",
         next_step="name another folder, or compute everything anew by --again (in Python again=True)",
     )  # fmt: skip
-
-
-def _emptied(folder: Path) -> None:
-    """Throw away what a sweep has written, and nothing else."""
-    for name in (RESULTS_FILE, TIMINGS_FILE, ABOUT_FILE, CODE_FILE, DECK_FILE):
-        (folder / name).unlink(missing_ok=True)
-    for name in (PARTS_FOLDER, DECKS_FOLDER):
-        shutil.rmtree(folder / name, ignore_errors=True)
 
 
 def _adopted(folder: Path, axes: list[str], plan: PointPlan) -> Iterator[Any]:

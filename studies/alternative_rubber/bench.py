@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import nlsdesign as nls
 from nlsdesign.components import Driven, Encoder, flat_relaxation
 from nlsdesign.feedback.analysis.rest import rest_states
+from nlsdesign.feedback.control import REPRODUCED_GAINS
 from nlsdesign.feedback.observer import CascadeGain, ObserverDesign
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.model import Variable
@@ -200,7 +201,7 @@ class Bench:
         return nls.ClosedLoop(
             plant=plant,
             observer=self.observer.model,
-            controller=nls.torque_controller(self.model, sample_time=SAMPLE),
+            controller=nls.torque_controller(self.model, sample_time=SAMPLE, gains=REPRODUCED_GAINS),
             wires={
                 "observer.motor.angle": "plant.spring.angle.measured",
                 "controller.motor.angle": "plant.motor_encoder.reading",

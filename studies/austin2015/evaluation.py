@@ -21,6 +21,7 @@ from nlsdesign.feedback.control import (
     sine_response,
 )
 from nlsdesign.feedback.control.evaluation.margins import OutputImpedance
+from nlsdesign.feedback.control.evaluation.spread_margins import SpreadMargins, spread_margins
 from nlsdesign.feedback.observer import ObserverDesign
 
 AMPLITUDES = (0.8, 2.8)  # N·m; the small and the large sine of Fig. 10 of the paper
@@ -31,12 +32,13 @@ BETWEEN = (8.0, 160.0)  # rad/s per N·m
 
 @dataclass(frozen=True, eq=False)
 class LoopEvaluation:
-    """Responses at two amplitudes, margins over the angle, impedance, and where limit cycles begin."""
+    """Responses at two amplitudes, margins over angle and spread, impedance, and where limit cycles begin."""
 
     responses: tuple[SineResponse, ...]
     margins: LoopMargins
     impedance: OutputImpedance
     onset: LimitCycleOnset
+    spread: SpreadMargins
 
     @property
     def least_gain_margin(self) -> float:
@@ -49,7 +51,7 @@ class LoopEvaluation:
 def evaluate_loop(
     actuator: nls.Assembly, model: nls.FlatModel, observer: ObserverDesign, count: int
 ) -> LoopEvaluation:
-    """Evaluate the loop with the default gains at a number of frequencies."""
+    """Evaluate the loop with the gains that reproduce the paper's at a number of frequencies."""
     controller = nls.torque_controller(model, gains=TorqueGains(proportional=KP))
     outputs = [v.name for v in model.outputs]
     moved = nls.flatten(with_moved_load(actuator), outputs=outputs)
@@ -64,4 +66,5 @@ def evaluate_loop(
         loop_margins(fixed, angles),
         output_impedance(free, angles[::5]),
         onset_of_limit_cycling(fixed, GAIN, between=BETWEEN, amplitude=AMPLITUDES[1], translate=natively),
+        spread_margins(fixed, GAIN, last=float(angles[-1]), translate=natively),
     )

@@ -17,12 +17,13 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.bench.identification import rmse
+from nlsdesign.feedback.control import ScheduledTorque
 from nlsdesign.feedback.observer import choose_observer
 
 from .torque_loop import FROM_ENCODER, TorqueLoop, export_and_cosimulate
 
 AMPLITUDE, FREQUENCY = 2.0, 1.0  # N·m, Hz; slow enough for the second relaxation to show
-CYCLES = 5
+CYCLES = 8
 _REPEATS = 0.05
 """Largest change of the torque error from one cycle to the next with which a run counts as settled."""
 
@@ -123,7 +124,7 @@ def code_of_three_decks(
 
 def _under(machine: nls.FlatModel, plant: nls.FlatModel, observer: nls.FlatModel) -> UnderCode:
     """Run the machine under observer and controller made for a plant."""
-    controller = nls.torque_controller(plant)
+    controller = nls.torque_controller(plant, law=ScheduledTorque())
     assert controller.origin is not None
     assert observer.origin is not None
     assert controller.origin.digest == observer.origin.digest

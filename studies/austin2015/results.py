@@ -118,6 +118,8 @@ class Results:
                 f"{name}_certified_decay_per_s": each.spread.certificate.proof.decay,
                 f"{name}_certified_condition": each.spread.certificate.proof.condition,
                 f"{name}_onset_of_limit_cycling_Kp": each.evaluation.onset.value,
+                f"{name}_largest_Kp_with_margins": each.evaluation.spread.enough,
+                f"{name}_limit_cycling_after_kick_Kp_32_percent": 100.0 * each.evaluation.spread.cycling,
                 f"{name}_error_with_stiffer_rubber_mNm_rms": 1e3 * each.observers.stiffer_error,
             }
         numbers |= self.generated.numbers

@@ -9,7 +9,7 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.export import CSource, Wire
-from nlsdesign.feedback.control import joined
+from nlsdesign.feedback.control import ScheduledTorque, joined
 from nlsdesign.foundation.arrays import Array
 
 READING = "plant.motor_encoder.reading"
@@ -56,7 +56,7 @@ def export_and_cosimulate(
     model: nls.FlatModel, observer: nls.FlatModel, out: Path, stop: float
 ) -> TorqueLoop:
     """Write C and FMUs, co-simulate the closed loop, and simulate the same loop in one piece."""
-    controller = nls.torque_controller(model)
+    controller = nls.torque_controller(model, law=ScheduledTorque())
     parts = {"plant": model, "observer": observer, "controller": controller}
     source = nls.export_c(observer, out / "c", name="observer")
     law = nls.export_c(controller, out / "c", name="controller")

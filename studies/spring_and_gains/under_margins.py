@@ -65,7 +65,13 @@ class Law:
 
 
 LAWS = (
-    Law("PID", PidTorque(), "controller.proportional", "rad/s per N·m", (2.0, 400.0)),
+    Law(
+        "PID",
+        PidTorque(proportional=32.0, integral=100.0),
+        "controller.proportional",
+        "rad/s per N·m",
+        (2.0, 400.0),
+    ),
     # What is fed forward has no part in margins and impedance, so following is compared without it too.
     Law("scheduled", ScheduledTorque(feedforward=0.0), "controller.bandwidth", "Hz", (1.0, 60.0)),
 )

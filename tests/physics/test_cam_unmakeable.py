@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import OneSidedCam
-from nlsdesign.design import contour_of_cam, design_cam, unmakeable_parts
-from nlsdesign.design.statics.energy import CamProfile, energy_profile
+from nlsdesign.design import contour_of_cam, design_cam
+from nlsdesign.design.statics.energy import CamProfile, energy_profile, unmakeable_parts
 from tests.cam_cases import CONCAVE, CONTOUR, CONVEX, KEEP, RUBBER, TARGET, actuator
 
 ANGLES = np.linspace(0.0, 1.2, 601)

@@ -189,7 +189,8 @@ def test_rates_follow_sharp_reversals_as_closely_as_the_counts_of_an_encoder_all
         short_of = gaussian_filter1d(predict(truth, records, "b")["stage.unbalanced"], 8.0)[200:-200]
         unbalanced.append(float(np.sqrt(np.mean(short_of**2))))
         assert np.max(np.abs(list(scores(refit(declared(), records)).values()))) < 3.0
-        assert rate_span(records.records, "stage.angle") == pytest.approx(spans[-1], rel=0.2)
+        # A block takes a shorter one where that of the motion takes too much from its rates.
+        assert spans[-1] < 1.2 * rate_span(records.records, "stage.angle")
     # A reversal takes 0.1 s; coarse counts need a longer time for the same noise of a rate.
     assert spans[0] < 0.06
     assert spans == sorted(spans)

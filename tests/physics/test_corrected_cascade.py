@@ -125,21 +125,24 @@ def estimates(folder: Path, angle: np.ndarray, current: np.ndarray) -> tuple[np.
     return np.array([y for y, _ in both]), np.array([status for _, status in both])
 
 
-@pytest.mark.long_cases("frozen", "long jump")
-@pytest.mark.parametrize("fault", ["jump", "long jump", "frozen"])
+@pytest.mark.long_cases("frozen-2300-1000", "long jump-2200-40")
+@pytest.mark.parametrize(
+    ("fault", "first", "length"),
+    [("jump", 2200, 3), ("long jump", 2200, 40), ("frozen", 2300, 1000), ("frozen", 3300, 100)],
+)
 def test_a_fault_is_forgotten_in_three_tenths_of_a_second(
-    fault: str, bench: tuple[Course, Prior, dict[str, Observer]], tmp_path: Path
+    fault: str, first: int, length: int, bench: tuple[Course, Prior, dict[str, Observer]], tmp_path: Path
 ) -> None:
     """Within 1 % of 5 N·m of the undisturbed twin, on a machine whose factors are learned."""
     course, prior, _ = bench
     run = course.run(drawn(course, prior, coordinates(prior, 1, 11)[0]))
     undisturbed, _ = estimates(tmp_path, run.angle, run.current)
-    first, length = 2200, {"jump": 3, "long jump": 40, "frozen": 700}[fault]
     seen = run.angle.copy()
     seen[first : first + length] = seen[first] if fault == "frozen" else seen[first : first + length] + 0.6
     disturbed, status = estimates(tmp_path, seen, run.current)
     apart = np.abs(disturbed[:, 0] - undisturbed[:, 0])
-    assert np.any(status[first : first + length])
+    # The encoder's stale time is longer than the shortest of these.
+    assert length == 100 or np.any(status[first : first + length])
     assert np.max(apart[first + length + 300 :]) <= 0.01 * 5.0
 
 

@@ -3,56 +3,69 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from nlsdesign.components import declare, with_moved_load
 from nlsdesign.export import quickest
-from nlsdesign.feedback.control import ClosedLoop, cascade_loops, loop_margins
+from nlsdesign.feedback.control import (
+    REPRODUCED_GAINS,
+    ClosedLoop,
+    PidTorque,
+    ScheduledTorque,
+    TorqueLaw,
+    cascade_loops,
+    loop_margins,
+)
 from nlsdesign.feedback.control.evaluation.responses import held_drive
 from nlsdesign.feedback.control.evaluation.spread_margins import (
     GAIN_MARGIN,
     PHASE_MARGIN,
+    SHARE,
     SpreadMargins,
     spread_margins,
 )
+from nlsdesign.feedback.control.evaluation.whole_evaluation import with_margin
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 
 GAIN, LAST = "controller.proportional", np.radians(50.0)
 
 
-def loop_of(deck: str) -> ClosedLoop:
+def loop_of(deck: str, **law: Any) -> ClosedLoop:
     assembly = declare(load_deck(deck))
     machines = [flatten(each) for each in (assembly, with_moved_load(assembly))]
-    return cascade_loops(*machines, delay=1, sample_time=1e-3)[0]
+    return cascade_loops(*machines, delay=1, sample_time=1e-3, **law)[0]
 
 
 @pytest.fixture(scope="module")
 def loop() -> ClosedLoop:
-    return loop_of("austin2015_figure_consistent")
+    return loop_of("austin2015_figure_consistent", gains=REPRODUCED_GAINS)
 
 
 @pytest.fixture(scope="module")
-def published(loop: ClosedLoop) -> SpreadMargins:
+def reproduced(loop: ClosedLoop) -> SpreadMargins:
     return spread_margins(loop, GAIN, last=LAST, translate=quickest())
 
 
-def test_the_published_gain_is_a_finding_with_the_gain_that_has_a_margin(published: SpreadMargins) -> None:
-    assert published.value == 32.0
-    assert not published.kept
-    assert published.least[0] < 1.0
-    margin, kick = published.findings()
+def test_the_gain_of_the_studies_is_a_finding_with_the_gain_that_has_a_margin(
+    reproduced: SpreadMargins,
+) -> None:
+    assert reproduced.value == 32.0
+    assert not reproduced.kept
+    assert reproduced.least[0] < 1.0
+    margin, kick = reproduced.findings()
     assert "6 dB, 30° are asked for: 14" in margin
     assert "machines of the spread limit-cycle at 3.5 N·m after a step and a kick of 10 ms" in kick
-    assert 0.05 < published.cycling < 0.4
+    assert 0.05 < reproduced.cycling < 0.4
 
 
 def test_the_gain_that_is_named_has_the_margin_and_survives_the_kick(
-    loop: ClosedLoop, published: SpreadMargins
+    loop: ClosedLoop, reproduced: SpreadMargins
 ) -> None:
-    better = replace(loop, controller=loop.controller.with_values({GAIN: published.enough}))
+    better = replace(loop, controller=loop.controller.with_values({GAIN: reproduced.enough}))
     found = spread_margins(better, GAIN, last=LAST, translate=quickest())
     assert found.kept
     assert found.findings() == []
@@ -75,8 +88,41 @@ def test_a_kick_is_wanted_for_ten_milliseconds_once_the_torque_is_reached(loop: 
 
 
 def test_a_linear_spring_keeps_its_margin_with_the_same_gain() -> None:
-    gentle = loop_of("austin2015_soft_spring")
+    gentle = loop_of("austin2015_soft_spring", gains=REPRODUCED_GAINS)
     found = spread_margins(gentle, GAIN, last=LAST, translate=quickest())
     assert found.kept
     assert found.enough == found.value
     assert found.findings() == []
+
+
+DECKS = ("austin2015_soft_spring", "austin2015_stiff_spring", "austin2015_figure_consistent",
+         "austin2015_as_printed", "test_rig")  # fmt: skip
+
+
+@pytest.mark.parametrize("deck", DECKS)
+@pytest.mark.parametrize("law", [PidTorque(), ScheduledTorque()])
+def test_default_gains_have_a_margin_on_every_deck(deck: str, law: TorqueLaw) -> None:
+    name = GAIN if isinstance(law, PidTorque) else "controller.bandwidth"
+    found = spread_margins(loop_of(deck, law=law), name, last=LAST, translate=quickest())
+    assert found.kept, found.findings()
+    assert found.findings() == []
+    assert found.kicked is not None
+    assert found.kicked.held >= SHARE
+
+
+def test_the_gain_by_default_closes_the_loop_of_a_linear_spring_at_twelve_hertz() -> None:
+    """Kp = 2π·12 Hz/k and Ki = 3.125 Kp/s, the spring of 1.7 N·m/rad by hand."""
+    values = loop_of("austin2015_soft_spring").controller.values
+    assert values[GAIN] == pytest.approx(2.0 * np.pi * 12.0 / 1.7, rel=1e-9)
+    assert values["controller.integral"] == pytest.approx(3.125 * values[GAIN])
+
+
+def test_a_gain_that_nobody_gave_is_lowered_to_one_with_a_margin_and_a_given_one_is_named() -> None:
+    plant = loop_of("austin2015_figure_consistent").plant
+    quick = {"gains": REPRODUCED_GAINS, "sample_time": 1e-3, "last": LAST}
+    kept, given = with_margin(plant, GAIN, given=True, **quick)
+    lowered, taken = with_margin(plant, GAIN, given=False, **quick)
+    assert kept.values[GAIN] == 32.0
+    assert "6 dB, 30° are asked for: 14" in given
+    assert taken == f"{given}, and is taken"
+    assert lowered.values[GAIN] == pytest.approx(14.2, abs=0.3)

@@ -17,7 +17,6 @@ _DEEPEST = 4.0
 """Depth of a slot over its width that is milled. Source: Neptune Labs, guideline for machined parts."""
 _USUAL = 5e-5
 """Deviation in m of sizes from 0.5 to 6 mm of the fine class. Source: ISO 2768-1, class f."""
-_CLASS = "ISO 2768-1 f: ± 0.05"
 _SHEAR = 0.6 * 800e6 / 1.25
 """Shear of a screw of class 8.8 over its stress area in Pa. Source: EN 1993-1-8, table 3.4."""
 _FACTOR = 2.0

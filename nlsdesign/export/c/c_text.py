@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import StrEnum
 from typing import Any
 
@@ -107,12 +107,12 @@ class Real(StrEnum):
         return [*lines, "};"]
 
 
-def identifier(text: str) -> str:
-    """Return a C and C++ identifier made from any name; other characters become ``_``."""
+def identifier(text: str, keywords: Collection[str] = _KEYWORDS) -> str:
+    """Return an identifier made from any name, by default one of C and C++; other characters become ``_``."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", text) or "_"
     if name[0].isdigit():
         name = "_" + name
-    return name + "_" if name in _KEYWORDS else name
+    return name + "_" if name in keywords else name
 
 
 def comment(text: str) -> str:

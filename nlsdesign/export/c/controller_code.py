@@ -109,18 +109,20 @@ def header_text(c: CWriter) -> str:
         "derived": [f"{c.real} derived[{derived}]; /* follows from the parameters */"] if derived else [],
         **_heads(c.name),
     }
-    bare = c.filled("controller.h", values | {"interface": "0u"})
-    return c.filled("controller.h", values | {"interface": interface_version(bare, c.model)})
+    version_of_interface = "@interface@"  # known once all else is written
+    text = c.filled("controller.h", values | {"interface": version_of_interface})
+    return text.replace(version_of_interface, interface_version(text, c.model))
 
 
 def source_text(c: CWriter) -> str:
     """Return the C file, its parts in the order of the file."""
     model, real = c.model, c.real
+    title, outputs = _title(model), first_outputs(model, real)
+    inputs = [min(max(v.start, v.minimum), v.maximum) for v in model.inputs]
     # What stands above the functions is what they call and look up.
     settled, derived, (body, looked_up) = settled_functions(c), derived_statements(c), step_body(c)
-    inputs = [min(max(v.start, v.minimum), v.maximum) for v in model.inputs]
     values: dict[str, str | list[str]] = {
-        "title": _title(model),
+        "title": title,
         "tables": [
             *elementary_functions(real, [*body, *settled, *derived]),
             *(line for table in c.tables if table.columns(looked_up) for line in (*table.data(), "")),
@@ -128,7 +130,7 @@ def source_text(c: CWriter) -> str:
         "start_parameters": c.initialiser("parameters", [v.start for v in model.parameters]),
         "start_states": c.initialiser("states", [v.start for v in model.states]),
         "start_inputs": c.initialiser("inputs", inputs),
-        "start_outputs": c.initialiser("outputs", first_outputs(model, real)),
+        "start_outputs": c.initialiser("outputs", outputs),
         "guards": guard_functions(c),
         "derive": [*c.filled("controller_derive.c", {"statements": derived}).splitlines(), ""]
         if derived

@@ -250,7 +250,9 @@ class _Run:
         rows = self._rows(plan)
         self._check_finite(plan, rows)
         columns = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(plan.columns)}
-        trace = Trace(plan.points, columns, {name: self._unit(name) for name in columns}, "co-simulation")
+        variables = ((name, *split_name(name)) for name in columns)
+        units = {name: self._descriptions[i].variables[v].unit or "1" for name, i, v in variables}
+        trace = Trace(plan.points, columns, units, "co-simulation")
         errors: dict[str, float] = {}
         if plan.coupled and self._stepping.estimate:
             finer = self._rows(self._plan(2 * parts))[::2]
@@ -333,10 +335,6 @@ class _Run:
                     f"instance '{instance}' at {plan.points[lost[0]]:g} s",
                     f"its output {variable} is no number",
                 )
-
-    def _unit(self, name: str) -> str:
-        instance, variable = split_name(name)
-        return self._descriptions[instance].variables[variable].unit or "1"
 
 
 def unpacked_fmus(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, FmuDescription]:

@@ -146,7 +146,8 @@ def delay_of(descriptions: Mapping[str, FmuDescription], wire: Wire) -> float:
 def gain_to(descriptions: Mapping[str, FmuDescription], target: str, wire: Wire) -> float:
     """Return the factor between the numbers of both ends, each in the unit that its FMU states."""
     number = wire.gain.number if isinstance(wire.gain, Quantity) else float(wire.gain)
-    names = [_unit(descriptions, end) for end in (target, wire.source)]
+    ends = (split_name(end) for end in (target, wire.source))
+    names = [descriptions[instance].variables[variable].unit for instance, variable in ends]
     if None in names:
         return number
     try:
@@ -174,8 +175,3 @@ def _apart(target: str, source: str, units: list[str | None], hint: str) -> Unit
     return UnitError(
         f"wire '{target}' [{units[0]}]", f"reads '{source}', which is in [{units[1]}]", next_step=hint
     )
-
-
-def _unit(descriptions: Mapping[str, FmuDescription], name: str) -> str | None:
-    instance, variable = split_name(name)
-    return descriptions[instance].variables[variable].unit

@@ -187,7 +187,11 @@ def export_fmu(
     length = step if step is not None else (model.sample_time or 1e-3)
     if not (math.isfinite(length) and length > 0.0):
         raise ValueRangeError(f"step={length}", "must be a positive number of seconds")
-    chosen = chosen_platforms(platforms if platforms is not None else _platforms_of_environment())
+    if platforms is None:
+        listed = os.environ.get("NLSDESIGN_PLATFORMS", "").split(",")
+        named = [name.strip() for name in listed if name.strip()]
+        platforms = (ALL_PLATFORMS if "all" in named else named) or None
+    chosen = chosen_platforms(platforms)
     contents = fmu_texts(model, version=version, step=length, authorship=(authorship or Authorship()).dated())
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
@@ -195,11 +199,6 @@ def export_fmu(
     with draft(target) as file:
         _write_archive(file, with_origin(model, contents | binaries))
     return target
-
-
-def _platforms_of_environment() -> Sequence[str] | None:
-    named = [name.strip() for name in os.environ.get("NLSDESIGN_PLATFORMS", "").split(",") if name.strip()]
-    return (ALL_PLATFORMS if "all" in named else named) or None
 
 
 def fmu_texts(
@@ -223,15 +222,11 @@ def fmu_texts(
     if version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(variables)
         texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(variables)
-    return {path: text.encode() for path, text in texts.items()} | _pictures(variables.model, version)
-
-
-def _pictures(model: FlatModel, version: str) -> dict[str, bytes]:
-    """Return the pictures of the model, and in FMI 3.0 of its terminals."""
-    if version == "2.0":
-        return {"model.png": icon()}
-    attached = {each.picture for each in terminals(model)}
-    return {f"terminalsAndIcons/{name}.png": icon(name) for name in ("icon", *sorted(attached))}
+    pictures = {"model.png": icon()}
+    if version == "3.0":
+        attached = sorted({each.picture for each in terminals(variables.model)})
+        pictures = {f"terminalsAndIcons/{name}.png": icon(name) for name in ("icon", *attached)}
+    return {path: text.encode() for path, text in texts.items()} | pictures
 
 
 def _token(texts: Mapping[str, str]) -> str:

@@ -44,15 +44,12 @@ def indicator_variables(model: FlatModel) -> list[Variable]:
 
 def mode_variables(model: FlatModel) -> list[Variable]:
     """Return the mode of each located switch: −1, 0 or 1."""
-    switches = located_switches(model)
-    return [
-        Variable(f"{name}.mode", "1", f"Mode of {name}: {_words(switch)}", minimum=-1.0, maximum=1.0)
-        for name, switch in zip(_names(switches), switches, strict=True)
-    ]
-
-
-def _words(switch: Switch) -> str:
-    return ", ".join(f"{mode} {text}" for mode, text in sorted(switch.words) if mode in (-1, 0, 1))
+    switches, variables = located_switches(model), []
+    for name, switch in zip(_names(switches), switches, strict=True):
+        modes = ", ".join(f"{mode} {text}" for mode, text in sorted(switch.words) if mode in (-1, 0, 1))
+        text = f"Mode of {name}: {modes}"
+        variables.append(Variable(f"{name}.mode", "1", text, minimum=-1.0, maximum=1.0))
+    return variables
 
 
 def _names(switches: Sequence[Switch]) -> list[str]:

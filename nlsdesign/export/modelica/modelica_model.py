@@ -21,14 +21,12 @@ from ...foundation.quantity import NOT_STATED, parse_unit
 from ...foundation.text_files import write_text
 from ...model import FlatModel, Variable
 from ...model.graph import Instruction, read_graph
-from ..c.c_text import comment
+from ..c.c_text import comment, identifier
 from ..c.provenance import origin_lines, stamped
 from .modelica_terms import ATOM, SERIES, SIGNED, WRITTEN_TWICE, Term, kept, term
 
 LONGEST = 16
 """Operations in one expression; a longer one gets a name of its own."""
-
-_RESULTS = ("derivative", "output", "signal")
 
 
 @dataclass
@@ -125,7 +123,7 @@ class _Reader:
 
 
 _NOT_QUOTABLE = re.compile(r"[^A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~]")
-_KEYWORDS = frozenset(
+KEYWORDS = frozenset(
     keyword
     for line in (
         "algorithm and annotation block break class connect connector constant constrainedby der discrete",
@@ -136,17 +134,6 @@ _KEYWORDS = frozenset(
     )
     for keyword in line.split()
 )
-
-
-def class_name(text: str) -> str:
-    """Return a plain Modelica identifier made from a name.
-
-    ``text``: any name; other characters become ``_``.
-    """
-    name = re.sub(r"[^A-Za-z0-9_]", "_", text) or "_"
-    if name[0].isdigit():
-        name = "_" + name
-    return name + "_" if name in _KEYWORDS else name
 
 
 def quoted_names(names: Iterable[str]) -> dict[str, str]:
@@ -255,7 +242,7 @@ def modelica_text(model: FlatModel) -> str:
     groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
     names = quoted_names(v.name for group in groups for v in group)
     equations = modelica_equations(model, names)
-    name = class_name(model.name)
+    name = identifier(model.name, KEYWORDS)
     lines = [
         *_head(model),
         f"model {name} {string(model.description)}",

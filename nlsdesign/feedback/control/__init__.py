@@ -30,14 +30,16 @@ from .evaluation.responses import (
 )
 from .evaluation.whole_evaluation import BIAS as BIAS
 from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, cascade_loops, evaluate_loop
+from .evaluation.whole_evaluation import with_margin as with_margin
 from .laws.known_drive import check_torque, largest_torque, only_side
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
 from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
-from .laws.torque_loop import TorqueGains, torque_controller
+from .laws.torque_loop import REPRODUCED_GAINS, TorqueGains, torque_controller
 from .laws.velocity_loop import DisturbanceObserver, FrictionCompensation, VelocityLoop
 from .tuning import LoopChoice, LoopLimits, TunedLoop, bandwidth_against_impedance, best_choices, largest_gain
 
 __all__ = [
+    "REPRODUCED_GAINS",
     "AntiWindup",
     "BackCalculation",
     "ClosedLoop",

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from .before_after import RecordError, gap_bars
-from .cam_motion import CamMotion, cam_motion_of, cam_positions, torque_curve
+from .cam_motion import cam_motion_of, cam_positions, torque_curve
 from .curves import (
     PointPanel,
     curves,
@@ -16,16 +16,13 @@ from .curves import (
 )
 from .design_figures import (
     curve_of_task,
-    design_picture,
-    limit_margins,
     motor_over_task,
     pareto_front,
     tolerance_bars,
     torque_band,
 )
-from .design_pictures import DesignPictures, inspection_rows
+from .design_pictures import DesignPictures
 from .loop_evaluation import (
-    coupled_stability_map,
     impedance_over_frequency,
     margins_over_angle,
     torque_responses,
@@ -33,14 +30,12 @@ from .loop_evaluation import (
 )
 from .loop_evaluation import passivity_words as passivity_words
 from .over_angle import errors_over_spread, observability_over_angle, ranked_intervals, stability_over_angle
-from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time, run_over_time
+from .over_time import closed_loop, closed_loop_of, observer_error, over_time
 from .style import compact
 from .svg import inline_svg, write_figures
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
-    "CamMotion",
-    "ClosedLoopRun",
     "DesignPictures",
     "Figure",
     "InspectionRow",
@@ -52,17 +47,13 @@ __all__ = [
     "closed_loop",
     "closed_loop_of",
     "compact",
-    "coupled_stability_map",
     "curve_of_task",
     "curves",
     "curves_beside_points",
-    "design_picture",
     "errors_over_spread",
     "gap_bars",
     "impedance_over_frequency",
     "inline_svg",
-    "inspection_rows",
-    "limit_margins",
     "loop_area",
     "margins_over_angle",
     "metric_note",
@@ -72,7 +63,6 @@ __all__ = [
     "over_time",
     "pareto_front",
     "ranked_intervals",
-    "run_over_time",
     "stability_over_angle",
     "tolerance_bars",
     "torque_against_measured",

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import typeset_unit
+from ...foundation.quantity import typeset_number, typeset_unit
 from .style import (
     AFTER,
     BEFORE,
@@ -23,10 +22,10 @@ from .style import (
     MUTED,
     SURFACE,
     described,
+    label_panel,
     legend,
     panels,
     root_mean_square,
-    significant,
     styled,
 )
 from .svg import thinned
@@ -107,7 +106,7 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
         ]
         for bar, top, height in zip(drawn, tops, heights, strict=True):
             axes.annotate(
-                significant(height), (bar.get_x() + bar.get_width() / 2, top), (0, 2), color=INK.light,
+                typeset_number(height), (bar.get_x() + bar.get_width() / 2, top), (0, 2), color=INK.light,
                 fontsize=8, ha="center", va="bottom", textcoords="offset points",
                 rotation=90.0 if len(ordered) > _MOST_LEVEL else 0.0,
             )  # fmt: skip
@@ -132,7 +131,9 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
     axes.set_ylabel(f"rms {quantity} in {unit}" if unit else f"rms {quantity}")
     legend(axes)
     held_out = [
-        f"{e.record} {significant(e.before)} to {significant(e.after)} {unit}" for e in ordered if e.held_out
+        f"{e.record} {typeset_number(e.before)} to {typeset_number(e.after)} {unit}"
+        for e in ordered
+        if e.held_out
     ]
     return described(
         figure, f"Error of each record before and after. Held out: {'; '.join(held_out) or 'none'}."
@@ -182,7 +183,7 @@ def held_out_series(record: HeldOut) -> Figure:
         *([("after", record.after, AFTER.light, DASHES[0])] if changed else []),
     ):
         residual = record.measured - values
-        rms = f"{significant(root_mean_square(residual))} {unit}"
+        rms = f"{typeset_number(root_mean_square(residual))} {unit}"
         errors.append(f"{rms} {label}")
         upper.plot(*thinned(record.time, values), color=tone, linestyle=dash, linewidth=1.2, label=label)
         lower.plot(
@@ -200,8 +201,8 @@ def held_out_series(record: HeldOut) -> Figure:
             zorder=0.5,
             label="noise, ± 2 standard deviations",
         )
-    _finish(upper, f"{record.quantity} in {unit}", record.title)
-    _finish(lower, f"error in {unit}", "Measured minus predicted")
+    label_panel(upper, f"{record.quantity} in {unit}", record.title)
+    label_panel(lower, f"error in {unit}", "Measured minus predicted")
     lower.set_xlabel("time in s")
     return described(
         figure, f"{record.title}: {record.quantity} over time. Remaining error: {', '.join(errors)}."
@@ -233,8 +234,8 @@ def binned_errors(before: Curve, after: Curve, *, across: str, unit: str, name: 
         axes.plot(*thinned(x, y), color=tone, linestyle=dash, marker=marker, label=label, linewidth=1.4)
     axes.margins(x=0.02)
     axes.set_xlabel(across)
-    _finish(axes, f"mean error in {typeset_unit(unit)}", "Mean error in bins")
-    sizes = [significant(root_mean_square(y), 2) for _, y in (before, after)]
+    label_panel(axes, f"mean error in {typeset_unit(unit)}", "Mean error in bins")
+    sizes = [typeset_number(root_mean_square(y), 2) for _, y in (before, after)]
     return described(
         figure,
         f"Mean error of {name} over {across}: {sizes[0]} {typeset_unit(unit)} rms before, "
@@ -290,9 +291,3 @@ def candidate_shares(candidates: Sequence[CandidateShare]) -> Figure:
         figure,
         f"Share of the excess over the noise floor that each candidate explains, largest first: {summary}.",
     )
-
-
-def _finish(axes: Axes, ordinate: str, title: str) -> None:
-    axes.set_ylabel(ordinate)
-    axes.set_title(title)
-    legend(axes)

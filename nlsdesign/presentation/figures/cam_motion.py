@@ -15,7 +15,7 @@ from ...design import Contour, elastic_law
 from ...design.statics.contour import turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import MM
+from ...foundation.quantity import MM, typeset_number
 from ...model import FlatModel
 from .style import (
     BLUE,
@@ -29,7 +29,6 @@ from .style import (
     WIDTH,
     described,
     panels,
-    significant,
     styled,
 )
 
@@ -360,7 +359,10 @@ def cam_picture(motion: CamMotion, *, start: float | None = None) -> CamPicture:
     """
     first = motion.nearest(0.6 * float(motion.angles[-1]) if start is None else start)
     curve = torque_curve(motion, at=first)
-    places = _places(curve, motion)
+    # Where the marker stands at each angle, in points of the SVG, y downwards.
+    curve.draw_without_rendering()
+    pixels = curve.axes[0].transData.transform(np.column_stack([np.degrees(motion.angles), motion.torques]))
+    places: Array = pixels * [1.0, -1.0] * 72.0 / curve.dpi
     frames = tuple(_frame(motion, i, places[i] - places[first]) for i in range(len(motion.angles)))
     tallest = max(float(np.max(motion.contour.radii)), 6.5e-3)
     lower, upper = motion.halves
@@ -395,19 +397,11 @@ def torque_curve(motion: CamMotion, *, at: int) -> Figure:
     axes.margins(x=0.03)
     axes.set_xlabel("angle in degrees")
     axes.set_ylabel("torque in N·m")
-    top = significant(float(np.max(motion.torques)))
+    top = typeset_number(float(np.max(motion.torques)))
     return described(
         figure,
         f"Torque over the angle from {degrees[0]:.0f}° to {degrees[-1]:.0f}°, up to {top} N·m, one marked.",
     )
-
-
-def _places(curve: Figure, motion: CamMotion) -> Array:
-    """Return where the marker stands at each angle, in points of the SVG, y downwards."""
-    curve.draw_without_rendering()
-    pixels = curve.axes[0].transData.transform(np.column_stack([np.degrees(motion.angles), motion.torques]))
-    places: Array = pixels * [1.0, -1.0] * 72.0 / curve.dpi
-    return places
 
 
 def _frame(motion: CamMotion, index: int, shift: Array) -> dict[str, Any]:

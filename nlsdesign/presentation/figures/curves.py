@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...bench.identification.residuals import Agreement
 from ...design import Target
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import typeset_number
 from ...foundation.written_numbers import shared_prefix
 from .style import (
     AFTER,
@@ -21,12 +21,12 @@ from .style import (
     INK,
     MUTED,
     described,
+    label_panel,
     legend,
     log_axis,
     look,
     panels,
     root_mean_square,
-    significant,
     styled,
 )
 from .svg import thinned
@@ -186,7 +186,7 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
     }
     factor, unit = shared_prefix([half, *(root_mean_square(error) for error in errors.values())], "N*m")
     if half > 0.0:
-        label = f"tolerance ± {significant(factor * half, 3)} {unit}"
+        label = f"tolerance ± {typeset_number(factor * half, 3)} {unit}"
         upper.fill_between(degrees, low, high, color=GRID.light, label=label)
         lower.axhspan(-factor * half, factor * half, color=GRID.light)
     upper.plot(
@@ -198,17 +198,17 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
         tone, dash, _ = look(number)
         error = errors[label]
         rms = root_mean_square(error)
-        summaries.append(f"{label} {significant(factor * rms, 2)} {unit}")
+        summaries.append(f"{label} {typeset_number(factor * rms, 2)} {unit}")
         upper.plot(np.degrees(angle), torque, color=tone, linestyle=dash, label=label)
         lower.plot(
             np.degrees(angle),
             factor * error,
             color=tone,
             linestyle=dash,
-            label=f"{label}: rms {significant(factor * rms, 2)} {unit}",
+            label=f"{label}: rms {typeset_number(factor * rms, 2)} {unit}",
         )
-    _label(upper, "torque in N·m", "Torque of the spring")
-    _label(lower, f"error in {unit}", "Design minus target")
+    label_panel(upper, "torque in N·m", "Torque of the spring")
+    label_panel(lower, f"error in {unit}", "Design minus target")
     lower.set_xlabel("angle in degrees")
     return described(
         figure,
@@ -251,7 +251,7 @@ def torque_against_measured(
         marker = look(position).marker
         upper.plot(np.degrees(at), points, color=INK.light, linestyle="none", marker=marker, label=label,
                    markerfacecolor="none", markeredgewidth=1.2, markersize=5.5)  # fmt: skip
-    _label(upper, "torque in N·m", "Torque of the spring", columns=2)
+    label_panel(upper, "torque in N·m", "Torque of the spring", columns=2)
     lower.set_ylabel("error in N·m")
     lower.set_title("Model minus measurement")
     lower.set_xlabel("angle in degrees")
@@ -279,7 +279,7 @@ def torque_loops(loops: Mapping[str, tuple[Curve, Curve]]) -> Figure:
     for panel, (title, (measured, model)) in zip(axes, loops.items(), strict=True):
         panel.plot(*_degrees(measured), color=INK.light, linewidth=1.1, label="measured")
         panel.plot(*_degrees(model), color=AFTER.light, linestyle=DASHES[1], label="model")
-        areas = [significant(1e3 * abs(loop_area(*loop)), 3) for loop in (measured, model)]
+        areas = [typeset_number(1e3 * abs(loop_area(*loop)), 3) for loop in (measured, model)]
         energies.append(f"{title}: {areas[0]} mJ measured, {areas[1]} mJ in the model")
         panel.set_title(f"{title}, lost per cycle: {areas[0]} mJ measured, {areas[1]} mJ model", fontsize=8.5)
         panel.set_xlabel("angle in degrees")
@@ -301,7 +301,7 @@ def metric_note(agreement: Agreement, unit: str = "N·m") -> str:
     unit
         Of the measured quantity.
     """
-    return f"{significant(agreement.relative)} %, {significant(agreement.rmse, 2)} {unit} rms"
+    return f"{typeset_number(agreement.relative)} %, {typeset_number(agreement.rmse, 2)} {unit} rms"
 
 
 def loop_area(angle: Array, torque: Array) -> float:
@@ -320,12 +320,6 @@ def loop_area(angle: Array, torque: Array) -> float:
 
 def _degrees(curve: Curve) -> tuple[Array, Array]:
     return thinned(np.degrees(curve[0]), curve[1])
-
-
-def _label(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> None:
-    axes.set_ylabel(ordinate)
-    axes.set_title(title)
-    legend(axes, columns=columns)
 
 
 def _require(what: str, given: Mapping[str, object]) -> None:

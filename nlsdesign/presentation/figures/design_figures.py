@@ -12,7 +12,7 @@ from ...design import CamDesign, Contour, LimitState, MotorCycle, ParetoFront, T
 from ...design.statics.contour import turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import MM, parse_unit, typeset_unit, with_unit
+from ...foundation.quantity import MM, parse_unit, typeset_number, typeset_unit, with_unit
 from ...foundation.written_numbers import shared_prefix
 from .style import (
     AFTER,
@@ -32,7 +32,6 @@ from .style import (
     legend,
     look,
     panels,
-    significant,
     styled,
 )
 
@@ -123,7 +122,10 @@ def _words(state: LimitState) -> str:
 def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
     contour = design.contour
     parallel = not np.isfinite(contour.anchor_distance)
-    for half in _halves(contour, parallel):
+    halves = list(contour.outlines())
+    if parallel:  # only the lip is designed; the body behind it is closed over the centre
+        halves = [np.vstack([contour.points, [[0.0, 0.0]], contour.points[:1]])]
+    for half in halves:
         axes.fill(*(turn(half, angle) * MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
     arm = float(np.interp(angle, contour.angles, contour.lever_arms))
     point = np.array([[np.interp(angle, contour.angles, column) for column in contour.points.T]])
@@ -273,7 +275,7 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
         ends[k] = factor * upper
     for place, value, end in zip(places, values, ends, strict=True):
         axes.annotate(
-            significant(value, 3), (end, place), (4, 0), color=INK.light, fontsize=8, va="center",
+            typeset_number(value), (end, place), (4, 0), color=INK.light, fontsize=8, va="center",
             textcoords="offset points",
         )  # fmt: skip
     axes.set_yticks(places, names)
@@ -287,9 +289,9 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     return described(
         figure,
         f"95 % quantile of the rms torque error of {len(result.errors)} made springs: "
-        f"{significant(factor * built.value, 3)} {unit} as built, {significant(factor * best[0], 3)} {unit} "
+        f"{typeset_number(factor * built.value)} {unit} as built, {typeset_number(factor * best[0])} {unit} "
         f"at best ({best[1]}). Largest cause alone: {causes[0].cause.name}, "
-        f"{significant(factor * causes[0].alone, 3)} {unit}.",
+        f"{typeset_number(factor * causes[0].alone)} {unit}.",
     )
 
 
@@ -326,11 +328,11 @@ def torque_band(result: ToleranceResult) -> Figure:
     lower.set_title("Made minus target")
     lower.set_xlabel("angle in degrees")
     legend(upper, columns=2)
-    after = f", {significant(factor * widest[1], 3)} {unit} after the trim" if len(widest) > 1 else ""
+    after = f", {typeset_number(factor * widest[1])} {unit} after the trim" if len(widest) > 1 else ""
     return described(
         figure,
         f"Band of the torque over the angle up to {degrees[-1]:.0f}° within which 90 % of the made springs "
-        f"lie, with the target; at most {significant(factor * widest[0], 3)} {unit} wide as built{after}. "
+        f"lie, with the target; at most {typeset_number(factor * widest[0])} {unit} wide as built{after}. "
         "Errors below.",
     )
 
@@ -368,7 +370,7 @@ def motor_over_task(curve: TaskCurve) -> Figure:
     legend(axes[0])
     axes[-1].set_xlabel("time in s")
     summary = "; ".join(
-        f"{name}: {significant(motor.heat)} J of heat, {significant(motor.peak_power)} W at most"
+        f"{name}: {typeset_number(motor.heat)} J of heat, {typeset_number(motor.peak_power)} W at most"
         for name, motor in zip(_LABELS, cycles, strict=True)
         if motor is not None
     )
@@ -395,7 +397,7 @@ def curve_of_task(curve: TaskCurve) -> Figure:
     beside = "no linear spring keeps the limits"
     if curve.linear is not None and curve.linear_stiffness is not None:
         line = np.array([np.min(curve.linear.cycle.torque), np.max(curve.linear.cycle.torque)])
-        beside = f"best linear spring, {significant(curve.linear_stiffness)} N·m/rad"
+        beside = f"best linear spring, {typeset_number(curve.linear_stiffness)} N·m/rad"
         at = np.degrees(line / curve.linear_stiffness)
         axes.plot(at, line, color=BEFORE.light, linestyle=DASHES[1], linewidth=1.2, label=beside)
     axes.set_ylabel("torque in N·m")
@@ -443,7 +445,7 @@ def pareto_front(front: ParetoFront) -> Figure:
     legend(axes)
     low, high = front.shown.min(axis=0), front.shown.max(axis=0)
     ranges = (
-        f"{goal} {with_unit(f'{significant(float(a))} to {significant(float(b))}', unit)}"
+        f"{goal} {with_unit(f'{typeset_number(float(a))} to {typeset_number(float(b))}', unit)}"
         for goal, unit, a, b in zip(front.goals, front.units, low, high, strict=True)
     )
     return described(figure, f"Front of {len(front.points)} designs: " + ", ".join(ranges) + ".")
@@ -462,6 +464,6 @@ def _steps(front: ParetoFront) -> list[list[int]]:
 
 
 def _range(front: ParetoFront, values: np.ndarray) -> str:
-    ends = dict.fromkeys(significant(float(value)) for value in (values.min(), values.max()))
+    ends = dict.fromkeys(typeset_number(float(value)) for value in (values.min(), values.max()))
     unit = front.units[2]
     return with_unit(" to ".join(ends), "" if unit == "1" else unit)

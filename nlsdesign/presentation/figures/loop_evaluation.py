@@ -13,21 +13,9 @@ from ...feedback.control import LoopEvaluation
 from ...feedback.control.evaluation.margins import CoupledStability, LoopMargins, OutputImpedance
 from ...feedback.control.evaluation.onset import SaturationLine
 from ...feedback.control.evaluation.responses import SineResponse
+from ...foundation.quantity import typeset_number
 from ...foundation.text_files import make_folder
-from .style import (
-    DASHES,
-    HOLDS,
-    INK,
-    LIMIT,
-    MUTED,
-    described,
-    legend,
-    log_axis,
-    look,
-    panels,
-    significant,
-    styled,
-)
+from .style import DASHES, HOLDS, INK, LIMIT, MUTED, described, legend, log_axis, look, panels, styled
 from .svg import write_figures
 
 
@@ -50,7 +38,7 @@ def torque_responses(responses: Sequence[SineResponse], line: SaturationLine | N
     words = []
     for number, response in enumerate(responses):
         tone, dash, point = look(number)
-        label = f"{significant(response.amplitude)} N·m"
+        label = f"{typeset_number(response.amplitude)} N·m"
         for panel, values in ((axes[0], response.decibel), (axes[1], response.phase_degrees)):
             panel.plot(response.frequency, values, color=tone, linestyle=dash, marker=point, label=label)
         lost = [f for f, v in zip(response.frequency, response.verdicts, strict=True) if not v.holds]
@@ -127,10 +115,11 @@ def margins_over_angle(result: Sequence[LoopMargins]) -> Figure:
         for panel, values in zip(axes, (margins.gain, margins.phase, 1e3 * margins.delay), strict=True):
             panel.plot(degrees, values, color=tone, linestyle=dash, label=f"at {margins.opening}")
         good = np.isfinite(margins.gain)
+        least = typeset_number(float(margins.gain[good].min())) if np.any(good) else ""
         words.append(
-            f"Cut at {margins.opening}: least gain margin {significant(float(margins.gain[good].min()))} dB, "
+            f"Cut at {margins.opening}: least gain margin {least} dB, "
             f"unstable at {int(np.sum(~margins.linear.stable()))} of {len(degrees)} angles."
-            if np.any(good) else f"Cut at {margins.opening}: unstable at all angles."
+            if least else f"Cut at {margins.opening}: unstable at all angles."
         )  # fmt: skip
     for panel, title in zip(
         axes, ("gain margin in dB", "phase margin in degrees", "delay margin in ms"), strict=True
@@ -179,7 +168,7 @@ def passivity_words(first: float) -> str:
     """Return in words from which frequency on a loop is active."""
     if np.isnan(first):
         return "unstable, so it has no impedance"
-    return f"active from {significant(first)} Hz on" if np.isfinite(first) else "passive"
+    return f"active from {typeset_number(first)} Hz on" if np.isfinite(first) else "passive"
 
 
 def _crosses(axes: Axes, frequencies: Sequence[float], number: int) -> None:
@@ -195,7 +184,7 @@ def _response_words(label: str, response: SineResponse, lost: Sequence[float]) -
     good = np.isfinite(response.decibel)
     if not np.any(good):
         return f"{label}: settles at no frequency."
-    low, high = (significant(float(end(response.decibel[good]))) for end in (np.min, np.max))
+    low, high = (typeset_number(float(end(response.decibel[good]))) for end in (np.min, np.max))
     tail = f"; does not settle at {len(lost)} frequencies" if lost else ""
     return f"{label}: {low} to {high} dB{tail}."
 

@@ -13,8 +13,9 @@ from matplotlib.ticker import MaxNLocator
 from ...feedback.analysis import Chart, RankDrops
 from ...feedback.observer import SpreadErrors
 from ...foundation.errors import ValueRangeError
+from ...foundation.quantity import typeset_number
 from ...foundation.written_numbers import shared_prefix
-from .style import AFTER, DASHES, INK, MUTED, described, legend, log_axis, look, panels, significant, styled
+from .style import AFTER, DASHES, INK, MUTED, described, legend, log_axis, look, panels, styled
 
 
 @styled
@@ -109,11 +110,11 @@ def _slowest(chart: Chart, mode: str, label: str) -> str:
     values, degrees = chart[f"{mode}.decay"], np.degrees(chart.at)
     worst, ratios = int(np.argmax(values)), chart[f"{mode}.damping_ratio"]
     least = int(np.argmin(ratios))
-    text = f"{label}, {mode.replace('_', ' ')}: slowest eigenvalue {significant(float(values[worst]))} 1/s"
+    text = f"{label}, {mode.replace('_', ' ')}: slowest eigenvalue {typeset_number(float(values[worst]))} 1/s"
     text += f" at {degrees[worst]:.0f}°"
     if ratios[least] < 1.0:
         pitch = float(chart[f"{mode}.frequency"][least])
-        text += f", damping at least {significant(float(ratios[least]), 2)} ({significant(pitch)} Hz)"
+        text += f", damping at least {typeset_number(float(ratios[least]), 2)} ({typeset_number(pitch)} Hz)"
     return f"{text}."
 
 
@@ -144,7 +145,7 @@ def _condition(axes: Axes, chart: Chart, number: int, label: str, exact: RankDro
     height = np.full(len(unobservable), 0.97 - 0.07 * number)
     crosses: Any = {"linestyle": "none", "marker": "x", "markersize": 5, "markeredgewidth": 1.6}
     axes.plot(unobservable, height, transform=axes.get_xaxis_transform(), color=tone, **crosses)
-    best = f"best condition number {significant(float(np.min(condition)), 2)}"
+    best = f"best condition number {typeset_number(float(np.min(condition)), 2)}"
     if exact is not None:
         return f"{label}: {'; '.join(exact.lines())}; {best}."
     if not len(unobservable):
@@ -238,7 +239,7 @@ def _draw_causes(axes: Axes, errors: SpreadErrors) -> None:
 
 
 def _range(values: np.ndarray) -> str:
-    low, high = (significant(float(end)) for end in (np.min(values), np.max(values)))
+    low, high = (typeset_number(float(end)) for end in (np.min(values), np.max(values)))
     return low if low == high else f"{low} to {high}"
 
 

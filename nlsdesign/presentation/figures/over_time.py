@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import typeset_unit
+from ...foundation.quantity import typeset_number, typeset_unit
 from ...simulation import Trace
 from .style import (
     AFTER,
@@ -21,12 +21,12 @@ from .style import (
     MUTED,
     PURPLE,
     described,
+    label_panel,
     legend,
     log_axis,
     look,
     panels,
     root_mean_square,
-    significant,
     styled,
 )
 from .svg import thinned
@@ -52,7 +52,7 @@ def observer_error(time: Array, true: Array, estimates: Mapping[str, Array]) -> 
     for number, (label, values) in enumerate(estimates.items()):
         tone, dash, _ = look(number)
         error = values - true
-        rms = f"{significant(1e3 * root_mean_square(error))} mN·m"
+        rms = f"{typeset_number(1e3 * root_mean_square(error))} mN·m"
         summaries.append(f"{label} {rms}")
         upper.plot(*thinned(time, values), color=tone, linestyle=dash, label=label, linewidth=1.3)
         lower.plot(
@@ -63,12 +63,12 @@ def observer_error(time: Array, true: Array, estimates: Mapping[str, Array]) -> 
             linewidth=1.2,
         )
     lower.axhline(0.0, color=MUTED.light, linewidth=0.8)
-    _finish(upper, "torque in N·m", "Torque of the spring")
-    _finish(lower, "error in mN·m", "Estimated minus true torque")
+    label_panel(upper, "torque in N·m", "Torque of the spring")
+    label_panel(lower, "error in mN·m", "Estimated minus true torque")
     lower.set_xlabel("time in s")
     return described(
         figure,
-        f"True and estimated torque over {significant(float(time[-1] - time[0]))} s, and the error. "
+        f"True and estimated torque over {typeset_number(float(time[-1] - time[0]))} s, and the error. "
         f"Root mean square error: {'; '.join(summaries)}.",
     )
 
@@ -92,14 +92,15 @@ def over_time(time: Array, curves: Mapping[str, Array], *, quantity: str, unit: 
     for number, (label, values) in enumerate(curves.items()):
         tone, dash, _ = look(number)
         axes.plot(*thinned(time, values), color=tone, linestyle=dash, label=label, linewidth=1.4)
-    _finish(axes, f"{quantity} in {unit}", quantity[:1].upper() + quantity[1:])
+    label_panel(axes, f"{quantity} in {unit}", quantity[:1].upper() + quantity[1:])
     axes.set_xlabel("time in s")
     sizes = "; ".join(
-        f"{n} from {significant(float(v.min()))} to {significant(float(v.max()))}" for n, v in curves.items()
+        f"{n} from {typeset_number(float(v.min()))} to {typeset_number(float(v.max()))}"
+        for n, v in curves.items()
     )
     return described(
         figure,
-        f"{quantity} over {significant(float(time[-1] - time[0]))} s in {unit}: {sizes}.",
+        f"{quantity} over {typeset_number(float(time[-1] - time[0]))} s in {unit}: {sizes}.",
     )
 
 
@@ -194,19 +195,19 @@ def closed_loop(
         for sign in (1.0, -1.0):
             axes[1].axhline(sign * run.current_limit, color=LIMIT.light, linestyle=DASHES[1], linewidth=1.0,
                             label="limit" if sign > 0 else None)  # fmt: skip
-    _finish(axes[0], "torque in N·m", "Torque of the spring")
-    _finish(axes[1], "current in A", "Motor current")
+    label_panel(axes[0], "torque in N·m", "Torque of the spring")
+    label_panel(axes[1], "current in A", "Motor current")
     if differences:
         _differences(axes[2], run.time, differences, (bound, typeset_unit(unit) or "1"))
     axes[-1].set_xlabel("time in s")
     errors = [
-        significant(1e3 * root_mean_square(values - run.true)) for values in (run.desired, run.estimated)
+        typeset_number(1e3 * root_mean_square(values - run.true)) for values in (run.desired, run.estimated)
     ]
     return described(
         figure,
-        f"Closed loop over {significant(float(run.time[-1] - run.time[0]))} s. The true torque follows "
+        f"Closed loop over {typeset_number(float(run.time[-1] - run.time[0]))} s. The true torque follows "
         f"the desired one within {errors[0]} mN·m rms, the estimate the true one within {errors[1]} mN·m. "
-        f"The current reaches {significant(float(np.max(np.abs(run.current))))} A.",
+        f"The current reaches {typeset_number(float(np.max(np.abs(run.current))))} A.",
     )
 
 
@@ -219,7 +220,7 @@ def _differences(
         size = np.abs(values)
         # Zero has no place on a logarithmic axis.
         x, y = thinned(time, np.where(size > 0.0, size, np.nan))
-        largest = f"{significant(float(np.max(size)), 2)} at most"
+        largest = f"{typeset_number(float(np.max(size)), 2)} at most"
         axes.plot(x, y, color=tone, linestyle=dash, linewidth=1.0, label=f"{label}: {largest}")
     every = np.concatenate([*(np.abs(values) for values in differences.values()), [bound or 0.0]])
     positive = every[every > 0.0]
@@ -227,15 +228,9 @@ def _differences(
         log_axis(axes)
         axes.set_ylim(float(positive.min()) / 3.0, 3.0 * float(positive.max()))
     if bound is not None:
-        label = f"bound {significant(bound, 2)}"
+        label = f"bound {typeset_number(bound, 2)}"
         axes.axhline(bound, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)), label=label)
-    _finish(axes, f"|difference| in {unit}", "Co-simulation against one monolithic simulation")
-
-
-def _finish(axes: Axes, ordinate: str, title: str) -> None:
-    axes.set_ylabel(ordinate)
-    axes.set_title(title)
-    legend(axes)
+    label_panel(axes, f"|difference| in {unit}", "Co-simulation against one monolithic simulation")
 
 
 def _same_length(time: Array, signals: Mapping[str, Array]) -> None:
@@ -284,11 +279,11 @@ def run_over_time(run: Trace, names: Sequence[str]) -> Figure:
         for name in members:
             tone, dash, _ = look(len(sizes))  # no two signals of the figure look alike
             panel.plot(*thinned(run.time, run[name]), color=tone, linestyle=dash, linewidth=1.3, label=name)
-            low, high = (significant(float(end)) for end in (np.min(run[name]), np.max(run[name])))
+            low, high = (typeset_number(float(end)) for end in (np.min(run[name]), np.max(run[name])))
             sizes.append(f"{name} from {low} to {high} {typeset_unit(unit)}".strip())
         shown = typeset_unit(unit)
         panel.set_ylabel(f"in {shown}" if shown else "without unit")
         legend(panel)
     axes[-1].set_xlabel("time in s")
-    span = significant(float(run.time[-1] - run.time[0]))
+    span = typeset_number(float(run.time[-1] - run.time[0]))
     return described(figure, f"{len(sizes)} signals over {span} s: {'; '.join(sizes)}.")

@@ -21,10 +21,10 @@ from ..figures import (
     errors_over_spread,
     gap_bars,
     observability_over_angle,
-    run_over_time,
     stability_over_angle,
     write_figures,
 )
+from ..figures.over_time import run_over_time
 from .diagnosis_sections import ROLES, fitted_table, regeneration_sections, verdict_sections
 from .page import write_report
 from .sections import (

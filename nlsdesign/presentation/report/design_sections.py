@@ -16,16 +16,14 @@ from ...foundation.quantity import three_digits
 from ...foundation.written_numbers import prefixed, shared_prefix
 from ...model import flatten
 from ..figures import (
-    CamMotion,
     cam_motion_of,
-    design_picture,
     inline_svg,
-    limit_margins,
     tolerance_bars,
     torque_against_target,
     torque_band,
 )
-from ..figures.cam_motion import MARKER, cam_picture
+from ..figures.cam_motion import MARKER, CamMotion, cam_picture
+from ..figures.design_figures import design_picture, limit_margins
 from .page import write_report
 from .sections import (
     FigureSection,

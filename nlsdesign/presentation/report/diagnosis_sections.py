@@ -23,7 +23,7 @@ from ...bench.discrepancy.reporting.verdict import (
     suspicions,
 )
 from ...foundation.errors import unknown_name
-from ...foundation.quantity import three_digits, typeset_unit, with_error
+from ...foundation.quantity import three_digits, typeset_number, typeset_unit, with_error
 from ...model import FlatModel, flatten
 from ..figures import RecordError, compact, gap_bars
 from ..figures.before_after import (
@@ -33,7 +33,6 @@ from ..figures.before_after import (
     candidate_shares,
     held_out_series,
 )
-from ..figures.style import significant
 from .sections import (
     Chapter,
     FigureSection,
@@ -192,8 +191,8 @@ def _blocks(verdict: Verdict) -> TableSection:
     rows = []
     for name in verdict.blocks:
         gap, kind = verdict.gap(name), kind_in_words(verdict.actuator, name)
-        size = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
-        times = (significant(each) for each in gap.times)
+        size = (typeset_number(each) for each in (gap.before, gap.after, gap.noise_floor))
+        times = (typeset_number(each) for each in gap.times)
         unit = typeset_unit(gap.unit) or "1"
         rows.append((f"`{name}`{f', {kind}' if kind else ''}", *size, unit, *times))
     columns = ("block", "before", "after", "noise", "unit", "before / noise", "after / noise")
@@ -368,8 +367,8 @@ def _circumstances(verdict: Verdict) -> list[Section]:
 
 
 def _gap_row(gap: RecordGap) -> tuple[str, ...]:
-    numbers = (significant(each) for each in (gap.before, gap.after, gap.noise_floor))
-    times = significant(gap.after / gap.noise_floor)
+    numbers = (typeset_number(each) for each in (gap.before, gap.after, gap.noise_floor))
+    times = typeset_number(gap.after / gap.noise_floor)
     return (
         gap.block,
         gap.record,

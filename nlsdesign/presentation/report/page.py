@@ -11,11 +11,11 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from ...foundation.errors import ExportError, ValueRangeError
+from ...foundation.errors import ExportError, ValueRangeError, visible
 from ...foundation.locations import version
 from ...foundation.text_files import write_text
 from ..figures.style import TONES
-from .sections import Chapter, Html, PagePosition, Section, breakable, prose, visible, words
+from .sections import Chapter, Html, PagePosition, Section, breakable, prose, words
 
 _PAGE_TONES = {
     "page": ("#f4f6f8", "#0e1217"),

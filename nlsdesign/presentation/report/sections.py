@@ -14,17 +14,14 @@ from typing import Any, ClassVar, NamedTuple
 from urllib.parse import quote
 
 from ...foundation.errors import ExportError, ValueRangeError
+from ...foundation.quantity import typeset_number
 from ..figures import Figure, inline_svg
-from ..figures.style import alternative_text, compact, significant
+from ..figures.style import alternative_text, compact
 from ..figures.svg import figure_data
 
 _CODE = re.compile(r"`([^`\n]+)`")
 _DOTS = re.compile(r"(?<=[a-z\]])(\.)(?=[a-z])|(?<=\w)(_)(?=\w)")
 """Dots within a hierarchical name and underscores, behind which a line may break."""
-
-
-_HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-"""Characters that are not seen, or turn the direction of what follows."""
 
 
 class Html(str):
@@ -46,17 +43,6 @@ def words(text: str) -> Html:
     '<code>a.b</code> &lt; 3'
     """
     return Html(_CODE.sub(r"<code>\1</code>", escape(text)))
-
-
-def visible(page: str) -> str:
-    r"""Return a text in which control characters and marks of direction are written out, as ``\x1b``.
-
-    Examples
-    --------
-    >>> print(visible("a" + chr(27) + "[31m"))
-    a\x1b[31m
-    """
-    return _HIDDEN.sub(lambda match: match[0].encode("unicode_escape").decode(), page)
 
 
 def breakable(text: Html) -> Html:
@@ -396,5 +382,5 @@ class FileSection(Section):
 def _size(count: int) -> str:
     for unit, factor in (("MB", 1e6), ("kB", 1e3)):
         if count >= factor:
-            return f"{significant(count / factor, 2 if count / factor < 100 else 3)} {unit}"
+            return f"{typeset_number(count / factor, 2 if count / factor < 100 else 3)} {unit}"
     return f"{count} B"

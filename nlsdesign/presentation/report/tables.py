@@ -10,8 +10,8 @@ from typing import Any, ClassVar, NamedTuple
 from urllib.parse import quote
 
 from ...foundation.errors import unknown_name, visible
-from ...foundation.quantity import Quantity, sources, typeset_unit
-from ..figures.style import compact, significant
+from ...foundation.quantity import Quantity, sources, typeset_number, typeset_unit
+from ..figures.style import compact
 from .sections import Html, PagePosition, Section, TableSection
 
 _LONGEST_ROW = 8
@@ -99,8 +99,8 @@ def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: st
     cells = tuple(
         (
             row.what,
-            "–" if row.paper is None else significant(row.paper),
-            significant(row.here),
+            "–" if row.paper is None else typeset_number(row.paper),
+            typeset_number(row.here),
             typeset_unit(row.unit),
             row.remark,
         )

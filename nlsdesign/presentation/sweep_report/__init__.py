@@ -4,6 +4,6 @@ The command and the front door import it. It computes no answers and draws nothi
 points, `figures` draws them.
 """
 
-from .sweep_page import SweepPage, write_sweep_report
+from .sweep_page import write_sweep_report
 
 __all__ = ["SweepPage", "write_sweep_report"]

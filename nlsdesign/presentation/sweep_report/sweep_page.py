@@ -169,7 +169,11 @@ def write_sweep_report(
     remarks += refusal
     content = PageContent(table, ranked, shown_points(table, ranked), names, sensitivities, points_file)
     best = _best(content, listed, notes, decks=decks, source=str(source))
-    files = _files(points_file, folder, decks)
+    listed_files = {points_file: "all points: axes, answers, status and reason, in SI"}
+    if decks:
+        about_decks = f"decks behind {len(decks)} points, which every command takes"
+        listed_files[folder / DECKS_FOLDER] = about_decks
+    files = FileSection("Files", listed_files, caption="Written beside this page.")
     page = _written(content, folder / PAGE_FILE, best=best, files=files, remarks=remarks)
     front = tuple(int(table.values["point"][row]) for row in ranked.front)
     return SweepPage(
@@ -291,10 +295,3 @@ def _caption(content: PageContent, count: int) -> str:
         return "The best in the one direction that was stated; several where they are equal."
     more = f" The first {MOST_DECKS} of {count}." if count > MOST_DECKS else ""
     return f"Points on the front, the best in `{ranked.preferences[0].answer}` first.{more}"
-
-
-def _files(points_file: Path, folder: Path, decks: dict[int, str]) -> FileSection:
-    files = {points_file: "all points: axes, answers, status and reason, in SI"}
-    if decks:
-        files[folder / DECKS_FOLDER] = f"decks behind {len(decks)} points, which every command takes"
-    return FileSection("Files", files, caption="Written beside this page.")

@@ -412,7 +412,7 @@ def test_what_the_sample_time_does_not_carry_is_refused(
 def test_defaults_are_what_the_sample_time_carries() -> None:
     slow = torque_controller(ob.bench(), law=ScheduledTorque(), sample_time=4e-3).values
     assert (slow["controller.bandwidth"], slow["controller.velocity_bandwidth"]) == (3.0, 11.25)
-    assert torque_controller(ob.bench(), sample_time=2e-3).values["controller.velocity_bandwidth"] == 30.0
+    assert torque_controller(ob.bench(), sample_time=2e-3).values["controller.velocity_bandwidth"] == 22.5
     fast = torque_controller(ob.bench(), law=ScheduledTorque(), sample_time=1e-4).values
     assert (fast["controller.bandwidth"], fast["controller.velocity_bandwidth"]) == (12.0, 45.0)
 

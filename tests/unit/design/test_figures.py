@@ -8,7 +8,7 @@ from matplotlib.container import BarContainer
 from matplotlib.patches import Polygon
 
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
-from nlsdesign.presentation.figures import design_picture, limit_margins
+from nlsdesign.presentation.figures.design_figures import design_picture, limit_margins
 from nlsdesign.presentation.figures.style import alternative_text
 from tests.cam_cases import CONCAVE, KEEP, RUBBER, TARGET, actuator
 

@@ -20,9 +20,8 @@ from nlsdesign.design import (
     PositiveStiffness,
     TabulatedTorque,
     design_cam,
-    unmakeable_parts,
 )
-from nlsdesign.design.statics.energy import energy_profile
+from nlsdesign.design.statics.energy import energy_profile, unmakeable_parts
 from nlsdesign.foundation.errors import InfeasibleError
 from nlsdesign.foundation.quantity import quantity
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, actuator

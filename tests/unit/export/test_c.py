@@ -30,6 +30,7 @@ from nlsdesign.export.c.guarded_step import (
 )
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
+from nlsdesign.feedback.control import ScheduledTorque, joined, torque_controller
 from nlsdesign.feedback.observer import design_adaptive_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError
@@ -485,3 +486,20 @@ def test_the_default_observer_in_float_passes_its_own_self_test(name, tmp_path):
     source = export_c(design_adaptive_observer(plant).model, tmp_path, real="float")
     program = compile_program([source.source, source.selftest], tmp_path / "selftest")
     assert subprocess.run([program], check=False).returncode == 0
+
+
+def test_the_self_test_allows_what_the_rounding_of_the_states_makes_and_no_more_than_ten_times(tmp_path):
+    """Slow states that stay small carry the rounding of their whole range; it once failed at two samples."""
+    plant = flatten(declare(load_deck("austin2015_soft_spring")))
+    loop = joined(design_adaptive_observer(plant).model, torque_controller(plant, law=ScheduledTorque()))
+    source = export_c(loop, tmp_path, real="float")
+    program = compile_program([source.source, source.selftest], tmp_path / "selftest")
+    assert subprocess.run([program], check=False).returncode == 0
+    # A slow state that is wrong by a hundredth of its size is found.
+    names = [v.name for v in loop.outputs]
+    place = names.index("spring.torque.deviation[2]")
+    text, changes = re.subn(rf"(const \w+ y{place} = )(.*);", r"\1 1.01f * (\2);", source.source.read_text())
+    assert changes == 1
+    source.source.write_text(text)
+    wrong = compile_program([source.source, source.selftest], tmp_path / "wrong")
+    assert subprocess.run([wrong], check=False, capture_output=True).returncode != 0

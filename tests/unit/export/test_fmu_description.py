@@ -19,7 +19,7 @@ from nlsdesign.export.fmi.authorship import Authorship
 from nlsdesign.export.fmi.dependencies import model_structure
 from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.export.fmi.fmu_variables import layout
-from nlsdesign.feedback.control import torque_controller
+from nlsdesign.feedback.control import REPRODUCED_GAINS, torque_controller
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError, ValueRangeError
 from nlsdesign.model import flatten
@@ -137,7 +137,7 @@ def test_a_rounded_reading_depends_on_what_is_read(actuator):
 
 
 def test_the_range_of_an_output_holds_for_every_tuning(actuator):
-    model = torque_controller(actuator)
+    model = torque_controller(actuator, gains=REPRODUCED_GAINS)  # reaches every limit below
     (shown,) = (each.variable for each in layout(model).given_out)
     limit = model.variable("motor.current_limit")
     assert (shown.minimum, shown.maximum) == (-limit.maximum, limit.maximum)

@@ -14,8 +14,9 @@ import pytest
 from nlsdesign.components import CoulombFriction, Inertia, assembly, smoothed, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_modelica
+from nlsdesign.export.c.c_text import identifier
 from nlsdesign.export.modelica.modelica_model import (
-    class_name,
+    KEYWORDS,
     literal,
     modelica_text,
     modelica_unit,
@@ -219,7 +220,7 @@ def test_hostile_words_stay_inside_their_strings_comments_and_names() -> None:
     assert string('a "b" \\ c\nd') == '"a \\"b\\" \\\\ c d"'
     names = quoted_names(["a b", "a_b", "a'b", "x\\y", "motor.angle[3]"])
     assert list(names.values()) == ["'a_b'", "'a_b_2'", "'a_b_3'", "'x_y'", "'motor.angle[3]'"]
-    assert [class_name(text) for text in ("model", "2 cams", "", "aus-tin")] == [
+    assert [identifier(text, KEYWORDS) for text in ("model", "2 cams", "", "aus-tin")] == [
         "model_", "_2_cams", "_", "aus_tin",
     ]  # fmt: skip
     model = deck("dfki_pendulum")

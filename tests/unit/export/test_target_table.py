@@ -10,7 +10,7 @@ import pytest
 import nlsdesign as nls
 from benchmarks import targets
 from nlsdesign.export import CORTEX_M4F
-from nlsdesign.export.compilation.target_run import TargetRun, missing_emulator
+from nlsdesign.export.compilation.target_run import TargetMeasurement, TargetRun, missing_emulator
 from nlsdesign.feedback.control import joined
 from nlsdesign.feedback.observer import design_observer_with_details
 
@@ -46,7 +46,7 @@ def test_the_goals_are_met_and_the_page_says_what_is_measured(name, chosen, root
 
 
 def test_a_missed_goal_is_named(chosen, monkeypatch):
-    cost = nls.export.TargetMeasurement(
+    cost = TargetMeasurement(
         source=None,
         processor=CORTEX_M4F,
         alone=None,

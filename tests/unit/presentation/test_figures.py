@@ -17,10 +17,11 @@ from matplotlib.colors import to_hex
 
 from nlsdesign.design import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
+from nlsdesign.foundation.quantity import typeset_number
 from nlsdesign.presentation import figures
 from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
-from nlsdesign.presentation.figures.cam_motion import MARKER, cam_motion, cam_picture
-from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look, significant
+from nlsdesign.presentation.figures.cam_motion import MARKER, CamMotion, cam_motion, cam_picture
+from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look
 from nlsdesign.presentation.figures.svg import svg_text, thinned
 from tests import figure_samples as samples
 from tests.selection import quick_only
@@ -218,7 +219,7 @@ def test_a_gap_in_a_line_stays_a_gap() -> None:
     ],
 )
 def test_numbers_as_people_write_them(value: float, digits: int, shown: str) -> None:
-    assert significant(value, digits) == shown
+    assert typeset_number(value, digits) == shown
 
 
 def test_numbers_without_zeros_at_their_end() -> None:
@@ -298,9 +299,7 @@ def test_a_cam_that_cannot_be_made_says_so() -> None:
 def test_a_motion_needs_equal_rows() -> None:
     motion = samples.motion()
     with pytest.raises(ValueRangeError, match="one extension, force and torque for each angle"):
-        figures.CamMotion(
-            motion.contour, motion.angles, motion.extensions[1:], motion.forces, motion.torques, 0.01
-        )
+        CamMotion(motion.contour, motion.angles, motion.extensions[1:], motion.forces, motion.torques, 0.01)
 
 
 # --- what the figures compute ---------------------------------------------------------------------

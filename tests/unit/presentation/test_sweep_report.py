@@ -15,9 +15,9 @@ import pytest
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import UnknownNameError
-from nlsdesign.presentation.sweep_report import SweepPage, write_sweep_report
+from nlsdesign.presentation.sweep_report import write_sweep_report
 from nlsdesign.presentation.sweep_report.shown_points import MOST_KEPT, MOST_OTHERS, shown_points
-from nlsdesign.presentation.sweep_report.sweep_page import usual_requirements
+from nlsdesign.presentation.sweep_report.sweep_page import SweepPage, usual_requirements
 from nlsdesign.sweeps import SmallerIsBetter
 from nlsdesign.sweeps.point_deck import point_deck_text, point_deck_texts
 from nlsdesign.sweeps.preferences import NotAbove, nondominated, rank_points

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
@@ -122,7 +121,7 @@ class DrivenBlock:
         e = _equations(block, self.free, self._straightened)
         self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
         self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
-        self._output = ColumnFunction(_output_function(e))
+        self._output, self._plain_output = (ColumnFunction(each) for each in _output_functions(e))
         self._equations = e
         self._sloped = _sloped(block)
         self._walk: _Walk | None = None
@@ -142,7 +141,7 @@ class DrivenBlock:
         """
         inputs, rates = self._inputs(record, values, smooth=self.stiff)
         at = self._digest(inputs.shape[1], [inputs, rates])
-        corners = self._corners(inputs, record.step)
+        corners = _corners(self.block, self._sloped, inputs, record.step)
         if corners is None:
             return Samples(at, at[:, :-1], at[:, 1:], record.step)
         count = inputs.shape[1] - 1
@@ -197,43 +196,27 @@ class DrivenBlock:
 
     def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
         """Return the output and its derivatives."""
-        p = self._numbers(values)
+        p = _vector(values, (*self.free, *self._late))
         n = given.at.shape[1]
         states, mean = (np.zeros((0, n)), None) if self._walk is None else self._states(self._walk, given, p)
-        result = self._finite(self._output(n, [states, given.at, p]) if mean is None else _centred(mean))
+        result = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
+        _require_finite(self.block, result)
         return Response(result[0], result[1:].T)
 
     def output(self, given: Samples, values: Mapping[str, float]) -> Array:
         """Return the output alone, shape (n,)."""
-        p, n, size = self._numbers(values), given.at.shape[1], self._size
+        p, n, size = _vector(values, (*self.free, *self._late)), given.at.shape[1], self._size
         path = np.zeros((0, n)) if self._walk is None else self._path(self._walk, given, p)[0]
         mean = self._walk is not None and self._walk.mean
         result = _centred(path[size:]) if mean else self._plain_output(n, [path[:size], given.at, p])
-        only: Array = self._finite(result)[0]
+        _require_finite(self.block, result)
+        only: Array = result[0]
         return only
-
-    def _numbers(self, values: Mapping[str, float]) -> Array:
-        return np.array([values[name] for name in (*self.free, *self._late)])
-
-    def _finite(self, result: Array) -> Array:
-        if not np.all(np.isfinite(result)):
-            raise ConvergenceError(
-                f"block '{self.block.name}'",
-                "its response is not finite",
-                next_step="narrow the bounds of the parameters",
-            )
-        return result
-
-    @cached_property
-    def _plain_output(self) -> ColumnFunction:
-        e = self._equations
-        given = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
-        return ColumnFunction(ca.Function("output", given, [ca.densify(e.output)]))
 
     def _path(self, walk: _Walk, given: Samples, p: Array) -> tuple[Array, Array]:
         """Return the states, with the mean output over each step behind them, and the constants of a step."""
         begin, end = given.begin, given.end
-        rest = self._rest(begin[:, 0], p)
+        rest = _rest(self.block, self._rate, begin[:, 0], p)
         slope = self._rate(rest, begin.mean(axis=1), p)[1]
         near = [slope[np.ix_(g, g)].ravel(order="F") for g in walk.near]
         tables = walk.tables(p, given.step)[0].ravel(order="F")
@@ -264,7 +247,7 @@ class DrivenBlock:
 
     def _made_walk(self, records: Sequence[Record], values: Mapping[str, float]) -> _Walk:
         """Return the functions of a step, with short implicit steps for what is faster than a sample."""
-        p = self._numbers(values)
+        p = _vector(values, (*self.free, *self._late))
         stretches = np.zeros(len(self._stages))
         for record in records:
             stretches = np.maximum(stretches, self._stretches(record, values, p))
@@ -275,7 +258,11 @@ class DrivenBlock:
         # What jumps within a step is not seen at its ends; a balance of efforts counts the impulse.
         mean = any(stiff) and self.block.target is None
         tables, step, slopes = _walk_functions(self._equations, self._stages, stiff, mean=mean)
-        carried = _carried(self._size, len(self.free))
+        # The derivatives of the states one step later.
+        before, by = (ca.SX.sym(name, self._size, len(self.free)) for name in ("before", "by_parameter"))
+        by_state = ca.SX.sym("by_state", self._size, self._size)
+        both = ca.vertcat(ca.vec(by_state), ca.vec(by))
+        carried = ca.Function("carried", [ca.vec(before), both], [ca.vec(by_state @ before + by)])
         rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
         near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
         instructions = sum(each.n_instructions() for each in (step, slopes, carried))
@@ -287,44 +274,57 @@ class DrivenBlock:
     def _stretches(self, record: Record, values: Mapping[str, float], p: Array) -> Array:
         """Return for each stage the largest norm of its derivative along a record, times the step."""
         inputs, rates = self._inputs(record, values, smooth=False)
-        corners = self._corners(inputs, record.step)
+        corners = _corners(self.block, self._sloped, inputs, record.step)
         left = (inputs if corners is None else corners[0])[:, : inputs.shape[1] - 1]
         every = slice(None, None, max(1, left.shape[1] // _PROBES))
         left, late = left[:, every], rates[:, : inputs.shape[1] - 1][:, every]
         probes = self._digest(left.shape[1], [left, late])
-        rest, n = self._rest(probes[:, 0], p), self._size
+        rest, n = _rest(self.block, self._rate, probes[:, 0], p), self._size
         slopes = self._steepness(left.shape[1], [rest, probes, p]).T.reshape(-1, n, n)
         # Where there is no derivative there is no response either, and a fit is told so.
         slopes = slopes[np.isfinite(slopes).all(axis=(1, 2))]
         inside = [slopes[:, g.states][:, :, g.states] for g in self._stages]
         return record.step * np.array([np.linalg.norm(m, 2, axis=(1, 2)).max(initial=0.0) for m in inside])
 
-    def _corners(self, inputs: Array, step: float) -> tuple[Array, Array] | None:
-        """Return the inputs at both ends of every step, with rates of the line in between.
 
-        Nothing is returned where no state is driven by a rate: then they are the inputs at the samples.
-        """
-        names, drives = [v.name for v in self.block.model.inputs], self.block.drives
-        if not self._sloped:
-            return None
-        left, right = inputs[:, :-1].copy(), inputs[:, 1:].copy()
-        for i in self._sloped:
-            signal = drives[names[i]].signal
-            value = names.index(next(n for n, d in drives.items() if d.signal == signal and d.order == 0))
-            left[i] = right[i] = np.diff(inputs[value]) / step
-        return left, right
+def _vector(values: Mapping[str, float], names: Sequence[str]) -> Array:
+    return np.array([values[name] for name in names])
 
-    def _rest(self, begin: Array, p: Array) -> Array:
-        """Return the state in which the block rests at the first sample: bench records start at rest."""
-        x = self.block.model.start(self.block.model.states)
-        for _ in range(3):
-            rate, slope = self._rate(x, begin, p)
-            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
-                raise ConvergenceError(
-                    f"block '{self.block.name}'", "has no state of rest at the first sample"
-                )
-            x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
-        return x
+
+def _require_finite(block: Block, response: Array) -> None:
+    if not np.all(np.isfinite(response)):
+        raise ConvergenceError(
+            f"block '{block.name}'",
+            "its response is not finite",
+            next_step="narrow the bounds of the parameters",
+        )
+
+
+def _rest(block: Block, rate_at: PointFunction, begin: Array, p: Array) -> Array:
+    """Return the state in which a block rests at the first sample: bench records start at rest."""
+    x = block.model.start(block.model.states)
+    for _ in range(3):
+        rate, slope = rate_at(x, begin, p)
+        if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
+            raise ConvergenceError(f"block '{block.name}'", "has no state of rest at the first sample")
+        x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+    return x
+
+
+def _corners(block: Block, sloped: Sequence[int], inputs: Array, step: float) -> tuple[Array, Array] | None:
+    """Return the inputs at both ends of every step, with rates of the line in between.
+
+    Nothing is returned where no state is driven by a rate: then they are the inputs at the samples.
+    """
+    names, drives = [v.name for v in block.model.inputs], block.drives
+    if not sloped:
+        return None
+    left, right = inputs[:, :-1].copy(), inputs[:, 1:].copy()
+    for i in sloped:
+        signal = drives[names[i]].signal
+        value = names.index(next(n for n, d in drives.items() if d.signal == signal and d.order == 0))
+        left[i] = right[i] = np.diff(inputs[value]) / step
+    return left, right
 
 
 def _sloped(block: Block) -> list[int]:
@@ -411,28 +411,49 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     return _Equations(s.state, digested, p, now, core[:n], core[n:], digest)
 
 
-def _output_function(e: _Equations) -> ca.Function:
+def _output_functions(e: _Equations) -> tuple[ca.Function, ca.Function]:
+    """Return the output with its derivatives from the states and theirs, and the output alone."""
     slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
-    everything = ca.vertcat(e.state, ca.vec(slope))
     total = ca.jacobian(e.output, e.parameter) + ca.jacobian(e.output, e.state) @ slope
     column = ca.cse(ca.densify(ca.vertcat(e.output, ca.vec(total))))
-    return ca.Function("output", [everything, e.digested, ca.vertcat(e.parameter, e.now)], [column])
+    given = [e.digested, ca.vertcat(e.parameter, e.now)]
+    return (
+        ca.Function("output", [ca.vertcat(e.state, ca.vec(slope)), *given], [column]),
+        ca.Function("output", [e.state, *given], [ca.densify(e.output)]),
+    )
 
 
-def _walk_functions(
-    e: _Equations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
-) -> tuple[ca.Function, ca.Function, ca.Function]:
-    """Return the tables of the exact steps over the parameters, one step of the states, and its slopes.
+class _Step(NamedTuple):
+    """One step of the states: what they are later, and the mean output over it where that is asked for.
 
-    With ``mean`` the step gives out the mean of the output over a stiff stage's short steps as well. Slopes
-    are those by the states at its beginning and by the free parameters, column after column.
+    ``tables`` are those of the exact steps, ``symbols`` stand for them; ``matrices`` are the derivatives of
+    the stages that take theirs from the start of the record. ``guesses`` are symbols of iterates and what
+    they stand for, earlier ones first.
     """
-    h, free = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now)
+
+    later: Expression
+    tables: Expression
+    symbols: Expression
+    matrices: Expression
+    guesses: list[tuple[Expression, Expression]]
+
+
+def _step(
+    e: _Equations,
+    stages: Sequence[Stage],
+    stiff: Sequence[bool],
+    *,
+    right: Expression,
+    h: Expression,
+    mean: bool,
+) -> _Step:
+    """Return a step of length ``h`` to the samples ``right``, stage after stage.
+
+    With ``mean`` it gives out the mean of the output over a stiff stage's short steps as well.
+    """
     tables, symbols, matrices, outputs = [], [], [], []
-    guess: list[Expression] = []
-    guessed: list[Expression] = []
+    guesses: list[tuple[Expression, Expression]] = []
     new = ca.SX(e.state)
-    right = ca.SX.sym("right", e.digested.shape)
     for stage, fast in zip(stages, stiff, strict=True):
         inner = ca.SX(ca.vertcat(*[e.state[i] for i in stage.states]))
         rate = ca.SX(ca.vertcat(*[e.derivative[i] for i in stage.states]))
@@ -446,53 +467,45 @@ def _walk_functions(
             later = table @ ca.vertcat(inner, at(zero, ends[0]), at(zero, ends[1]))
         elif fast:
             short_steps = implicit_steps(at, inner, ends, h)
-            later, guess, guessed = (
-                short_steps.states[-1],
-                guess + short_steps.guess,
-                guessed + short_steps.guessed,
-            )
+            later = short_steps.states[-1]
+            guesses += zip(short_steps.guess, short_steps.guessed, strict=True)
             seen, count = placed(e.output, (e.state, e.digested), stage.states), len(short_steps.states)
             corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
             outputs += [seen(x, v) / count for x, v in zip(short_steps.states, corners, strict=True)]
         else:
             w = None if is_short(rate) else ca.SX.sym("w", n, n)
-            matrices += [] if w is None else [w]
+            matrices += [] if w is None else [ca.vec(w)]
             later = rosenbrock_step(at, inner, ends, w, h)
         for k, i in enumerate(stage.states):
             new[i] = later[k]
-    table, symbol = _column(tables), _column(symbols)
-    dependence = ca.jacobian(table, e.parameter)
-    prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
-    along = ca.SX.sym("along", table.numel(), e.parameter.numel())
-    before, column = ca.SX(e.state), ca.SX(new)
-    if mean:
-        before = ca.vertcat(before, ca.SX.sym("before"))
-        column = ca.vertcat(column, sum(outputs, start=ca.SX(0)))
-    by_parameter = ca.jacobian(column, e.parameter)
-    by_parameter += ca.jacobian(column, symbol) @ ca.project(along, dependence.sparsity())
-    slopes = ca.vec(ca.densify(ca.horzcat(ca.jacobian(column, e.state), by_parameter)))
-    if guess:
-        # Backwards: each symbol stands for an expression of those before it.
-        for name, value in zip(reversed(guess), reversed(guessed), strict=True):
-            column, slopes = ca.substitute([column, slopes], [name], [value])
-    constant = ca.vertcat(free, symbol, ca.vec(along), _column([ca.vec(w) for w in matrices]), h)
+    later = ca.vertcat(new, sum(outputs, start=ca.SX(0))) if mean else new
+    return _Step(later, _column(tables), _column(symbols), _column(matrices), guesses)
+
+
+def _walk_functions(
+    e: _Equations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
+) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Return the tables of the exact steps over the parameters, one step, and its slopes.
+
+    Slopes are those by the states at its beginning and by the free parameters, column after column.
+    """
+    h, free, right = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now), ca.SX.sym("right", e.digested.shape)
+    step = _step(e, stages, stiff, right=right, h=h, mean=mean)
+    dependence = ca.jacobian(step.tables, e.parameter)
+    prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(step.tables, dependence))])
+    along = ca.SX.sym("along", *dependence.shape)
+    by_table = ca.jacobian(step.later, step.symbols) @ ca.project(along, dependence.sparsity())
+    by = ca.horzcat(ca.jacobian(step.later, e.state), ca.jacobian(step.later, e.parameter) + by_table)
+    columns = [step.later, ca.vec(ca.densify(by))]
+    # Backwards: each symbol stands for an expression of those before it.
+    for symbol, value in reversed(step.guesses):
+        columns = ca.substitute(columns, [symbol], [value])
+    before = ca.vertcat(e.state, ca.SX.sym("before")) if mean else e.state
+    constant = ca.vertcat(free, step.symbols, ca.vec(along), step.matrices, h)
     given = [before, e.digested, right, constant]
-    return (
-        prepare,
-        ca.Function("step", given, [ca.cse(ca.densify(column))]),
-        ca.Function("slopes", given, [ca.cse(slopes)]),
-    )
-
-
-def _carried(states: int, free: int) -> ca.Function:
-    """Return the derivatives of the states by the free parameters one step later, from the step's slopes."""
-    slope, by_state = ca.SX.sym("slope", states, free), ca.SX.sym("by_state", states, states)
-    by_parameter = ca.SX.sym("by_parameter", states, free)
-    return ca.Function(
-        "carried",
-        [ca.vec(slope), ca.vertcat(ca.vec(by_state), ca.vec(by_parameter))],
-        [ca.vec(by_state @ slope + by_parameter)],
-    )
+    named = zip(("step", "slopes"), columns, strict=True)
+    one, slopes = (ca.Function(name, given, [ca.cse(ca.densify(column))]) for name, column in named)
+    return prepare, one, slopes
 
 
 def _column(items: Sequence[Expression]) -> Expression:

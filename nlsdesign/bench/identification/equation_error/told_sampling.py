@@ -172,14 +172,14 @@ def _asked(
 
     Blocks that share numbers with these say what the numbers are.
     """
-    told = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
-    known, left = set[str](), [each for each in seen if all(each is not other for other in told)]
-    while known != (known := {name for each in told for name in _free(each)}):
-        told += [each for each in left if known & set(_free(each))]
+    asked = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
+    known, left = set[str](), [each for each in seen if all(each is not other for other in asked)]
+    while known != (known := {name for each in asked for name in _free(each)}):
+        asked += [each for each in left if known & set(_free(each))]
         left = [each for each in left if not known & set(_free(each))]
     try:
         plain, sharper = (
-            _likelihood([_rows(each, records.deciding, signal, terms) for each in told]) if told else None
+            _likelihood([_rows(each, records.deciding, signal, terms) for each in asked]) if asked else None
             for terms in (plain_terms, missing)
         )
     except ConvergenceError:

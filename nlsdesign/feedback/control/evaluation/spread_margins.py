@@ -46,7 +46,7 @@ class SpreadMargins:
         a number where none was found.
     kicked
         Machines that hold four fifths of what the drive can after a kick; ``None`` where nothing has a
-        spread.
+        spread, or none was kicked.
     """
 
     gain: str
@@ -68,6 +68,15 @@ class SpreadMargins:
             return 0.0
         return float(np.mean([v.state in (LIMIT_CYCLE, DIVERGED) for v in self.kicked.verdicts]))
 
+    def margins(self) -> str:
+        """Return in a sentence what the gain has."""
+        gain, phase = self.spread
+        has = f"has {gain:.2g} dB and {phase:.2g}° in" if math.isfinite(gain) else "is not stable in"
+        return (
+            f"{self.gain} {self.value:.3g} {has} 95 % of the machines of the spread (declared numbers: "
+            f"{self.least[0]:.2g} dB, {self.least[1]:.2g}°)"
+        )
+
     def words(self) -> list[str]:
         """Return in a sentence which share of the machines settles after the kick, if any was kicked."""
         if self.kicked is None:
@@ -80,13 +89,7 @@ class SpreadMargins:
         result = []
         if not self.kept:
             better = f"{self.enough:.3g} has both" if math.isfinite(self.enough) else "none below was found"
-            gain, phase = self.spread
-            has = f"has {gain:.2g} dB and {phase:.2g}° in" if math.isfinite(gain) else "is not stable in"
-            result.append(
-                f"{self.gain} {self.value:.3g} {has} 95 % of the machines of the spread (declared numbers: "
-                f"{self.least[0]:.2g} dB, {self.least[1]:.2g}°); {GAIN_MARGIN:g} dB, {PHASE_MARGIN:g}° are "
-                f"asked for: {better}"
-            )
+            result.append(f"{self.margins()}; {GAIN_MARGIN:g} dB, {PHASE_MARGIN:g}° are asked for: {better}")
         if self.kicked is not None and self.cycling > 1.0 - SHARE:
             result.append(
                 f"{100 * self.cycling:.0f} % of {len(self.kicked.verdicts)} machines of the spread "
@@ -98,11 +101,24 @@ class SpreadMargins:
 def spread_margins(
     loop: ClosedLoop, gain: str, *, last: float, translate: Translate = as_it_is
 ) -> SpreadMargins:
+    """Return :func:`margins_alone`, and which machines settle after a kick."""
+    margins = margins_alone(loop, gain, last=last)
+    if not declared_prior(loop.plant).names:
+        return margins
+    side = only_side(loop.plant) or 1.0
+    held = LARGEST * largest_torque(loop.plant)
+    kicked = loop_over_spread(
+        loop, amplitude=side * held, frequency=0.0, draws=KICKED, kick=side * min(KICK, 0.3 * held),
+        translate=translate,
+    )  # fmt: skip
+    return replace(margins, kicked=kicked)
+
+
+def margins_alone(loop: ClosedLoop, gain: str, *, last: float) -> SpreadMargins:
     """Return the margins of a loop over the angle and the spread of its deck, and the gain that has enough.
 
     ``last``: angle to which they are taken, in rad; the first is a twentieth of it, since where the spring
-    has no
-    stiffness the loop hardly acts and its phase says nothing.
+    has no stiffness the loop hardly acts and its phase says nothing.
     """
     angles = np.linspace(0.05, 1.0, 11) * last
     plants = _machines(loop)
@@ -119,16 +135,8 @@ def spread_margins(
         enough *= 10.0 ** -min(lacking + 0.005, _STEEPEST)
     else:
         enough = math.nan
-    kicked = None
-    if len(plants) > 1:
-        side = only_side(loop.plant) or 1.0
-        held = LARGEST * largest_torque(loop.plant)
-        kicked = loop_over_spread(
-            loop, amplitude=side * held, frequency=0.0, draws=KICKED, kick=side * min(KICK, 0.3 * held),
-            translate=translate,
-        )  # fmt: skip
     least = (float(worst[0, 0]), float(worst[0, 1]))
-    return SpreadMargins(gain, value, least, _kept_by_most(worst), enough, kicked)
+    return SpreadMargins(gain, value, least, _kept_by_most(worst), enough, None)
 
 
 def _machines(loop: ClosedLoop) -> list[ClosedLoop]:

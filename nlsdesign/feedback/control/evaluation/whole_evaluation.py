@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ....foundation.arrays import Array
+from ....foundation.errors import NlsError
 from ....foundation.text_files import write_table
 from ....model import FlatModel
 from ....model.roles import measured_motion, motor_of, series_spring
@@ -43,7 +44,7 @@ from .responses import (
     torque_resolution,
     zero_torque,
 )
-from .spread_margins import SpreadMargins, spread_margins
+from .spread_margins import SpreadMargins, margins_alone, spread_margins
 
 FREQUENCIES = (0.1, 11.0, 20)
 """First and last in Hz, and how many."""
@@ -295,6 +296,28 @@ def cascade_loops(
         for plant in plants
     )
     return first, second
+
+
+def with_margin(
+    plant: FlatModel, gain: str, *, last: float, given: bool, sample_time: float, **law: Any
+) -> tuple[FlatModel, str]:
+    """Return the controller of a plant and a sentence on its margins.
+
+    The gain is lowered where it was not ``given`` and lacks them; ``last`` is the angle to which they are
+    taken, ``law`` as for :func:`~nlsdesign.feedback.control.torque_controller`.
+    """
+    controller = torque_controller(plant, sample_time=sample_time, **law)
+    try:
+        loop, _ = cascade_loops(plant, plant, delay=1, sample_time=sample_time, **law)
+        margins = margins_alone(loop, gain, last=last)
+    except NlsError as error:  # not every machine has a cascade
+        return controller, f"margins of {gain} are not judged: {error}"
+    if margins.kept:
+        return controller, margins.margins()
+    (lacks,) = margins.findings()
+    if given or math.isnan(margins.enough):
+        return controller, lacks
+    return controller.with_values({gain: margins.enough}), f"{lacks}, and is taken"
 
 
 def json_number(value: float) -> float | str | None:

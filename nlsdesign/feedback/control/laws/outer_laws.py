@@ -41,6 +41,10 @@ class Heard(NamedTuple):
     angle: Expression
 
 
+SLOW_PART = 3.125
+"""Integral over proportional gain of a PID by default, in 1/s: 100 over 32, as in the studies."""
+
+
 class HeldBack(NamedTuple):
     """By how much commands exceed their limits at a sample; zero within them.
 
@@ -116,15 +120,17 @@ class PidTorque(TorqueLaw):
     """PID on the estimated torque: v = Kp·e + ∫Ki·e dt + Kd·de/dt, e = T_d − T̂.
 
     v is the speed of the spring. Below crossover a load that is moved with the speed ω feels the torque ω/Kp,
-    whatever the spring. The loop gain is Kp·k_t(θ): a stiffening spring loses margin.
+    whatever the spring. The loop gain is Kp·k_t(θ): a stiffening spring loses margin, so by default Kp is
+    such that the loop gain is that of :class:`ScheduledTorque` where the spring is stiffest.
     Sources: Pratt and Williamson 1995; Robinson 2000; Vallery et al. 2008 (around a velocity loop).
 
     Parameters
     ----------
     proportional
-        Kp in rad/s per N·m.
+        Kp in rad/s per N·m; by default 2π·f_c/k_t at the largest tangent stiffness, with f_c of 12 Hz, or
+        0.012 of the sampling rate where that is less.
     integral
-        Ki in rad/s² per N·m.
+        Ki in rad/s² per N·m; by default 3.125 1/s times Kp.
     derivative
         Kd in rad per N·m.
     derivative_bandwidth
@@ -139,13 +145,14 @@ class PidTorque(TorqueLaw):
     Raises
     ------
     ValueRangeError
-        If a setting is negative or not finite.
+        If a setting is negative or not finite; when it is written also if there is no Kp and the spring has
+        no stiffness.
     """
 
     title: ClassVar[str] = "PID on the estimated torque"
 
-    proportional: float = 32.0
-    integral: float = 100.0
+    proportional: float | None = None
+    integral: float | None = None
     derivative: float = 0.0
     derivative_bandwidth: float = 100.0
     speed_limit: float = 60.0
@@ -165,10 +172,12 @@ class PidTorque(TorqueLaw):
         before = writer.state("torque_loop.error.previous", "N*m", "torque error one sample ago")
         old_rate = writer.state("torque_loop.error.rate", "N*m/s", "filtered rate of the torque error")
         integral = writer.state("torque_loop.integral", "rad/s", "integral part of the speed command")
+        proportional = self._proportional(drive, time) if self.proportional is None else self.proportional
+        whole = SLOW_PART * proportional if self.integral is None else self.integral
         gain = writer.setting(
-            "proportional", "rad/s/N/m", "torque loop: speed command per torque error", self.proportional
+            "proportional", "rad/s/N/m", "torque loop: speed command per torque error", proportional
         )
-        slow = writer.setting("integral", "rad/s^2/N/m", "torque loop: integral gain", self.integral)
+        slow = writer.setting("integral", "rad/s^2/N/m", "torque loop: integral gain", whole)
         fast = writer.setting("derivative", "rad/N/m", "torque loop: derivative gain", self.derivative)
         corner = writer.setting(
             "derivative_bandwidth", "Hz", "torque loop: corner of the filter on the derivative",
@@ -190,6 +199,17 @@ class PidTorque(TorqueLaw):
             writer.follow("torque_loop.integral", self.windup.following(writer, one))
 
         return SpeedCommand(speed, asked - speed, ca.SX(0), finish)
+
+    def _proportional(self, drive: KnownDrive, sample_time: float) -> float:
+        """Return the gain with which the loop closes at its bandwidth where the spring is stiffest."""
+        stiffest = float(np.max(stiffness_table(drive).values[:, 0]))
+        if stiffest <= 0.0:
+            raise ValueRangeError(
+                f"proportional gain of '{drive.plant.name}'",
+                "has no default: the spring has no stiffness",
+                next_step="give PidTorque(proportional=...)",
+            )
+        return 2.0 * math.pi * ScheduledTorque().closes_at(sample_time) / stiffest
 
 
 def held_speed(writer: LawWriter, asked: Expression, limit: float, acceleration: float | None) -> Expression:

@@ -15,9 +15,6 @@ from .law_writer import loop_names as loop_names
 from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
 from .velocity_loop import VelocityLoop
 
-SHARE_OF_RATE = 0.06
-"""Share of the sampling rate that the velocity loop of the default gains has at most: 60 Hz at 1 kHz."""
-
 CARRIED = 0.1
 """Share of the sampling rate above which no loop is closed.
 
@@ -30,6 +27,8 @@ that an integrating plant has.
 @dataclass(frozen=True)
 class TorqueGains:
     """Settings of a PID law and its velocity loop in one list; all of them can be tuned in the controller.
+
+    Where none is given they are :data:`REPRODUCED_GAINS`, whatever the spring.
 
     Parameters
     ----------
@@ -92,6 +91,13 @@ class TorqueGains:
         )
 
 
+REPRODUCED_GAINS = TorqueGains()
+"""Kp 32 rad/s per N·m and Ki 100 rad/s² per N·m, with which the studies reproduce Austin et al. 2015.
+
+The paper prints no gains. On the deck of its nonlinear spring these have a gain margin below 1 dB, which
+:func:`~nlsdesign.feedback.control.evaluate_loop` finds."""
+
+
 def torque_controller(
     plant: FlatModel,
     *,
@@ -115,14 +121,13 @@ def torque_controller(
     plant
         Continuous, on the bench: load fixed or prescribed.
     law
-        Outer law, such as :class:`~nlsdesign.feedback.control.laws.outer_laws.ScheduledTorque`; a PID
-        with the
-        defaults of :class:`TorqueGains` if neither a law nor gains are given, its velocity loop at most at
-        0.06 of the sampling rate.
+        Outer law, such as :class:`~nlsdesign.feedback.control.laws.outer_laws.ScheduledTorque`; a PID with
+        the gain that the spring allows if neither a law nor gains are given.
     velocity
         Velocity loop inside; with its defaults if only a law is given.
     gains
-        Settings of a PID and its velocity loop in one list, in place of ``law`` and ``velocity``.
+        Settings of a PID and its velocity loop in one list, in place of ``law`` and ``velocity``, for
+        instance :data:`REPRODUCED_GAINS`.
     sample_time
         In s.
     current
@@ -139,7 +144,7 @@ def torque_controller(
     """
     if not (math.isfinite(sample_time) and sample_time > 0.0):
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
-    outer, inner = _parts(law, velocity, gains or _gains_by_default(law, velocity, sample_time))
+    outer, inner = _parts(law, velocity, gains)
     _check_bandwidths(outer, inner, sample_time)
     drive, writer = KnownDrive(plant), LawWriter(sample_time, plant.origin)
     names = drive.names
@@ -182,16 +187,6 @@ def _parts(
     if gains is not None:
         return gains.law, gains.velocity
     return law or PidTorque(), velocity or VelocityLoop()
-
-
-def _gains_by_default(
-    law: TorqueLaw | None, velocity: VelocityLoop | None, sample_time: float
-) -> TorqueGains | None:
-    """Return the default gains where nothing is given, with a velocity loop that the sample time carries."""
-    if law is not None or velocity is not None:
-        return None
-    usual = TorqueGains()
-    return replace(usual, velocity_bandwidth=min(usual.velocity_bandwidth, SHARE_OF_RATE / sample_time))
 
 
 def _check_bandwidths(law: TorqueLaw, velocity: VelocityLoop, sample_time: float) -> None:

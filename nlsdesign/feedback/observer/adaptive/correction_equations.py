@@ -24,7 +24,8 @@ and the factors c are found by Bayesian regression, one reading at a time:
   counts only as one of many over the correlation time, and a reading at standstill does not count.
 - Where residuals stay larger than expected, something acts that is none of the factors. What was learned then
   fades, and the torque goes back to that of the cascade.
-- A residual beyond three deviations teaches the less the larger it is: a jump of the encoder is no news.
+- A residual beyond three deviations teaches the less the larger it is, and makes the less unrest: a jump of
+  the encoder is no news.
 - With a weight that grows with ln B from 0 to 1 the factors correct the torque. Where the numbers of the
   deck explain the readings as well, the torque is that of the cascade, so an exact deck costs nothing.
 - The correction is held within stated deviations of the deck.
@@ -176,7 +177,9 @@ class CorrectionEquations:
         ratio = (total - alone) / alone
         news = other**2 / alone - innovation**2 / total - ratio * (6.0 + ratio) / (6.0 + 4.0 * ratio)
         forgotten = (1.0 - self.time / EVIDENCE_TIME) * evidence
-        excess = (ca.fmin(nis, SURPRISE**2) - 1.0) * self.time
+        # A reading that does not move, as of a frozen encoder, says nothing of what the machine is, and the
+        # jumps around it no more than any other residual that is far too large.
+        excess = moving * heard * (ca.fmin(nis, SURPRISE**2) - 1.0) * self.time
         grown = unrest * (1.0 + ca.fmax(excess * (1.0 / RISE), excess * (1.0 / FALL)))
         return slow, after, ca.vertcat(
             offset + share * other,

@@ -42,7 +42,12 @@ def evidence_of(
     driven = SimpleNamespace(block=SimpleNamespace(name="spring"), free=("a", "b"), stiff=False)
     record = SimpleNamespace(name=name, role=role)
     floor = SimpleNamespace(sigma=np.ones(ROWS), independent=math.inf)
-    return cast(Evidence, SimpleNamespace(driven=driven, record=record, floor=floor, residual=residual))
+    return cast(
+        Evidence,
+        SimpleNamespace(
+            driven=driven, record=record, floor=floor, residual=residual, left=lambda v: residual(v)[0]
+        ),
+    )
 
 
 def solved(rows: np.ndarray, data: np.ndarray) -> np.ndarray:

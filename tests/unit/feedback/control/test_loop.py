@@ -7,6 +7,7 @@ import pytest
 
 from nlsdesign.components import Driven
 from nlsdesign.feedback.control import (
+    REPRODUCED_GAINS,
     ClosedLoop,
     TorqueGains,
     loop_margins,
@@ -33,7 +34,8 @@ def plant() -> FlatModel:
 @pytest.fixture(scope="module")
 def loop(plant: FlatModel) -> ClosedLoop:
     observer = design_observer_with_details(plant, grid=FixedGrid(-1.2, 1.2, points=241)).model
-    return ClosedLoop(plant=plant, observer=observer, controller=torque_controller(plant), wires=ob.WIRES)
+    controller = torque_controller(plant, gains=REPRODUCED_GAINS)
+    return ClosedLoop(plant=plant, observer=observer, controller=controller, wires=ob.WIRES)
 
 
 def wanted(time: float) -> float:
