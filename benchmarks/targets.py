@@ -17,7 +17,8 @@ import casadi as ca
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.export import CORTEX_M4F, PROCESSORS, Processor, TargetMeasurement, export_c, measure_on_target
+from nlsdesign.export import CORTEX_M4F, PROCESSORS, Processor, export_c, measure_on_target
+from nlsdesign.export.compilation.target_run import TargetMeasurement
 from nlsdesign.feedback.control import joined
 from nlsdesign.feedback.observer import (
     design_adaptive_observer,

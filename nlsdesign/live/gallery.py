@@ -94,12 +94,11 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
         last = blank.machine.model.values[cam.last_angle]
     else:
         last = float(contour_of_cam(actuator[cam.name]).angles[-1])
-    angles = np.linspace(0.0, last, _POINTS)
+    # Round as a person reads them, in degrees.
+    angles = np.radians([float(f"{each:.3g}") for each in np.degrees(np.linspace(0.0, last, _POINTS))])
     torques = np.maximum(equilibrium_torque(blank.machine.model, cam.drive, angles), 0.0)
     torques[0] = 0.0
-    points = tuple(
-        TargetPoint(float(f"{a:.4g}"), float(f"{t:.4g}")) for a, t in zip(angles, torques, strict=True)
-    )
+    points = tuple(TargetPoint(float(a), float(f"{t:.3g}")) for a, t in zip(angles, torques, strict=True))
     question = replace(
         blank, points=points, free=(blank.contour, cam.pretension), limits=_stretch(blank.machine, angles)
     )
@@ -132,7 +131,10 @@ def _deck(name: str) -> Deck:
 def _objection(deck: Deck) -> str:
     try:
         machine = declare(deck)
-        declared_cam(machine[series_cam(flatten(machine)).name])
+        model = flatten(machine)
+        if not any(spring.cams for spring in model.springs):
+            return "no cam spring, whose curve is designed here"
+        declared_cam(machine[series_cam(model).name])
     except NlsError as error:
         return error.rule
     return ""

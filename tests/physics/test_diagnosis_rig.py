@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import diagnose, predict, write_verdict
+from nlsdesign.bench.discrepancy.diagnose import blocks_of
 from nlsdesign.bench.identification import load_records
+from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
@@ -117,12 +119,15 @@ def test_practice_records_get_the_right_verdict(
     assert not expected or found.closed > 0.9
     written = write_verdict(found, tmp_path)
     assert {file.name for file in written} == {"verdict.json", "model.toml"}
-    # The deck that was written predicts the held-out record as the verdict shows it.
+    # The deck that was written predicts the held-out record as the verdict shows it: on the clock on which
+    # blocks read the records, and through the filter of the declared block.
     reread = declare(load_deck(tmp_path / "model.toml"))
     assert reread == found.actuator
     if expected:
-        predicted = predict(reread, records, found.course.record)
-        assert np.allclose(predicted[found.course.quantity], found.course.after, atol=1e-6)
+        bench = Bench(records, blocks_of(flatten(rig), records.signals))
+        predicted = predict(reread, bench.records, found.course.record)[found.course.quantity]
+        rows = bench.floors[found.block, found.course.record].filter
+        assert np.allclose(rows @ predicted, found.course.after, atol=1e-6)
 
 
 @pytest.mark.slow

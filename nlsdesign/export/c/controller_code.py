@@ -140,7 +140,7 @@ def source_text(c: CWriter) -> str:
             f"&state->parameters.{path}, 0x{index_bit(i):x}u, &status);"
             for i, (v, path) in enumerate(zip(model.parameters, c.paths.parameters, strict=True))
         ]
-        or ["(void)state;", "(void)parameters;"],
+        or ["(void)parameters;"],
         "derived": [f"{c.name}_derive(state);"] if derived else [],
         "start_readings": [
             line

@@ -33,6 +33,7 @@ INPUT_STALE = 1 << 7
 OUT_OF_TABLE = 1 << 8
 RECOVERED = 1 << 9
 WAITING = 1 << 10
+NOT_STARTED = 1 << 11
 FIRST_INDEX_BIT, LAST_INDEX_BIT = 16, 30
 
 STATUS_BITS = {
@@ -62,6 +63,7 @@ STATUS_BITS = {
     "OUT_OF_TABLE": (OUT_OF_TABLE, "a table was read beyond its ends, where it holds its last numbers"),
     "RECOVERED": (RECOVERED, "a reading is used again after a gap"),
     "WAITING": (WAITING, "no usable reading has come yet; the outputs are those of the start"),
+    "NOT_STARTED": (NOT_STARTED, "init has not been called; all outputs are 0, nothing was taken"),
 }
 
 

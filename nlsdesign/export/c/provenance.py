@@ -135,4 +135,5 @@ def interface_version(header: str, model: FlatModel) -> str:
     lines = [" ".join(line.split()) for line in bare.splitlines() if not line.lstrip().startswith("#")]
     groups = (model.inputs, model.outputs, model.parameters, model.states)
     units = [f"{v.name} {v.unit}" for group in groups for v in group]
-    return f"0x{zlib.crc32(chr(10).join([*filter(None, lines), *units]).encode()):08x}u"
+    # A state that was never started is most often zero, and this number marks one that was.
+    return f"0x{zlib.crc32(chr(10).join([*filter(None, lines), *units]).encode()) or 1:08x}u"

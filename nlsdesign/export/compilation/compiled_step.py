@@ -72,8 +72,7 @@ class CompiledStep:
             getattr(self._library, function).restype = ctypes.c_uint32
         # An array of doubles is aligned.
         self._state = (ctypes.c_double * (self._library.adapter_size() // 8 + 1))()
-        given = None if parameters is None else self._array(parameters)
-        self.first_status = int(self._library.adapter_init(self._state, given))
+        self.first_status = self.init(parameters)
 
     def __call__(self, inputs: Sequence[float]) -> tuple[Array, int]:
         """Advance by one sample.
@@ -83,6 +82,15 @@ class CompiledStep:
         outputs = self._array([0.0] * len(self._source.model.outputs))
         status = self._library.adapter_step(self._state, self._array(inputs), outputs)
         return self._plain(outputs, len(self._source.model.outputs)), int(status)
+
+    def init(self, parameters: Sequence[float] | None = None) -> int:
+        """Start the instance anew; return the status word."""
+        given = None if parameters is None else self._array(parameters)
+        return int(self._library.adapter_init(self._state, given))
+
+    def fill(self, byte: int) -> None:
+        """Fill the memory of the instance, as that of a machine may be that was just switched on."""
+        ctypes.memset(self._state, byte, ctypes.sizeof(self._state))
 
     def set_parameters(self, parameters: Sequence[float]) -> int:
         """Change the parameters of the running instance."""

@@ -193,8 +193,8 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
         # Whatever a damaged description makes the XML and FMI libraries raise.
         # What Python raises where something is missing names only that.
         named = isinstance(error, LookupError) or not str(error).strip()
-        message = fit_to_show(f"{type(error).__name__} {error}" if named else error)
-        raise ExportError(what, f"is not a valid FMU: {message}") from error
+        reason = fit_to_show(f"{type(error).__name__} {error}" if named else error)
+        raise ExportError(what, f"is not a valid FMU: {reason}") from error
     offered = read.coSimulation
     if offered is None or read.fmiVersion == "1.0":
         raise ExportError(what, "is not a co-simulation FMU of FMI 2.0 or 3.0")

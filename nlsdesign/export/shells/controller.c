@@ -37,8 +37,12 @@ void @name@_defaults(@name@_parameters *parameters)
 {
     uint32_t status = 0u;
 
-    @assignments@
-    @derived@
+    if (state->started != @NAME@_INTERFACE_VERSION) {
+        status = @NAME@_NOT_STARTED;
+    } else {
+        @assignments@
+        @derived@
+    }
     return status;
 }
 
@@ -50,6 +54,7 @@ void @name@_defaults(@name@_parameters *parameters)
     state->outputs = start_outputs;
     @start_readings@
     state->begun = 0u;
+    state->started = @NAME@_INTERFACE_VERSION;
     @derived@
     return parameters == NULL ? 0u : @name@_set_parameters(state, parameters);
 }
@@ -75,13 +80,18 @@ static uint32_t @name@_advance(@name@_state *state, @name@_outputs *outputs)
 
 @step@
 {
-    uint32_t status = @name@_take(state, inputs);
+    uint32_t status = @NAME@_NOT_STARTED;
 
-    if (state->begun == 0u) {
-        *outputs = state->outputs;
-        status |= @NAME@_WAITING;
+    if (state->started != @NAME@_INTERFACE_VERSION) {
+        *outputs = (@name@_outputs){0};
     } else {
-        status |= @name@_advance(state, outputs);
+        status = @name@_take(state, inputs);
+        if (state->begun == 0u) {
+            *outputs = state->outputs;
+            status |= @NAME@_WAITING;
+        } else {
+            status |= @name@_advance(state, outputs);
+        }
     }
     return status;
 }

@@ -34,7 +34,10 @@ typedef struct {
     @readings@
     @derived@
     uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
+    uint32_t started; /* @NAME@_INTERFACE_VERSION from init on; with any other number step gives NOT_STARTED */
 } @name@_state;
+
+/* No pointer may be null but the parameters of init; none is checked. */
 
 /* Gives the parameters of the design. */
 void @name@_defaults(@name@_parameters *parameters);
@@ -43,10 +46,11 @@ void @name@_defaults(@name@_parameters *parameters);
    first usable readings, of a machine at rest. Returns a status word. */
 @init@;
 
-/* Takes over parameters, each only if it is within its range. Returns a status word. */
+/* Takes over parameters, each only if it is within its range. Returns a status word; before init nothing is taken. */
 @set_parameters@;
 
-/* Computes the outputs of this sample and the state of the next. Returns a status word. */
+/* Computes the outputs of this sample and the state of the next. Returns a status word. Before init, with a state
+   of any content, all outputs are 0 and the word is @NAME@_NOT_STARTED. */
 @step@;
 
 #ifdef __cplusplus

@@ -1,7 +1,7 @@
 // One panel with axes, lines and a cursor that all panels share. Drawn once; then only paths change.
 
 import { draw, make, set, text } from "./elements.js";
-import { factorOf, plain, scaled, unitOf, withUnit } from "./units.js";
+import { factorOf, plain, powerOf, scaled, unitOf, withUnit } from "./units.js";
 
 const LEFT = 56, RIGHT = 10, TOP = 10, BOTTOM = 30;
 
@@ -148,15 +148,19 @@ export class Chart {
     this.grid.replaceChildren();
     const fx = factorOf(this.x.unit), [unitUp, fy] = scaled(this.y.unit, Math.max(...this.limits.y.map(Math.abs)));
     const bottom = this.height - BOTTOM, right = this.width - RIGHT;
-    const across = this.symlog ? powers(this.limits.x) : this.log ? decades(this.limits.x) : ticks(...this.limits.x.map((v) => v * fx), this.width / 70).map((v) => v / fx);
+    const px = (value) => this.px(value), py = (value) => this.py(value);
+    const decades = this.log || this.symlog ? powers(this.limits.x, px, 28) : null, written = decades ? powerOf : (value) => plain(value * fx);
+    if (decades) for (const value of between(this.limits.x, px, this.symlog)) this.grid.append(draw("line", { class: "minor", x1: px(value), x2: px(value), y1: TOP, y2: bottom }));
+    if (this.symlog) for (const value of between(this.limits.y, py, true)) this.grid.append(draw("line", { class: "minor", x1: LEFT, x2: right, y1: py(value), y2: py(value) }));
+    const across = decades ?? ticks(...this.limits.x.map((v) => v * fx), this.width / 70).map((v) => v / fx);
     for (const value of across) {
       const a = this.px(value);
-      this.grid.append(draw("line", { x1: a, x2: a, y1: TOP, y2: bottom }), draw("text", { x: a, y: bottom + 13, "text-anchor": "middle" }, plain(value * fx)));
+      this.grid.append(draw("line", { x1: a, x2: a, y1: TOP, y2: bottom }), draw("text", { x: a, y: bottom + 13, "text-anchor": "middle" }, written(value)));
     }
-    const up = this.symlog ? powers(this.limits.y) : ticks(...this.limits.y.map((v) => v * fy), this.height / 38).map((v) => v / fy);
+    const up = this.symlog ? powers(this.limits.y, py, 15) : ticks(...this.limits.y.map((v) => v * fy), this.height / 38).map((v) => v / fy);
     for (const value of up) {
       const b = this.py(value);
-      this.grid.append(draw("line", { x1: LEFT, x2: right, y1: b, y2: b }), draw("text", { x: LEFT - 6, y: b + 3.5, "text-anchor": "end" }, plain(value * fy)));
+      this.grid.append(draw("line", { x1: LEFT, x2: right, y1: b, y2: b }), draw("text", { x: LEFT - 6, y: b + 3.5, "text-anchor": "end" }, this.symlog ? powerOf(value) : plain(value * fy)));
     }
     const named = (axis, unit) => (unit ? `${axis.name} in ${unit}` : axis.name);
     this.grid.append(
@@ -243,22 +247,36 @@ function logRange(series) {
   return low > 0 ? [low, high] : [0.1, 10];
 }
 
-function decades([low, high]) {
-  const found = [];
-  for (let power = Math.floor(Math.log10(low)); 10 ** power <= high * 1.001; power += 1) if (10 ** power >= low * 0.999) found.push(10 ** power);
-  return found.length > 1 ? found : [low, high];
-}
-
 // Poles lie between one per minute and ten thousand per second, on both sides of zero.
 function folded(value) {
   return Math.sign(value) * Math.log10(1 + Math.abs(value));
 }
 
-function powers([low, high]) {
-  const found = [0];
-  const most = Math.ceil(Math.max(folded(high), -folded(low)));
-  const step = Math.max(1, Math.ceil(most / 4));
-  for (let power = step; power <= most; power += step) for (const value of [10 ** power, -(10 ** power)]) if (value >= low && value <= high) found.push(value);
+// Powers of ten that are as far apart as their labels need, from the smallest size outwards; zero where it is inside.
+export function powers([low, high], place, room) {
+  const signs = low > 0 ? [1] : [1, -1], found = low > 0 ? [] : [0];
+  const first = low > 0 ? Math.ceil(Math.log10(low) - 1e-6) : 0;
+  const zero = found.length ? place(0) : -Infinity;
+  for (const sign of signs) {
+    let last = zero;
+    for (let power = first; sign * 10 ** power <= high * 1.001 && sign * 10 ** power >= (low > 0 ? 0 : low); power += 1) {
+      const value = sign * 10 ** power;
+      if (Math.abs(place(value) - last) < (last === zero ? 0.75 : 1) * room) continue;  // "0" is narrow
+      found.push(value);
+      last = place(value);
+    }
+  }
+  return found;
+}
+
+// Fine lines at two to nine times each power, which show that a scale is no linear one.
+function between([low, high], place, both) {
+  const found = [], most = Math.max(high, both ? -low : high);
+  const first = both ? 0 : Math.floor(Math.log10(low));
+  if (Math.abs(place(10 ** (first + 2)) - place(10 ** (first + 1))) < 18) return found;
+  for (let power = first; 10 ** power < most; power += 1) for (let k = 2; k < 10; k += 1) {
+    for (const value of both ? [k * 10 ** power, -k * 10 ** power] : [k * 10 ** power]) if (value >= low && value <= high) found.push(value);
+  }
   return found;
 }
 

@@ -35,7 +35,7 @@ class NumberRow {
     this.slider.addEventListener("change", () => this.slid(true));
   }
 
-  // given: { label, value, unit, minimum, maximum, free, active, margin }
+  // given: { label, value, unit, digits, free, active, margin, path, droppable }
   show(given) {
     this.given = given;
     nameText(this.name, given.label);
@@ -58,13 +58,13 @@ class NumberRow {
     this.row.classList.toggle("active", given.active === true);
     text(this.margin, given.margin ?? "");
     if (document.activeElement !== this.field || this.settled) {
-      this.field.value = given.value === null ? "" : editable(given.value * factorOf(given.unit));
+      this.field.value = given.value === null ? "" : editable(given.value * factorOf(given.unit), given.digits);
       this.settled = false;
       this.field.removeAttribute("aria-invalid");
       text(this.wrong, "");
     }
     if (document.activeElement !== this.slider || !this.sliding) this.rest();
-    this.slider.setAttribute("aria-valuetext", given.value === null ? "no number" : withUnit(given.value, given.unit));
+    this.slider.setAttribute("aria-valuetext", given.value === null ? "no number" : withUnit(given.value, given.unit, 4));
   }
 
   rest() {
@@ -89,7 +89,7 @@ class NumberRow {
     text(this.wrong, "");
     const value = Number(this.valueAt(Number(this.slider.value)).toPrecision(4));
     this.field.value = editable(value * factorOf(this.given.unit));
-    this.slider.setAttribute("aria-valuetext", withUnit(value, this.given.unit));
+    this.slider.setAttribute("aria-valuetext", withUnit(value, this.given.unit, 4));
     this.change(value, last);
   }
 

@@ -238,7 +238,7 @@ function limitRow([name, words, value, si, shown, upper, byDefault]) {
   const unit = shown === "%" ? "%" : si;
   const margin = answer.design?.margins.find((each) => each.limit === name);
   const from = byDefault ? "from the deck" : "set here";
-  return { name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false, droppable: !byDefault,
+  return { name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, digits: byDefault ? 3 : 5, active: margin?.active ?? false, droppable: !byDefault,
     margin: margin ? `${from}; ${margin.active ? "the design sits on it" : `now ${withUnit(margin.value, unit, 3)}`}` : from };
 }
 
@@ -269,7 +269,7 @@ function showKinds() {
 
 function numberRow([name, value, unit, , free, , , source]) {
   const chosen = answer.design?.numbers.find((each) => each.name === name);
-  return { name, path: `${name} (${source})`, label: name, value: free && chosen ? chosen.value : value, unit, free,
+  return { name, path: `${name} (${source})`, label: name, value: free && chosen ? chosen.value : value, digits: free ? 3 : 5, unit, free,
     margin: free && chosen ? `chosen: ${withUnit(chosen.value, unit)}` : "" };
 }
 
@@ -321,7 +321,20 @@ function showWords(name, kind, words) {
   byId("state").className = `state ${kind}`;
   text(byId("state-name"), name);
   text(byId("state-words"), words.trim());
+  clearTimeout(cutting);
+  cutting = setTimeout(showCut, 150);
 }
+
+// The bar has one height, so that no answer moves the page. Words that do not fit are there whole: for whoever
+// points at them, brings the focus to them or has them read.
+let cutting = 0;
+function showCut() {
+  const place = byId("state-words"), cut = place.scrollHeight > place.clientHeight + 1;
+  place.title = cut ? place.textContent : "";
+  if (cut) place.tabIndex = 0;
+  else place.removeAttribute("tabindex");
+}
+window.addEventListener("resize", () => showCut());
 
 // Computing is worth a word only where it takes longer than a glance.
 let waiting = 0;
@@ -390,9 +403,12 @@ function showGallery(message) {
   ({ cards, materials, limits: kinds } = message);
   if (answer) showKinds();
   const select = byId("gallery");
-  const group = (kind, label) => make("optgroup", { label }, ...cards.filter((each) => each.kind === kind).map((each) =>
-    make("option", { value: each.name, disabled: each.reason !== "", title: each.line }, each.reason ? `${each.name} (${each.reason})` : each.name)));
-  select.replaceChildren(make("option", { value: "", disabled: true }, "own deck"), group("deck", "decks"), group("template", "templates"));
+  const group = (label, chosen) => make("optgroup", { label }, ...chosen.map((each) => make("option", { value: each.name, disabled: each.reason !== "", title: each.line }, each.name)));
+  const open = (kind) => cards.filter((each) => each.kind === kind && each.reason === "");
+  // What cannot be opened stands below the reason that it shares with others.
+  const reasons = [...new Set(cards.map((each) => each.reason))].filter((each) => each !== "");
+  select.replaceChildren(make("option", { value: "", disabled: true }, "own deck"), group("decks", open("deck")), group("templates", open("template")),
+    ...reasons.map((reason) => group(`cannot be opened: ${reason}`, cards.filter((each) => each.reason === reason))));
   select.disabled = false;
   if (answer) showTitle();
   material.replaceChildren(make("option", { value: "" }, "that of the deck"), ...materials.map(({ name, reason }) =>

@@ -58,7 +58,7 @@ export class TargetEditor extends Chart {
     if (!this.held(k)) set(this.handles[k], {
       "aria-label": `Target point ${k + 1} of ${this.points.length}. ${HELP}`,
       "aria-valuenow": plain(torque), "aria-valuemin": plain(this.bounds.torque[0]), "aria-valuemax": plain(this.bounds.torque[1]),
-      "aria-valuetext": `${withUnit(torque, "N*m")} at ${withUnit(angle, "rad")}`, "aria-orientation": "vertical",
+      "aria-valuetext": `${withUnit(torque, "N*m", 4)} at ${withUnit(angle, "rad", 4)}`, "aria-orientation": "vertical",
     });
   }
 
@@ -151,7 +151,7 @@ export class TargetEditor extends Chart {
   say(rms, words) {
     if (this.spoken === undefined) return;
     const [angle, torque] = this.points[this.spoken] ?? [null, null];
-    if (angle !== null) announce(`${withUnit(torque, "N*m")} at ${withUnit(angle, "rad")}; ${rms}. ${words}`);
+    if (angle !== null) announce(`${withUnit(torque, "N*m", 4)} at ${withUnit(angle, "rad", 4)}; ${rms}. ${words}`);
   }
 
   get moving() {

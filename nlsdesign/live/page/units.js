@@ -21,7 +21,7 @@ export function factorOf(si) {
   return (SHOWN[si] ?? ["", 1])[1];
 }
 
-// Four significant digits, without an exponent where a person would write none.
+// Four significant digits, as a scale needs, without an exponent where a person would write none.
 export function plain(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
@@ -40,7 +40,8 @@ export function scaled(si, largest) {
   return largest < 5e-4 ? ["µN·m", 1e6] : ["mN·m", 1e3];
 }
 
-export function withUnit(value, si, digits = 4) {
+// Three digits, in a unit that suits the size; more where a step of a hand must be seen.
+export function withUnit(value, si, digits = 3) {
   if (si === "N*m" && value !== null && Math.abs(value) < 0.05 && value !== 0) {
     const [unit, factor] = scaled(si, Math.abs(value));
     return `${plain(value * factor, digits)} ${unit}`;
@@ -50,10 +51,10 @@ export function withUnit(value, si, digits = 4) {
   return unit === "" ? number : unit === "°" ? `${number}°` : `${number} ${unit}`;
 }
 
-// As a field takes it back.
-export function editable(value) {
+// As a field takes it back; what nobody typed needs no more than three digits.
+export function editable(value, digits = 5) {
   if (value === null || !Number.isFinite(value)) return "";
-  const short = Number(value.toPrecision(5));
+  const short = Number(value.toPrecision(digits));
   return Math.abs(short) >= 1e7 || (short !== 0 && Math.abs(short) < 1e-4) ? short.toExponential() : String(short);
 }
 
@@ -66,6 +67,11 @@ export function typed(text) {
 
 function minus(text) {
   return text.replace("-", "−");
+}
+
+// A tick of a logarithmic axis.
+export function powerOf(value) {
+  return value === 0 ? "0" : `${value < 0 ? "−" : ""}10${superscript(Math.round(Math.log10(Math.abs(value))))}`;
 }
 
 function superscript(exponent) {

@@ -6,4 +6,4 @@ points, `figures` draws them.
 
 from .sweep_page import write_sweep_report
 
-__all__ = ["SweepPage", "write_sweep_report"]
+__all__ = ["write_sweep_report"]

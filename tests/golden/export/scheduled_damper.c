@@ -196,7 +196,11 @@ uint32_t scheduled_damper_set_parameters(
 {
     uint32_t status = 0u;
 
-    take_over(parameters->memory.gain, 0.0, 10.0, &state->parameters.memory.gain, 0x10000u, &status);
+    if (state->started != SCHEDULED_DAMPER_INTERFACE_VERSION) {
+        status = SCHEDULED_DAMPER_NOT_STARTED;
+    } else {
+        take_over(parameters->memory.gain, 0.0, 10.0, &state->parameters.memory.gain, 0x10000u, &status);
+    }
     return status;
 }
 
@@ -209,6 +213,7 @@ uint32_t scheduled_damper_init(scheduled_damper_state *state, const scheduled_da
     state->readings[0] = (scheduled_damper_reading){0};
     state->readings[0].last = start_inputs.piston.speed;
     state->begun = 0u;
+    state->started = SCHEDULED_DAMPER_INTERFACE_VERSION;
     return parameters == NULL ? 0u : scheduled_damper_set_parameters(state, parameters);
 }
 
@@ -293,13 +298,18 @@ uint32_t scheduled_damper_step(
     const scheduled_damper_inputs *inputs,
     scheduled_damper_outputs *outputs)
 {
-    uint32_t status = scheduled_damper_take(state, inputs);
+    uint32_t status = SCHEDULED_DAMPER_NOT_STARTED;
 
-    if (state->begun == 0u) {
-        *outputs = state->outputs;
-        status |= SCHEDULED_DAMPER_WAITING;
+    if (state->started != SCHEDULED_DAMPER_INTERFACE_VERSION) {
+        *outputs = (scheduled_damper_outputs){0};
     } else {
-        status |= scheduled_damper_advance(state, outputs);
+        status = scheduled_damper_take(state, inputs);
+        if (state->begun == 0u) {
+            *outputs = state->outputs;
+            status |= SCHEDULED_DAMPER_WAITING;
+        } else {
+            status |= scheduled_damper_advance(state, outputs);
+        }
     }
     return status;
 }

@@ -16,7 +16,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_DECK "damper"
 #define SCHEDULED_DAMPER_DECK_DIGEST "1111111111111111111111111111111111111111111111111111111111111111"
 #define SCHEDULED_DAMPER_PARENT_DIGEST "0000000000000000000000000000000000000000000000000000000000000000"
-#define SCHEDULED_DAMPER_INTERFACE_VERSION 0x770cc7a2u /* another one where structures, functions or units differ */
+#define SCHEDULED_DAMPER_INTERFACE_VERSION 0x680285c2u /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
    set_parameters) as numbered below; bit 30 stands for all from 14 on. */
@@ -31,6 +31,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_OUT_OF_TABLE 0x100u /* a table was read beyond its ends, where it holds its last numbers */
 #define SCHEDULED_DAMPER_RECOVERED 0x200u /* a reading is used again after a gap */
 #define SCHEDULED_DAMPER_WAITING 0x400u /* no usable reading has come yet; the outputs are those of the start */
+#define SCHEDULED_DAMPER_NOT_STARTED 0x800u /* init has not been called; all outputs are 0, nothing was taken */
 
 /* What step reads. */
 typedef struct {
@@ -84,7 +85,10 @@ typedef struct {
     scheduled_damper_outputs outputs; /* last good */
     scheduled_damper_reading readings[1]; /* in the order of the inputs */
     uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
+    uint32_t started; /* SCHEDULED_DAMPER_INTERFACE_VERSION from init on; with any other number step gives NOT_STARTED */
 } scheduled_damper_state;
+
+/* No pointer may be null but the parameters of init; none is checked. */
 
 /* Gives the parameters of the design. */
 void scheduled_damper_defaults(scheduled_damper_parameters *parameters);
@@ -93,12 +97,13 @@ void scheduled_damper_defaults(scheduled_damper_parameters *parameters);
    first usable readings, of a machine at rest. Returns a status word. */
 uint32_t scheduled_damper_init(scheduled_damper_state *state, const scheduled_damper_parameters *parameters);
 
-/* Takes over parameters, each only if it is within its range. Returns a status word. */
+/* Takes over parameters, each only if it is within its range. Returns a status word; before init nothing is taken. */
 uint32_t scheduled_damper_set_parameters(
     scheduled_damper_state *state,
     const scheduled_damper_parameters *parameters);
 
-/* Computes the outputs of this sample and the state of the next. Returns a status word. */
+/* Computes the outputs of this sample and the state of the next. Returns a status word. Before init, with a state
+   of any content, all outputs are 0 and the word is SCHEDULED_DAMPER_NOT_STARTED. */
 uint32_t scheduled_damper_step(
     scheduled_damper_state *state,
     const scheduled_damper_inputs *inputs,

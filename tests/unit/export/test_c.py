@@ -21,6 +21,7 @@ from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_SATURATED,
+    NOT_STARTED,
     OUT_OF_TABLE,
     OUTPUT_HELD,
     PARAMETER_REFUSED,
@@ -300,6 +301,22 @@ def test_parameters_are_taken_at_run_time_or_refused(running):
     reference = GuardedModel(model.with_values({"cam.corner": 0.4}))
     assert refused([0.7, 1.0])[0] == pytest.approx(reference.step([0.7, 1.0])[0], rel=1e-12)
     assert running("observer", "double", [3.0, 0.015, 0.2]).first_status == PARAMETER_REFUSED | index_bit(0)
+
+
+@pytest.mark.parametrize("real", REALS)
+@pytest.mark.parametrize("filling", [0x00, 0x01, 0x7F, 0xA5, 0xFF])
+def test_a_step_before_init_gives_zeros_and_says_so(filling, real, running):
+    """A state that was never started: zeroed memory, or what a memory without start-up code holds."""
+    step = running("controller", real)
+    step.fill(filling)
+    for _ in range(3):
+        outputs, status = step([1.0, 0.2])
+        assert (set(outputs.tolist()), status) == ({0.0}, NOT_STARTED)
+    assert step.set_parameters([v.start for v in MODELS["controller"].parameters]) == NOT_STARTED
+    assert step([1.0, 0.2])[1] == NOT_STARTED
+    assert step.init() == 0
+    fresh = running("controller", real)
+    assert step([1.0, 0.2])[0].tolist() == fresh([1.0, 0.2])[0].tolist()
 
 
 def test_two_instances_do_not_know_of_each_other(running):

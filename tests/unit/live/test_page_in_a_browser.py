@@ -128,7 +128,7 @@ def test_every_control_has_a_name_of_its_own_and_every_figure_its_numbers(tab: T
     for name in figures:
         assert sum(each.isdigit() for each in name) >= 4, name
     (torque,) = [name for name in figures if name.startswith("Torque over angle")]
-    assert "design from 0 N·m at 0° to 0.588 N·m at 60°" in torque
+    assert "design from 0 N·m at 0° to 0.589 N·m at 60°" in torque
     tab.evaluate("for (const each of document.querySelectorAll('.more, .menu')) each.open = false")
 
 
