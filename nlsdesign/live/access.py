@@ -96,7 +96,10 @@ class Access:
 
     def refusal(self, scope: Scope) -> Refusal | None:
         """Return why a request is refused; ``None`` where it is not."""
-        headers = _headers(scope)
+        headers: dict[str, str] = {}  # one that comes twice is of no value
+        for name, value in scope["headers"]:
+            key = name.decode("latin-1").lower()
+            headers[key] = "" if key in headers else value.decode("latin-1")
         if f"http://{headers.get('host', '').lower()}" not in self.origins:
             return Refusal(421, "The live page answers at its loopback address only.")
         socket = scope["type"] == "websocket"
@@ -120,15 +123,6 @@ class Access:
         else:
             given = headers.get("authorization", "").removeprefix("Bearer ")
         return hmac.compare_digest(given.encode(), self.token.encode())
-
-
-def _headers(scope: Scope) -> dict[str, str]:
-    """Return the headers by name; one that comes twice is of no value."""
-    headers: dict[str, str] = {}
-    for name, value in scope["headers"]:
-        key = name.decode("latin-1").lower()
-        headers[key] = "" if key in headers else value.decode("latin-1")
-    return headers
 
 
 def _opened(headers: dict[str, str]) -> bool:

@@ -367,7 +367,7 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     assert missed.lower().count("misses") == 1
     assert "; what would help: free rubber.area (to 2 mm^2), or another" in missed
     worse = full_answer(full, question, answer, replace(solved, cost=2.0))
-    assert "a worse local optimum (torque error, rubber and smoothness together): 0.0198" in worse.message
+    assert "a worse local optimum (torque error, rubber and smoothness together): 0.0319" in worse.message
     template._history.settle(full)
     assert template.answer.source == "full"
     assert template.at(0.3).revision == template.answer.revision
