@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from ..foundation.rubber_library import CONDITIONS as CONDITIONS
+from ..foundation.rubber_library import Material, material, materials
 from .assembly.changed_copies import sharpened as sharpened
 from .assembly.changed_copies import smoothed
 from .assembly.changed_copies import with_moved_load as with_moved_load
@@ -35,8 +37,6 @@ from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
-from .materials.library import CONDITIONS as CONDITIONS
-from .materials.library import Material, material, materials
 from .materials.loss_tangent import (
     KnownLoss,
     Relaxation,

@@ -1,4 +1,4 @@
-"""What the live page shows is read at a glance: a bar that stays in its place, scales, round numbers, reasons once."""
+"""What the live page shows is read at a glance: the status, scales, numbers, reasons."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_numbers_have_three_digits_and_a_unit_that_suits_them(tab: Tab) -> None:
     ):
         assert tab.evaluate(shown.format(value, unit)) == words
     now = tab.evaluate("[...document.querySelectorAll('.now, #numbers dd')].map((each) => each.textContent)")
-    now += tab.evaluate("[...document.querySelectorAll('#limits input[type=text]')].map((each) => each.value)")
+    now += tab.evaluate("[...document.querySelectorAll('#limits input[type=text]')].map((one) => one.value)")
     numbers = [one for words in now for one in re.findall(r"\d+(?:\.\d+)?", words)]
     assert len(numbers) > 12
     assert [one for one in numbers if len(one.replace(".", "").lstrip("0")) > 3] == []
@@ -121,7 +121,7 @@ def test_points_of_the_first_target_stand_at_round_angles(tab: Tab) -> None:
 
 def test_the_list_says_once_why_some_decks_are_not_opened(tab: Tab) -> None:
     names = {card.name for card in gallery_cards()}
-    options = tab.evaluate("[...document.querySelectorAll('#gallery option')].map((each) => each.textContent)")
+    options = tab.evaluate("[...document.querySelectorAll('#gallery option')].map((one) => one.textContent)")
     assert names == set(options[1:])
     closed = {card.name for card in gallery_cards() if card.reason}
     assert len(closed) >= 8
