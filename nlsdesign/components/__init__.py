@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-from ..foundation.rubber_library import CONDITIONS as CONDITIONS
-from ..foundation.rubber_library import Material, material, materials
 from .assembly.changed_copies import sharpened as sharpened
 from .assembly.changed_copies import smoothed
 from .assembly.changed_copies import with_moved_load as with_moved_load
@@ -109,6 +107,11 @@ from .transmission.cam_shapes import AnchoredCam, OneSidedCam
 from .transmission.capstan import CapstanFriction, Guide, WrapProduct
 from .transmission.stretchy_cable import StretchyCable
 from .transmission.unilateral_cable import Buckling, InextensibleCable, PullOnly, pull_only
+
+# isort: split
+# Last: the first import from the inner room ``materials`` puts the room at the name of this function.
+from ..foundation.rubber_library import CONDITIONS as CONDITIONS
+from ..foundation.rubber_library import Material, material, materials
 
 __all__ = [
     "MATERIAL",
