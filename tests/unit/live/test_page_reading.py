@@ -24,6 +24,8 @@ def tab() -> Iterator[Tab]:
         one.look(1400, height=950)
         one.visit(server.address)
         one.until(f"{ANSWERED} && !document.getElementById('gallery').disabled", seconds=180)
+        # What is put into the page here would be written over by news of the check.
+        one.until("document.getElementById('state-name').textContent.startsWith('checked')", seconds=180)
         yield one
 
 
