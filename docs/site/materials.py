@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from nlsdesign.components.materials import library
+from nlsdesign.foundation import rubber_library as library
 
 from . import bibliography, markup
 

@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..foundation import rubber_library as library
 from ..foundation.bibliography import cited
 from ..foundation.errors import unknown_name
+from ..foundation.extensions import extension_names
 from ..foundation.locations import folder
 from ..foundation.quantity import typeset_unit
+from .listed_parts import first_paragraph, kind_of, listed_parts
 from .options import json_option
 from .output import examples, show_json, show_table
 
@@ -30,17 +33,22 @@ if TYPE_CHECKING:
 @json_option
 def parts(name: str | None, as_json: bool) -> None:
     """List the parts that a deck can name, or show one. Law, source and numbers are shown."""
-    from ..components import component_classes, renamed
-
-    known = component_classes()
     if name is None:
-        laws = {n: (inspect.getdoc(c) or "").split("\n\n")[0].replace("\n", " ") for n, c in known.items()}
-        rows = sorted((_kind(c), n, laws[n]) for n, c in known.items())
+        listed = listed_parts()
+        if extension_names():  # what other packages bring is loaded already
+            from ..components import component_classes
+
+            brought = component_classes().items()
+            listed = {n: (_kind(c), first_paragraph(inspect.getdoc(c) or "")) for n, c in brought}
+        rows = sorted((kind, n, law) for n, (kind, law) in listed.items())
         if as_json:
             show_json({n: {"kind": kind, "law": law} for kind, n, law in rows})
         else:
             show_table("Parts", ("kind", "part", "law"), rows)
         return
+    from ..components import component_classes, renamed
+
+    known = component_classes()
     if name not in known:
         raise renamed(name) or unknown_name("part", name, known)
     infos, law = known[name].parameter_infos(), inspect.getdoc(known[name]) or ""
@@ -70,13 +78,7 @@ def parts(name: str | None, as_json: bool) -> None:
 
 
 def _kind(part: type[Part]) -> str:
-    from ..components import Body, Cam, DrivePart, Element, Sensor, Transmission
-
-    kinds: dict[str, type[Part]] = {
-        "element": Element, "body": Body, "gear": Transmission, "cam": Cam, "sensor": Sensor,
-        "drive": DrivePart,
-    }  # fmt: skip
-    return next(kind for kind, base in kinds.items() if issubclass(part, base))
+    return kind_of(tuple(each.__name__ for each in part.__mro__))
 
 
 @click.command(
@@ -86,8 +88,6 @@ def _kind(part: type[Part]) -> str:
 @json_option
 def materials(name: str | None, as_json: bool) -> None:
     """List the rubbers of the library, or show one. Values, conditions, grade of evidence and source."""
-    from .. import components as library
-
     if name is None:
         known = library.materials()
         if as_json:

@@ -82,7 +82,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @out_option("out/observer", writes=_writes)
 @real_option
 @click.option("--errors", "with_errors", is_flag=True, help="Also compare torque errors on a simulated "
-              "bench: with exact numbers, over the spread, by cause.")  # fmt: skip
+              "bench: over the spread, with exact numbers, by cause.")  # fmt: skip
 @click.option("--draws", type=click.IntRange(min=4), default=16, show_default=True,
               help="Machines drawn for --errors.")  # fmt: skip
 @json_option
@@ -225,7 +225,7 @@ def show_errors(errors: SpreadErrors, kind: str, deck_name: str) -> None:
         f"Torque error in {errors.shown_in} rms, sines of {errors.torque:.3g} {unit}, "
         f"{errors.drawn.shape[1]} draws of the spread"
     )
-    heads = ("observer", "Hz", "exact numbers", "median", "90 %", "rms", "bound on rms")
+    heads = ("observer", "Hz", "median", "90 %", "rms", "bound on rms", "exact numbers")
     show_table(title, heads, errors.rows())
     ranked = [[name, without_power(factor * size)] for name, size in causes]
     show_table("Causes", (f"{kind}: cause, one standard deviation off", f"{shown} rms"), ranked)

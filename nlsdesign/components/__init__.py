@@ -35,8 +35,6 @@ from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
-from .materials.library import CONDITIONS as CONDITIONS
-from .materials.library import Material, material, materials
 from .materials.loss_tangent import (
     KnownLoss,
     Relaxation,
@@ -109,6 +107,11 @@ from .transmission.cam_shapes import AnchoredCam, OneSidedCam
 from .transmission.capstan import CapstanFriction, Guide, WrapProduct
 from .transmission.stretchy_cable import StretchyCable
 from .transmission.unilateral_cable import Buckling, InextensibleCable, PullOnly, pull_only
+
+# isort: split
+# Last: the first import from the inner room ``materials`` puts the room at the name of this function.
+from ..foundation.rubber_library import CONDITIONS as CONDITIONS
+from ..foundation.rubber_library import Material, material, materials
 
 __all__ = [
     "MATERIAL",

@@ -9,9 +9,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..components.assembly.library_rubber import with_rubber
-from ..components.materials import library
 from ..design.optimisation.limits import limit_kinds
 from ..design.parametric.cam_question import TargetPoint
+from ..foundation import rubber_library as library
 from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question

@@ -12,11 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..components.materials.library import materials
 from ..components.materials.material_law import missing_law
 from ..design.optimisation.limits import limit_kinds
 from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
+from ..foundation.rubber_library import materials
 from .answers import AngleAnswer, AnswerSource, DesignView, LiveAnswer, Mechanism, WorkStage, to_json
 from .at_angle import AngleView
 from .background import WorkState

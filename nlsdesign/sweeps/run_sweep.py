@@ -223,7 +223,9 @@ def _compute(
 ) -> None:
     rows: list[dict[str, Any]] = []
     begin = written = time.monotonic()
-    outcomes = shared_map(task.work, points, executor, count=watch.left)
+    outcomes = shared_map(
+        task.work, points, executor, count=watch.left, without_workers=watch.without_workers
+    )
     try:
         with contextlib.closing(outcomes):  # type: ignore[type-var]
             for batch in outcomes:
@@ -260,6 +262,11 @@ class _Watch:
         self._progress, self._total, self.left = progress, total, left
         self._failed, self._done = 0, 0
         self._begin = time.monotonic()
+        self._alone = 0.0
+
+    def without_workers(self, seconds: float) -> None:
+        """Note for how long there has been nobody to compute."""
+        self._alone = seconds
 
     def count(self, batch: Sequence[PointOutcome]) -> None:
         self._done += len(batch)
@@ -268,7 +275,10 @@ class _Watch:
         text = f"{over} of {self._total} points"
         if self._failed:
             text += f", {self._failed} failed"
-        if self._done:
+        if self._alone > 0.0:  # what is left would take for ever
+            since = time.localtime(time.time() - self._alone)
+            text += f", no worker since {time.strftime('%H:%M:%S', since)}"
+        elif self._done:
             seconds = (time.monotonic() - self._begin) / self._done * (self.left - self._done)
             text += f", about {duration(seconds)} left"
         self._progress.note(text)

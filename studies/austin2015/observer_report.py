@@ -1,4 +1,4 @@
-"""Sections on the torque observers: what is seen, exact numbers, the spread, and what is proved."""
+"""Sections on the torque observers: what is seen, the spread, exact numbers, and what is proved."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def observer_sections(results: Results) -> list[Section]:
         ),
     ]
     for name, each in results.both.items():
+        sections += _spread_sections(name, each)
+    for name, each in results.both.items():
         sections += _bench_sections(name, each)
     sections.append(_errors_with_known_numbers(results))
-    for name, each in results.both.items():
-        sections += _spread_sections(name, each)
     return [*sections, _bounds(results), *(_proved(name, each) for name, each in results.both.items())]
 
 
@@ -87,7 +87,7 @@ def _bench_sections(name: str, results: ActuatorResults) -> list[Section]:
             caption="Current 6 A at 2 Hz, 8192 counts per turn; the cascade starts wrong.",
             means=f"With exact numbers, after 1 s: {1e3 * observers.minimal_error:.2f} mN·m rms of the "
             f"cascade, {1e3 * observers.published_error:.2f} in the paper's form. What the spread of the "
-            "deck makes of this stands below.",
+            "deck makes of this stands above.",
             assumed="The observer knows every number of the actuator exactly.",
         ),
         FigureSection(
@@ -119,7 +119,7 @@ def _spread_sections(name: str, results: ActuatorResults) -> list[Section]:
         ),
         TableSection(
             f"Torque errors in numbers, {name}",
-            ("observer", "Hz", "exact numbers", "median", "90 %", "rms", "bound on the rms"),
+            ("observer", "Hz", "median", "90 %", "rms", "bound on the rms", "exact numbers"),
             rows,
             caption="mN·m rms. `best` is the observer that is generated, by the error that is expected over "
             "the spread before anything is drawn.",

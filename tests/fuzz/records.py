@@ -16,12 +16,12 @@ import numpy as np
 from nlsdesign.bench.calibration import read_joint_numbers
 from nlsdesign.bench.identification import load_records
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.components.materials.library import materials
 from nlsdesign.design import read_job, read_task
 from nlsdesign.design.curves.target_files import read_band, read_target
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.locations import bundled
 from nlsdesign.foundation.locations import folder as distributed
+from nlsdesign.foundation.rubber_library import materials
 from nlsdesign.model import flatten
 
 from .cases import ACCEPTED, Case, Outcome

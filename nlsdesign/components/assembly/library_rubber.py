@@ -8,8 +8,8 @@ from typing import Any
 
 from ...foundation.deck import Deck, Written
 from ...foundation.errors import ArrangementError, DeckError, NlsError, unknown_name
+from ...foundation.rubber_library import Material, material
 from ..core.element import Tie
-from ..materials.library import Material, material
 from ..materials.loss_tangent import Relaxation
 from ..materials.material_law import MaterialLaw, law_of
 from ..materials.relaxing_rubber import relaxing_law_of

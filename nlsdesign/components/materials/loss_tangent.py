@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError, unknown_name
-from .library import Material, Property, materials
+from ...foundation.rubber_library import Material, Property, materials
 from .quasilinear import relaxation_factor
 
 LOSS_TANGENT = "loss_tangent"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ...foundation.errors import ArrangementError, unknown_name
 from ...foundation.quantity import Quantity
+from ...foundation.rubber_library import Material, Property, materials
 from ..core.dampers import ViscousMaterial
 from ..core.element import Element, Range
 from ..core.part_numbers import NotDeclared, Reading
@@ -14,7 +15,6 @@ from ..core.series import series
 from ..core.springs import FittedLaw, FittedRange, LinearElastic, StrainStiffening
 from .curve_fit import fit_curve
 from .hyperelastic import NeoHooke, Ogden
-from .library import Material, Property, materials
 from .quasilinear import QuasilinearRelaxation
 from .specimen import Specimen, Strength, specimen
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...foundation.quantity import Quantity
+from ...foundation.rubber_library import Material
 from ..core.element import Element
 from ..core.part_numbers import Reading
-from .library import Material
 from .loss_tangent import Relaxation, flat_relaxation, loss_of, relaxation_of
 from .material_law import MaterialLaw, law_of
 from .quasilinear import QuasilinearRelaxation

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from ...components.assembly.library_rubber import with_rubber
 from ...components.assembly.named_parts import Assembly
-from ...components.materials.library import material
 from ...foundation.errors import ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity
+from ...foundation.rubber_library import material
 from ..curves.numbers import plain
 
 _MOST = 1000

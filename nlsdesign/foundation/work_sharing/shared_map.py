@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
@@ -53,6 +54,7 @@ def shared_map(
     *,
     count: int | None = None,
     sizes: ChunkSizes | None = None,
+    without_workers: Callable[[float], None] | None = None,
 ) -> Iterator[list[PointOutcome]]:
     """Yield the outcomes of all points as they come, in lists; an empty one now and then while none comes.
 
@@ -70,6 +72,8 @@ def shared_map(
         Number of points where it is known, so that the last chunks are small enough for all workers.
     sizes
         Of chunks.
+    without_workers
+        Called before each list with the seconds for which no worker has been there, zero where one is.
 
     Raises
     ------
@@ -78,7 +82,7 @@ def shared_map(
     """
     with executor.team(work) as team:
         queue = _Queue(iter(points), sizes or ChunkSizes(), count)
-        flying = 0
+        flying, last_seen = 0, time.monotonic()
         while True:
             while team.free() > 0 and (chunk := queue.next(team)) is not None:
                 team.submit(chunk)
@@ -93,6 +97,10 @@ def shared_map(
                 else:
                     queue.learn(outcome)
                     outcomes += outcome
+            if without_workers is not None:
+                now = time.monotonic()
+                last_seen = now if team.workers() else last_seen
+                without_workers(now - last_seen)
             yield outcomes
 
 

@@ -198,8 +198,8 @@ def errors_over_spread(errors: SpreadErrors) -> Figure:
             at, factor * errors.exact[number], color=tone, marker=point, linestyle="none", fillstyle="none"
         )
         words.append(
-            f"{name}: exact {_range(factor * errors.exact[number])}, median {_range(median)}, 90 % "
-            f"{_range(most)} {unit}."
+            f"{name}: median {_range(median)}, 90 % {_range(most)}, with exact numbers "
+            f"{_range(factor * errors.exact[number])} {unit}."
         )
     if len(errors.bound):
         bound = factor * errors.bound

@@ -188,11 +188,12 @@ def write_observer_report(
         KeyNumber(
             f"{name}, median over the spread",
             f"{prefixed(float(np.max(errors.quantile(name, 0.5))), errors.unit)} rms",
-            f"at the worst of {', '.join(f'{f:g}' for f in errors.frequencies)} Hz",
+            f"at the worst of {', '.join(f'{f:g}' for f in errors.frequencies)} Hz; with exact numbers "
+            f"{prefixed(float(np.max(exact)), errors.unit)}",
         )
-        for name in errors.observers
+        for name, exact in zip(errors.observers, errors.exact, strict=True)
     )
-    heads = ("observer", "Hz", "exact numbers", "median", "90 %", "rms", "bound on rms")
+    heads = ("observer", "Hz", "median", "90 %", "rms", "bound on rms", "exact numbers")
     sections: list[Section] = [
         NumbersSection("Torque error", keys),
         TextSection("The observer", drawing="\n".join(words)),

@@ -11,8 +11,8 @@ from click.testing import CliRunner
 
 from nlsdesign.cli.main import program
 from nlsdesign.components import NeoHooke, Ogden, material, materials
-from nlsdesign.components.materials.library import EVIDENCE
 from nlsdesign.foundation.errors import DeckError, UnitError, UnknownNameError
+from nlsdesign.foundation.rubber_library import EVIDENCE
 from nlsdesign.foundation.spread import RelativeSpread
 from tests.stretched import pulled, stress_at
 

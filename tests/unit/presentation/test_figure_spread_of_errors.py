@@ -23,8 +23,8 @@ def test_the_text_says_what_is_drawn() -> None:
     figure = errors_over_spread(errors(np.array([2.5e-3, 2.5e-3])))
     text = alternative_text(figure)
     # Of 1, 3, 5 the median is 3 and the 90 % quantile 4.6; of 2, 4, 6: 4 and 5.6.
-    assert "best: exact 0.500, median 3.00 to 4.00, 90 % 4.60 to 5.60 mN·m." in text
-    assert "other: exact 6.00 to 8.00, median 7.00, 90 % 7.00 mN·m." in text
+    assert "best: median 3.00 to 4.00, 90 % 4.60 to 5.60, with exact numbers 0.500 mN·m." in text
+    assert "other: median 7.00, 90 % 7.00, with exact numbers 6.00 to 8.00 mN·m." in text
     assert "Bound on the rms of any estimator 2.50 mN·m" in text
     left, right = figure.axes
     assert left.get_ylabel() == "torque error in mN·m rms"

@@ -34,8 +34,8 @@ from nlsdesign.cli.studies import study_names
 from nlsdesign.components import Part
 from nlsdesign.components.assembly.deck_reader import component_classes
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
-from nlsdesign.components.materials import library
 from nlsdesign.design.jobs.job_file import kinds
+from nlsdesign.foundation import rubber_library as library
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.model import flatten
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import socket
 import threading
@@ -16,6 +17,8 @@ import pytest
 from nlsdesign.foundation.errors import WorkSharingError
 from nlsdesign.foundation.work_sharing import CodeIdentity, DaskScheduler, Processes, shared_map
 from nlsdesign.foundation.work_sharing.chunks import Chunk
+from nlsdesign.sweeps import Listed
+from nlsdesign.sweeps.run_sweep import SweepSettings, run_task, sweep_task
 from tests import sweeping
 from tests.light_work import square
 
@@ -179,6 +182,28 @@ def test_a_scheduler_that_stays_away_ends_the_run_with_what_was_finished(tmp_pat
     sweeping.run(out, 300, Processes(2))
     assert sorted(sweeping.rows_in_parts(out)) == list(range(600)), "nothing lost, nothing twice"
     assert sweeping.same_table(out, 300, tmp_path / "one")
+
+
+class Noted:
+    """What a run says while it waits."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.texts.append(text)
+
+
+def test_a_driver_without_workers_says_so_and_since_when_before_it_ends(tmp_path: Path) -> None:
+    port, noted = free_port(), Noted()
+    axes = [Listed({sweeping.AREA: [1e-5, 2e-5]})]
+    task = sweep_task(sweeping.actuator(), axes=axes, ask=sweeping.question())
+    executor = DaskScheduler(f"tcp://127.0.0.1:{port}", connect_within=60.0, patience=2.0)
+    with scheduler(port), pytest.raises(WorkSharingError, match="has had no worker for 2 s") as ended:
+        run_task(task, tmp_path, executor=executor, settings=SweepSettings(), progress=noted)
+    assert "start workers with 'dask worker'" in str(ended.value)
+    assert re.fullmatch(r"0 of 2 points, no worker since \d\d:\d\d:\d\d", noted.texts[-1])
+    assert not [each for each in noted.texts if " left" in each]
 
 
 class Wire:

@@ -134,15 +134,14 @@ class SpreadErrors:
         return data_set(data, axes=axes, units=dict.fromkeys(data, self.unit))
 
     def rows(self) -> list[list[str]]:
-        """Return a table in `shown_in`: observer, errors with exact numbers, and over the spread."""
+        """Return a table in `shown_in`: observer, errors over the spread, bound, with exact numbers."""
         rows, factor = [], self.shown_factor
         for i, name in enumerate(self.observers):
             median, most, rms = self.quantile(name, 0.5), self.quantile(name, 0.9), self.rms(name)
             for k, f in enumerate(self.frequencies):
-                numbers = [self.exact[i, k], median[k], most[k], rms[k]]
-                cells = [three_digits(factor * value) for value in numbers]
+                over = [three_digits(factor * value[k]) for value in (median, most, rms)]
                 bound = three_digits(factor * self.bound[k]) if len(self.bound) else "not computed"
-                rows.append([name, f"{f:g}", *cells, bound])
+                rows.append([name, f"{f:g}", *over, bound, three_digits(factor * self.exact[i, k])])
         return rows
 
     def content(self) -> dict[str, Any]:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...foundation.deck import NUMBER_FIELDS, Deck, read_deck
-from ...foundation.errors import DeckError, nearest, unknown_name
-from ...foundation.extensions import extension_files
-from ...foundation.locations import folder
-from ...foundation.quantity import Quantity, same_dimension, with_unit
-from ...foundation.text_files import text_of
+from .deck import NUMBER_FIELDS, Deck, read_deck
+from .errors import DeckError, nearest, unknown_name
+from .extensions import extension_files
+from .locations import folder
+from .quantity import Quantity, same_dimension, with_unit
+from .text_files import text_of
 
 EVIDENCE = ("measured curve", "data sheet", "range")
 """Grades of evidence, best first."""
