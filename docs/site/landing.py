@@ -1,23 +1,28 @@
-"""The picture of the first page: the reference actuator, drawn from its deck."""
+"""The picture of the first page: what the code draws that stands above it."""
 
 from __future__ import annotations
 
-import numpy as np
+import re
 
-import nlsdesign as nls
-from nlsdesign.design import contour_of_cam
-from nlsdesign.presentation.figures import cam_motion_of, cam_positions
 from nlsdesign.presentation.figures.svg import inline_svg
 
 from . import markup
 
-DECK = "austin2015_figure_consistent"
+_PLACE = "<!-- picture -->"
+_CODE = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-def picture() -> str:
-    """Return the cam of the reference actuator at two angles, as SVG in a figure."""
-    actuator = nls.declare(nls.load_deck(DECK))
-    model = nls.flatten(actuator)
-    motion = cam_motion_of(model, contour_of_cam(actuator.element("spring").cam), count=61)
-    svg = inline_svg(cam_positions(motion, angles=[np.radians(20.0), np.radians(45.0)]), "reference")
-    return markup.plot(svg, f"The cam of <code>{DECK}</code>, turned by 20° and by 45°")
+def with_picture(page: str) -> str:
+    """Return the first page with the figure that its code draws, as SVG.
+
+    Parameters
+    ----------
+    page
+        Markdown; its one block of Python leaves a ``figure``.
+    """
+    (code,) = _CODE.findall(page)
+    drawn: dict[str, object] = {}
+    exec(code, drawn)
+    svg = inline_svg(drawn["figure"], "reference")  # type: ignore[arg-type]
+    words = "The cam of the reference actuator at two angles, with its cable and the rubber behind it."
+    return page.replace(_PLACE, markup.plot(svg, words))

@@ -43,7 +43,7 @@ def stage(root: Path, folder: Path) -> set[str]:
         pages[name] = _text(root, path, linked, at=f"docs/{name}")
     pages |= _contents(pages)
     pages["index.md"] = pages["index.md"].replace("MORE", "\n".join(_unlisted(pages)))
-    pages["index.md"] = pages["index.md"].replace("<!-- picture -->", landing.picture())
+    pages["index.md"] = landing.with_picture(pages["index.md"])
     for name, text in pages.items():
         _write(folder / name, text)
     for path in sorted((root / "docs").rglob("*")):

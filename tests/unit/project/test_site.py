@@ -23,6 +23,7 @@ from docs.site import (
     collect,
     commands,
     formula,
+    landing,
     markup,
     materials,
     parts,
@@ -79,6 +80,17 @@ def test_the_pages_of_parts_name_each_number_with_unit_range_and_meaning() -> No
             assert row is not None, f"{name}: {number}"
             assert row[1], f"{name}: {number} has no unit"
             assert info.description in row[0]
+
+
+def test_the_first_page_installs_and_shows_what_its_code_draws(root: Path) -> None:
+    page = (root / "docs" / "site" / "pages" / "index.md").read_text(encoding="utf-8")
+    assert "pip install" in page[: page.index("```python")]
+    made = landing.with_picture(page)
+    assert made.count("<svg") == 1
+    first, second = re.findall(r"The cam at (\d+)°, (\d+)°", made)[0]
+    assert (first, second) == ("20", "45")
+    other = landing.with_picture(page.replace("[0.35, 0.79]", "[0.35, 0.7]"))
+    assert "The cam at 20°, 40°" in other
 
 
 def test_laws_are_typeset(root: Path) -> None:
