@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,24 +22,41 @@ _BEGINNINGS = {"Part", "Tie"}
 class _Written:
     """A class as it is written: what it descends from, what it leaves open, and what it gives."""
 
-    name: str
     bases: tuple[str, ...]
     text: str
     abstract: frozenset[str]
     given: frozenset[str]
 
+    @classmethod
+    def of(cls, node: ast.ClassDef) -> _Written:
+        """Return what a definition says."""
+        methods = [each for each in node.body if isinstance(each, ast.FunctionDef)]
+        abstract = {each.name for each in methods if "abstractmethod" in map(_name, each.decorator_list)}
+        given = {each.name for each in methods} - abstract
+        for each in node.body:
+            if isinstance(each, ast.Assign):
+                given |= set(map(_name, each.targets))
+            elif isinstance(each, ast.AnnAssign) and each.value is not None:
+                given.add(_name(each.target))
+        text = ast.get_docstring(node, clean=False) or ""
+        return cls(tuple(map(_name, node.bases)), text, frozenset(abstract), frozenset(given))
+
 
 def listed_parts() -> dict[str, tuple[str, str]]:
     """Return kind and law of each part of the package that can be declared, by name."""
-    classes = {each.name: each for file in sorted(_FOLDER.rglob("*.py")) for each in _classes(file)}
-    found = {}
+    nodes = (node for file in sorted(_FOLDER.rglob("*.py")) for node in ast.parse(file.read_bytes()).body)
+    classes = {node.name: _Written.of(node) for node in nodes if isinstance(node, ast.ClassDef)}
+    kinds = {}
     for name in sorted(classes):
         line = _line(name, classes)
-        if name[0] == "_" or name in _BEGINNINGS or "Part" not in line or _open(line, classes):
+        left_open: frozenset[str] = frozenset()
+        for each in (classes[base] for base in reversed(line) if base in classes):
+            left_open = left_open - each.given | each.abstract
+        if name[0] == "_" or name in _BEGINNINGS or "Part" not in line or left_open:
             continue
-        text = next((classes[each].text for each in line if each in classes and classes[each].text), "")
-        found[name] = kind_of(line), first_paragraph(text)
-    return found
+        text = next((classes[base].text for base in line if base in classes and classes[base].text), "")
+        kinds[name] = kind_of(line), first_paragraph(text)
+    return kinds
 
 
 def kind_of(line: tuple[str, ...]) -> str:
@@ -50,22 +67,6 @@ def kind_of(line: tuple[str, ...]) -> str:
 def first_paragraph(text: str) -> str:
     """Return the first paragraph of a docstring in one line."""
     return inspect.cleandoc(text).split("\n\n")[0].replace("\n", " ")
-
-
-def _classes(file: Path) -> Iterator[_Written]:
-    for node in ast.parse(file.read_bytes()).body:
-        if isinstance(node, ast.ClassDef):
-            methods = [each for each in node.body if isinstance(each, ast.FunctionDef)]
-            left = {each.name for each in methods if "abstractmethod" in map(_name, each.decorator_list)}
-            given = {each.name for each in methods} - left
-            for each in node.body:
-                if isinstance(each, ast.Assign):
-                    given |= {_name(target) for target in each.targets}
-                elif isinstance(each, ast.AnnAssign) and each.value is not None:
-                    given.add(_name(each.target))
-            bases = tuple(map(_name, node.bases))
-            text = ast.get_docstring(node, clean=False) or ""
-            yield _Written(node.name, bases, text, frozenset(left), frozenset(given))
 
 
 def _name(node: ast.expr) -> str:
@@ -82,13 +83,3 @@ def _line(name: str, classes: Mapping[str, _Written]) -> tuple[str, ...]:
     ]
     # A base that several share stands where it comes last.
     return (name, *reversed(dict.fromkeys(reversed(below))))
-
-
-def _open(line: tuple[str, ...], classes: Mapping[str, _Written]) -> bool:
-    """Tell whether something that a class descends from asks for what none before it gives."""
-    given: set[str] = set()
-    for each in (classes[name] for name in line if name in classes):
-        if each.abstract - given:
-            return True
-        given |= each.given
-    return False
