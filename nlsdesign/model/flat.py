@@ -87,6 +87,8 @@ class Variable:
         Where a parameter's number comes from, and how far the true one may lie from it.
     plausibility
         Of a measured input: what a reading can be; ``None`` for a command.
+    largest_rate
+        Of a command: how fast it is followed at most, in its unit per second.
     """
 
     name: str
@@ -99,6 +101,7 @@ class Variable:
     source: str = ""
     spread: Spread = EXACT
     plausibility: Plausibility | None = None
+    largest_rate: float = float("inf")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "spread", as_spread(self.spread))

@@ -47,7 +47,7 @@ def damper() -> FlatModel:
         (Variable("piston.filtered", "m/s", "Filtered speed"),),
         (
             Variable("piston.speed", "m/s", "Speed", 0.0, 1.0, -1.0, 1.0, plausibility=can),
-            Variable("valve.opening", "1", "Opening of the valve", 1.0, 1.0, 0.0, 1.0),
+            Variable("valve.opening", "1", "Opening of the valve", 1.0, 1.0, 0.0, 1.0, largest_rate=30.0),
         ),
         (
             Variable(

@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -22,6 +23,7 @@ from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_JUMPED,
     INPUT_OUT_OF_RANGE,
+    INPUT_SATURATED,
     INPUT_STALE,
     OUT_OF_TABLE,
     RECOVERED,
@@ -32,7 +34,7 @@ from nlsdesign.export.c.guarded_step import (
 )
 from nlsdesign.export.c.writer import member_paths
 from nlsdesign.export.compilation.compiled_step import CompiledStep
-from nlsdesign.feedback.control import TorqueGains, joined
+from nlsdesign.feedback.control import ScheduledTorque, TorqueGains, joined
 from nlsdesign.feedback.observer import design_adaptive_observer, design_observer_with_details
 from nlsdesign.foundation.errors import NlsError
 from tests.compiling import compile_program
@@ -295,6 +297,63 @@ def test_c_does_what_the_reference_does_under_faults(which: str, tmp_path: Path)
     assert worst < 1e-9
     for flag in (INPUT_HELD, INPUT_JUMPED, INPUT_OUT_OF_RANGE, INPUT_STALE, RECOVERED):
         assert any(word & flag for word in words)
+
+
+def one_sample(machine: nls.FlatModel) -> ca.Function:
+    """Return state and spring torque after 1 ms with a held current: ten steps of Runge and Kutta."""
+    x, current = ca.MX.sym("x", len(machine.states)), ca.MX.sym("current")
+    numbers, step, after = machine.start(machine.parameters), 1e-4, x
+
+    def slope(at: ca.MX) -> ca.MX:
+        return machine.equations(0.0, at, current, numbers, [])[0]
+
+    for _ in range(10):
+        one = slope(after)
+        two = slope(after + step / 2.0 * one)
+        three = slope(after + step / 2.0 * two)
+        four = slope(after + step * three)
+        after = after + step / 6.0 * (one + 2.0 * two + 2.0 * three + four)
+    place = [v.name for v in machine.signals].index("spring.torque")
+    torque = machine.equations(0.0, after, current, numbers, [])[2][place]
+    return ca.Function("sample", [x, current], [after, torque])
+
+
+FAULTY = 200
+
+
+def after_one_command(both: nls.FlatModel, bad: float | None) -> tuple[np.ndarray, list[int]]:
+    """Return the spring's torque and the words of 0.4 s in closed loop; ``bad`` is asked for once."""
+    machine, sample = plant(), one_sample(plant())
+    angle = [v.name for v in machine.states].index("motor.angle")
+    current = [v.name for v in both.outputs].index("motor.current")
+    run, state, acting, torques, words = GuardedModel(both), machine.start(machine.states), 0.0, [], []
+    for k in range(2 * FAULTY):
+        wish = 2.0 * math.sin(2.0 * math.pi * 1.3e-3 * k)
+        reading = 0.767e-3 * round(float(state[angle]) / 0.767e-3)
+        outputs, word = run.step([reading, bad if bad is not None and k == FAULTY else wish])
+        state, torque = sample(state, acting)
+        torques.append(float(torque))
+        words.append(word)
+        acting = outputs[current]
+    return np.array(torques), words
+
+
+@pytest.mark.parametrize("law", ["scheduled", pytest.param("pid", marks=pytest.mark.slow)])
+def test_one_sample_of_the_command_is_named_and_soon_forgotten(law: str) -> None:
+    """Without a range and a largest rate 540 N·m were seen for 0.2 s, 5e5 N·m for 0.29 s."""
+    outer = ScheduledTorque() if law == "scheduled" else None
+    both = joined(cascade(), nls.torque_controller(plant(), law=outer))
+    undisturbed, words = after_one_command(both, None)
+    assert set(words) == {0}
+    command = INPUT_SATURATED | index_bit(1)
+    for bad in (430.0, -7e4, 3e30):
+        torques, words = after_one_command(both, bad)
+        assert words[FAULTY] & command == command
+        assert set(words[:FAULTY] + words[FAULTY + 3 :]) == {0}
+        # One per cent of 5 N·m, as for readings, after five time constants of the observer.
+        apart = np.abs(torques - undisturbed)
+        assert np.max(apart[FAULTY + math.ceil(5.0 * time_constant(cascade()) / 1e-3) :]) < 0.05
+        assert np.max(apart) < 0.5
 
 
 def test_both_are_the_observer_and_the_controller_with_the_current_between() -> None:

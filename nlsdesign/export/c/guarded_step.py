@@ -34,6 +34,7 @@ OUT_OF_TABLE = 1 << 8
 RECOVERED = 1 << 9
 WAITING = 1 << 10
 NOT_STARTED = 1 << 11
+COMMAND_SLOWED = 1 << 12
 FIRST_INDEX_BIT, LAST_INDEX_BIT = 16, 30
 
 STATUS_BITS = {
@@ -64,6 +65,10 @@ STATUS_BITS = {
     "RECOVERED": (RECOVERED, "a reading is used again after a gap"),
     "WAITING": (WAITING, "no usable reading has come yet; the outputs are those of the start"),
     "NOT_STARTED": (NOT_STARTED, "init has not been called; all outputs are 0, nothing was taken"),
+    "COMMAND_SLOWED": (
+        COMMAND_SLOWED,
+        "a command changed faster than the drive can follow; what it can reach was used",
+    ),
 }
 
 
@@ -116,6 +121,11 @@ def reading_numbers(variable: Variable, sample_time: float, real: Real) -> Readi
         limits.noticeable if limits.moved_by is not None else -1.0,
         math.ceil(patience) if patience < MOST else MOST + 1,
     )
+
+
+def change_of_command(variable: Variable, sample_time: float, real: Real) -> float:
+    """Return the largest change of a command from sample to sample, the largest number where it has none."""
+    return min(variable.largest_rate * sample_time, real.largest)
 
 
 def mover(model: FlatModel, variable: Variable) -> tuple[str, int] | None:
@@ -233,9 +243,13 @@ class GuardedModel:
             if not abs(given) <= self.real.largest:
                 status |= INPUT_HELD | index_bit(i)
                 continue
-            self._inputs[i] = min(max(given, variable.minimum), variable.maximum)
-            if self._inputs[i] != given:
+            usable = min(max(given, variable.minimum), variable.maximum)
+            if usable != given:
                 status |= INPUT_SATURATED | index_bit(i)
+            followed = self._followed(i, usable)
+            if followed != usable:
+                status |= COMMAND_SLOWED | index_bit(i)
+            self._inputs[i] = followed
         for i, guard in self._guards.items():
             moved = self._movers[i]
             driver = 0.0
@@ -245,6 +259,13 @@ class GuardedModel:
             status |= flags | (index_bit(i) if flags else 0)
             resume = resume or again
         return status, resume
+
+    def _followed(self, i: int, usable: float) -> float:
+        """Return a command as near as it can be followed; the first one is taken as it is."""
+        if not self.begun:
+            return usable
+        change = change_of_command(self.model.inputs[i], float(self.model.sample_time or 0.0), self.real)
+        return min(max(usable, self._inputs[i] - change), self._inputs[i] + change)
 
     def _settled(self, state: Array, which: int) -> Array:
         if self.model.begin is None:

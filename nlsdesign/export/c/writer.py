@@ -20,7 +20,16 @@ from ...model.flat import FlatModel, Symbols, Variable
 from ..files import filled
 from .c_text import Real, comment, identifier
 from .elementary import own_functions
-from .guarded_step import AGREEING, GAP, MOST, ReadingNumbers, index_bit, mover, reading_numbers
+from .guarded_step import (
+    AGREEING,
+    GAP,
+    MOST,
+    ReadingNumbers,
+    change_of_command,
+    index_bit,
+    mover,
+    reading_numbers,
+)
 from .instructions import print_statements
 from .table_lookup import CTable, c_tables, look_up
 
@@ -236,6 +245,7 @@ def guard_functions(c: CWriter) -> list[str]:
     }
     wanted = {
         "controller_guard.c": len(c.model.inputs) > len(c.readings),
+        "controller_command.c": any(_is_slowed(v) for v in c.model.inputs),
         "controller_reading.c": bool(c.readings),
         "controller_parameter.c": bool(c.model.parameters),
     }
@@ -252,7 +262,7 @@ def take_statements(c: CWriter) -> list[str]:
         bit, taken = f"0x{index_bit(i):x}u, &status", f"&state->inputs.{path}"
         if v.name not in c.readings:
             limits = f"{real.bound(v.minimum)}, {real.bound(v.maximum)}"
-            commands.append(f"usable(inputs->{path}, {limits}, {taken}, {bit});")
+            commands.append(_command(c, v, f"inputs->{path}, {limits}", f"{taken}, {bit}"))
             continue
         number, _, driver = c.readings[v.name]
         remembered = f"&reading_{number}, &state->readings[{number}]"
@@ -266,6 +276,19 @@ def take_statements(c: CWriter) -> list[str]:
     }
     beginning = c.filled("controller_beginning.c", values).splitlines()
     return [*(commands + readings or ["(void)inputs;"]), *beginning]
+
+
+def _is_slowed(variable: Variable) -> bool:
+    return variable.plausibility is None and variable.largest_rate < float("inf")
+
+
+def _command(c: CWriter, variable: Variable, given: str, taken: str) -> str:
+    """Return the statement that takes a command, as fast as it is followed once the model has begun."""
+    if not _is_slowed(variable):
+        return f"usable({given}, {taken});"
+    change = c.real.literal(change_of_command(variable, float(c.model.sample_time or 0.0), c.real))
+    any_change = c.real.bound(float("inf"))
+    return f"followed({given}, state->begun == 0u ? {any_change} : {change}, {taken});"
 
 
 def step_body(c: CWriter) -> tuple[list[str], set[int]]:

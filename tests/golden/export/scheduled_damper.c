@@ -99,6 +99,24 @@ static void usable(double given, double lowest, double highest, double *last, ui
     }
 }
 
+/* Follows one command as fast as the drive can; the first one is taken as it is. */
+static void followed(double given, double lowest, double highest, double change, double *last, uint32_t which,
+                     uint32_t *status)
+{
+    double wanted = *last;
+
+    usable(given, lowest, highest, &wanted, which, status);
+    if (wanted > *last + change) {
+        *last += change;
+        *status |= SCHEDULED_DAMPER_COMMAND_SLOWED | which;
+    } else if (wanted < *last - change) {
+        *last -= change;
+        *status |= SCHEDULED_DAMPER_COMMAND_SLOWED | which;
+    } else {
+        *last = wanted;
+    }
+}
+
 /* What a reading can be, per sample; patience is the number of samples without change after which it is stale. */
 typedef struct {
     double lowest;
@@ -238,7 +256,7 @@ static uint32_t scheduled_damper_take(scheduled_damper_state *state, const sched
     uint32_t status = 0u;
 
     uint32_t resuming = 0u;
-    usable(inputs->valve.opening, 0.0, 1.0, &state->inputs.valve.opening, 0x20000u, &status);
+    followed(inputs->valve.opening, 0.0, 1.0, state->begun == 0u ? 1.7976931348623157e+308 : 0.3, &state->inputs.valve.opening, 0x20000u, &status);
     resuming |= plausible(inputs->piston.speed, state->inputs.valve.opening, &reading_0, &state->readings[0], &state->inputs.piston.speed, 0x10000u, &status);
     if (state->begun == 0u && state->readings[0].seen != 0u) {
         scheduled_damper_begin(state);

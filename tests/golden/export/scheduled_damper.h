@@ -32,6 +32,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_RECOVERED 0x200u /* a reading is used again after a gap */
 #define SCHEDULED_DAMPER_WAITING 0x400u /* no usable reading has come yet; the outputs are those of the start */
 #define SCHEDULED_DAMPER_NOT_STARTED 0x800u /* init has not been called; all outputs are 0, nothing was taken */
+#define SCHEDULED_DAMPER_COMMAND_SLOWED 0x1000u /* a command changed faster than the drive can follow; what it can reach was used */
 
 /* What step reads. */
 typedef struct {

@@ -41,7 +41,7 @@ from nlsdesign.feedback.control import (
 from nlsdesign.feedback.control.laws.known_drive import torque_limit
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
-from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.simulation import Trace, simulate
 from tests import observed as ob
@@ -379,6 +379,28 @@ def test_the_largest_torque_is_what_the_current_leaves_beside_friction() -> None
         check_torque(plant, 4.5)
     with pytest.raises(ValueRangeError, match="nan"):
         check_torque(plant, math.nan)
+
+
+def test_a_command_has_the_range_and_the_rate_of_the_drive() -> None:
+    """By hand: k·I − friction on both sides; slope of the spring times the declared speed of the encoder."""
+
+    def wished(plant: FlatModel) -> Variable:
+        (wish,) = (v for v in torque_controller(plant).inputs if v.name == "spring.torque.desired")
+        return wish
+
+    most = 20.0 * ob.CONSTANT - 0.02 - ob.DAMPING
+    linear = wished(linear_bench())
+    assert (linear.minimum, linear.maximum) == pytest.approx((-most, most), rel=1e-9)
+    assert linear.largest_rate == math.inf
+    deck = flatten(declare(load_deck("austin2015_soft_spring")))
+    soft = wished(deck)
+    assert soft.maximum == pytest.approx(most, rel=1e-9)
+    assert soft.largest_rate == pytest.approx(1.7 * deck.values["motor_encoder.largest_rate"], rel=1e-6)
+    cable = flatten(declare(load_deck("one_sided_cable_drive")))
+    pull = wished(cable)
+    assert sorted((pull.minimum, pull.maximum), key=abs) == pytest.approx([0.0, largest_torque(cable)])
+    loose = wished(flatten(ob.actuator(load=Inertia(inertia=1e-3))))
+    assert (loose.minimum, loose.maximum, loose.largest_rate) == (-math.inf, math.inf, math.inf)
 
 
 def test_the_end_of_the_contour_limits_too() -> None:

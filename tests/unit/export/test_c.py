@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import (
+    COMMAND_SLOWED,
     INPUT_HELD,
     INPUT_SATURATED,
     NOT_STARTED,
@@ -229,6 +230,36 @@ def test_nan_and_infinity_are_held_and_excess_is_saturated(real, running):
         ([7.0, -21.0], [1.5, -20.0]),
     ):
         assert one(bad)[0].tolist() == other(good)[0].tolist()
+
+
+@pytest.mark.parametrize("real", REALS)
+def test_a_command_is_followed_as_fast_as_it_can_be(real, tmp_path):
+    """0.5 per sample of 0.25 s from the second sample on; numbers are exact in both types."""
+    wish = Variable("wish", "1", "Command", 0.0, 1.0, -4.0, 3.0, largest_rate=2.0)
+    u, nothing = ca.SX.sym("u"), ca.SX(0, 1)
+    equations = ca.Function(
+        "e", [ca.SX.sym("t"), ca.SX.sym("x", 0), u, ca.SX.sym("p", 0), ca.SX.sym("w", 0)],
+        [nothing, 2 * u, nothing, nothing],
+    )  # fmt: skip
+    model = FlatModel(
+        "follower", "Follows", (), (wish,), (), (Variable("y", "1", "Twice"),), (), equations, 0.25
+    )
+    step, reference = CompiledStep(export_c(model, tmp_path, real=real)), GuardedModel(model)
+    slowed, saturated = COMMAND_SLOWED | index_bit(0), INPUT_SATURATED | index_bit(0)
+    sequence = [
+        (2.0, 2.0, 0),
+        (2.5, 2.5, 0),
+        (540.0, 3.0, saturated),
+        (1.0, 2.5, slowed),
+        (2.0, 2.0, 0),
+        (-1e9, 1.5, saturated | slowed),
+        (math.nan, 1.5, INPUT_HELD | index_bit(0)),
+        (1.25, 1.25, 0),
+        (1.875, 1.75, slowed),
+    ]
+    for wished, used, word in sequence:
+        for outputs, status in (step([wished]), reference.step([wished])):
+            assert (list(outputs), status) == ([2.0 * used], word)
 
 
 number = st.floats(allow_nan=True, allow_infinity=True)

@@ -248,13 +248,7 @@ def torque_limit(plant: FlatModel) -> TorqueLimit:
     ``plant``: continuous, load fixed or prescribed; friction in its smooth form.
     """
     drive = KnownDrive(plant)
-    loose = [b.name for b in plant.bodies if not b.prescribed and b.name != drive.body.name]
-    if loose:
-        raise ArrangementError(
-            f"body '{loose[0]}'", "moves freely, so no torque can be held in the spring",
-            next_step="fix the load, or prescribe its motion",
-        )  # fmt: skip
-    sides = [(_by_current(drive, way), _by_contour(drive, way)) for way in (1.0, -1.0)]
+    sides = _sides(drive)
     used = [side for side in sides if side[1] > 0.0] or [(0.0, 0.0)]
     current, contour = min(side[0] for side in used), min(side[1] for side in used)
     if contour < current:
@@ -272,6 +266,22 @@ def largest_torque(plant: FlatModel) -> float:
         Continuous, load fixed or prescribed.
     """
     return torque_limit(plant).torque
+
+
+def torque_range(plant: FlatModel) -> tuple[float, float]:
+    """Return the least and the largest torque in N·m that a drive can hold in its series spring.
+
+    Each direction by itself, where :func:`torque_limit` takes the lesser of both; zero where the spring gives
+    none.
+
+    ``plant``: continuous, load fixed or prescribed; friction in its smooth form.
+    """
+    drive = KnownDrive(plant)
+    sides = _sides(drive)
+    contours = [contour for _, contour in sides if math.isfinite(contour)]
+    nothing = _NOTHING * max(contours, default=0.0)
+    forward, backward = (min(side) if side[1] > nothing else 0.0 for side in sides)
+    return (-backward, forward) if drive.spring_turns_value > 0.0 else (-forward, backward)
 
 
 def only_side(plant: FlatModel) -> float:
@@ -322,29 +332,47 @@ def check_torque(plant: FlatModel, torque: float) -> None:
         )
 
 
-def _by_current(drive: KnownDrive, way: float) -> float:
+def _sides(drive: KnownDrive) -> list[tuple[float, float]]:
+    """Return what current and contour let a drive hold, forward and backward, as sizes."""
+    loose = [b.name for b in drive.plant.bodies if not b.prescribed and b.name != drive.body.name]
+    if loose:
+        raise ArrangementError(
+            f"body '{loose[0]}'", "moves freely, so no torque can be held in the spring",
+            next_step="fix the load, or prescribe its motion",
+        )  # fmt: skip
+    by_current = _by_current(drive)
+    return [(by_current(way), _by_contour(drive, way)) for way in (1.0, -1.0)]
+
+
+def _by_current(drive: KnownDrive) -> Callable[[float], float]:
     """Return the size of the torque against which the largest current just creeps on, forward or backward."""
     plant, effort = drive.plant, series_spring(drive.plant).effort
     opened = cut(plant, [effort])
     states, inputs = opened.start(opened.states), opened.start(opened.inputs)
     names, places = [v.name for v in opened.states], [v.name for v in opened.inputs]
-    states[names.index(drive.body.rate)] = way * SLOW
-    inputs[places.index(drive.names.current)] = way * plant.values[drive.motor.current_limit]
-    against = way * math.copysign(1.0, drive.spring_turns_value)
+    rate, numbers = names.index(drive.body.rate), opened.start(opened.parameters)
 
-    def pushes_on(torque: float) -> bool:
-        inputs[places.index(effort)] = against * torque
-        return way * opened.evaluate(list(states), list(inputs))[f"der({drive.body.rate})"] > 0.0
+    def largest(way: float) -> float:
+        states[rate] = way * SLOW
+        inputs[places.index(drive.names.current)] = way * plant.values[drive.motor.current_limit]
+        against = way * math.copysign(1.0, drive.spring_turns_value)
 
-    if not pushes_on(0.0):
-        return 0.0
-    low, high = 0.0, 1.0
-    while pushes_on(high) and math.isfinite(high):
-        low, high = high, 2.0 * high
-    while high - low > 1e-12 * high:
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if pushes_on(middle) else (low, middle)
-    return low
+        def pushes_on(torque: float) -> bool:
+            inputs[places.index(effort)] = against * torque
+            slopes = opened.equations(0.0, states, inputs, numbers, opened.look_up(states, inputs))[0]
+            return way * float(slopes[rate]) > 0.0
+
+        if not pushes_on(0.0):
+            return 0.0
+        low, high = 0.0, 1.0
+        while pushes_on(high) and math.isfinite(high):
+            low, high = high, 2.0 * high
+        while high - low > 1e-12 * high:
+            middle = (low + high) / 2.0
+            low, high = (middle, high) if pushes_on(middle) else (low, middle)
+        return low
+
+    return largest
 
 
 def _by_contour(drive: KnownDrive, way: float) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....model import FlatModel, Variable
 from ....model.roles import with_declared_reading
+from .command_limits import with_command_limits
 from .known_drive import KnownDrive, voltage_is_limited
 from .law_writer import DESIRED, LawWriter
 from .law_writer import LoopNames as LoopNames
@@ -167,7 +168,7 @@ def torque_controller(
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{supply}"
     model = writer.model("torque_controller", description, (output, motor.current))
-    return _with_declared_angle(model, plant, names.angle)
+    return with_command_limits(_with_declared_angle(model, plant, names.angle), plant)
 
 
 def _with_declared_angle(controller: FlatModel, plant: FlatModel, angle: str) -> FlatModel:
