@@ -26,6 +26,7 @@ from nlsdesign.export.c.guarded_step import (
     INPUT_SATURATED,
     INPUT_STALE,
     OUT_OF_TABLE,
+    PARAMETER_REFUSED,
     RECOVERED,
     STATE_RESTARTED,
     WAITING,
@@ -354,6 +355,26 @@ def test_one_sample_of_the_command_is_named_and_soon_forgotten(law: str) -> None
         apart = np.abs(torques - undisturbed)
         assert np.max(apart[FAULTY + math.ceil(5.0 * time_constant(cascade()) / 1e-3) :]) < 0.05
         assert np.max(apart) < 0.5
+
+
+def test_parameters_of_a_joined_step_say_whom_they_reach(tmp_path: Path) -> None:
+    """A higher current limit let the observer, which believes 20 A at most, err by 15 rad/s with status 0."""
+    both = joined(cascade(), nls.torque_controller(plant(), law=ScheduledTorque()))
+    numbers = {v.name: v for v in both.parameters}
+    limit = numbers.pop("motor.current_limit")
+    assert (limit.start, limit.maximum) == (20.0, 20.0)
+    for name, v in numbers.items():
+        assert ("controller only" in v.description) == (not name.startswith("controller."))
+    source = nls.export_c(both, tmp_path, real="float")
+    step, values = CompiledStep(source), [v.start for v in both.parameters]
+    place = [v.name for v in both.parameters].index("motor.current_limit")
+    values[place] = 10.0
+    assert step.set_parameters(values) == 0
+    values[place] = 40.0
+    assert step.set_parameters(values) & PARAMETER_REFUSED
+    # Two tables over one range of one angle are one question.
+    (line,) = (line for line in source.source.read_text().splitlines() if "OUT_OF_TABLE : 0u" in line)
+    assert line.count("<") == line.count(">") == 1
 
 
 def test_both_are_the_observer_and_the_controller_with_the_current_between() -> None:

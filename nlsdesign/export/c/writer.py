@@ -308,11 +308,10 @@ def step_body(c: CWriter) -> tuple[list[str], set[int]]:
         for letter, group in ((_MISSED, gap), (_DERIVED, numbers))
     ]
     tables, statements = c.equation_lines(function, further, targets)
-    ranges = dict.fromkeys((c.arguments[table.argument], *table.ends) for table in c.model.tables)
-    beyond = " || ".join(
-        f"{argument} < {real.literal(first)} || {argument} > {real.literal(last)}"
-        for argument, first, last in ranges
+    ranges = dict.fromkeys(
+        (c.arguments[table.argument], *map(real.literal, table.ends)) for table in c.model.tables
     )
+    beyond = " || ".join(f"{argument} < {first} || {argument} > {last}" for argument, first, last in ranges)
     flag = [f"status |= ({beyond}) ? {c.name.upper()}_OUT_OF_TABLE : 0u;"] if beyond else []
     missed, derived = (sorted(named_indices(statements, letter)) for letter in (_MISSED, _DERIVED))
     one, zero = real.literal(1.0), real.literal(0.0)

@@ -17,6 +17,7 @@ from ...model.roles import moved_load, series_spring
 from ...model.transform import with_signal
 from ...simulation import Trace, range_warnings
 from ...simulation.sampled_batch import PLANT, BatchTrace, SampledSystem, run_batch
+from .laws.law_writer import GAIN
 from .laws.torque_loop import LoopNames, loop_names
 
 ACTING = "acting"
@@ -67,7 +68,7 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
     wiring = _Wiring(observer, controller, _driven(observer, controller))
     inputs, waiting = wiring.inputs(), _waiting(wiring.driven, delay)
     states = (*observer.states, *controller.states, *waiting)
-    parameters = (*observer.parameters, *controller.parameters)
+    parameters = (*observer.parameters, *wiring.controller_only())
     outputs = (*observer.outputs, *controller.outputs)
     tables = (*observer.tables, *controller.tables)
     for group in ((*states, *inputs), parameters, outputs):
@@ -112,6 +113,21 @@ class _Wiring:
                 did_you_mean=nearest(self.controller.inputs[0].name, list(given)),
             )  # fmt: skip
         return (*own, *wishes)
+
+    def controller_only(self) -> tuple[Variable, ...]:
+        """Return the parameters of the controller: those of the plant say that the observer keeps its own.
+
+        What limits the driven output can only be lowered: the observer believes no more than that.
+        """
+        limits = (-self.driven.minimum, self.driven.maximum)
+        said = []
+        for v in self.controller.parameters:
+            if not v.name.startswith(f"{GAIN}."):
+                is_limit = v.unit == self.driven.unit and v.start in limits
+                words = f"{v.description}; controller only: the observer keeps the number of its design"
+                v = replace(v, maximum=v.start) if is_limit else replace(v, description=words)
+            said.append(v)
+        return tuple(said)
 
     def _measured(self, variable: Variable) -> Variable:
         """Return an input whose reading is moved by what acts, now a state."""
