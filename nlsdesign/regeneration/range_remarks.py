@@ -9,6 +9,7 @@ import numpy as np
 
 from ..components import Assembly
 from ..feedback.analysis import ranges_at_rest
+from ..feedback.control.laws.command_limits import rate_remarks
 from ..feedback.observer.scheduling.scheduled import whole_contour
 from ..foundation.errors import NlsError, UnitError
 from ..foundation.quantity import typeset_unit
@@ -42,7 +43,7 @@ def range_remarks(
     except NlsError:
         # Without an angle to go over, or a rest on it, whoever goes over it says what is wrong.
         return []
-    remarks = [] if last is None else beyond_contour(model, (angles[0], high))
+    remarks = rate_remarks(model) if last is None else beyond_contour(model, (angles[0], high))
     for warning in left_ranges:
         part = declared[warning.part]
         law = type(getattr(part, "element", part)).__name__

@@ -38,6 +38,7 @@ from nlsdesign.feedback.control import (
     largest_torque,
     torque_controller,
 )
+from nlsdesign.feedback.control.laws.command_limits import largest_speed, rate_remarks
 from nlsdesign.feedback.control.laws.known_drive import torque_limit
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
@@ -401,6 +402,29 @@ def test_a_command_has_the_range_and_the_rate_of_the_drive() -> None:
     assert sorted((pull.minimum, pull.maximum), key=abs) == pytest.approx([0.0, largest_torque(cable)])
     loose = wished(flatten(ob.actuator(load=Inertia(inertia=1e-3))))
     assert (loose.minimum, loose.maximum, loose.largest_rate) == (-math.inf, math.inf, math.inf)
+
+
+def test_a_declared_rate_below_what_the_drive_reaches_is_remarked() -> None:
+    """By hand: J·ω²/2 = τ·(θ − θ₀) + k·(θ₀² − θ²)/2; a simulation loses some to the rubber."""
+    deck = flatten(declare(load_deck("austin2015_soft_spring")))
+    stiffness, most = 1.7, 20.0 * ob.CONSTANT - 0.02 - ob.DAMPING
+    end = math.pi / 2.0
+    by_hand = math.sqrt(
+        2.0 / 5.97e-4 * (most * 2.0 * end)
+    )  # both ends of ±90° before k·θ = τ, energies alike
+    assert most / stiffness > end
+    assert largest_speed(deck) == pytest.approx(by_hand, rel=1e-9)
+
+    plant = flatten(declare(load_deck("austin2015_figure_consistent")))
+    reversed_ = simulate(
+        plant, np.linspace(0.0, 1.05, 10501),
+        inputs={"motor.current": lambda t: -20.0 * min(1.0, t / 0.4) if t < 1.0 else 20.0},
+    )["motor.speed"].max()  # fmt: skip
+    assert reversed_ < largest_speed(plant) < 1.05 * reversed_
+    (remark,) = rate_remarks(plant)
+    assert "95 rad/s, the drive reaches 171.4 rad/s" in remark
+    assert "declare at least 172 rad/s" in remark
+    assert rate_remarks(plant.with_values({"motor_encoder.largest_rate": 172.0})) == []
 
 
 def test_the_end_of_the_contour_limits_too() -> None:

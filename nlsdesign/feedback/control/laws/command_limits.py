@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ....foundation.arrays import Array
 from ....foundation.errors import NlsError
 from ....model import FlatModel
 from ....model.roles import declared_reading
-from .known_drive import KnownDrive, torque_range
+from .known_drive import KnownDrive, torque_range, torques_by_current, voltage_is_limited
 from .outer_laws import stiffness_table
 
 
@@ -46,3 +47,61 @@ def _largest_rate(drive: KnownDrive) -> float:
     if limits is None:
         return math.inf
     return float(np.max(stiffness_table(drive).values)) * abs(drive.spring_turns_value) * limits[2]
+
+
+def largest_speed(plant: FlatModel) -> float:
+    """Return the speed in rad/s that the motor can reach on its contour when its largest current is reversed.
+
+    From rest, as far as the current of one sign holds the spring, with that of the other sign, by energy:
+    J·ω²/2 = τ·(θ − θ₀) + E(θ₀) − E(θ). τ is what the current leaves beside friction, E what the spring at
+    rest holds. A supply of limited voltage turns the motor no faster than without load, U/k.
+
+    ``plant``: load held.
+    """
+    drive = KnownDrive(plant)
+    numbers = plant.evaluate(list(plant.start(plant.states))) | dict(plant.values)
+    table, turns = stiffness_table(drive), abs(drive.spring_turns_value)
+    deflections = table.grid * (turns if drive.spring_seen_at_the_motor else 1.0)
+    torques, held = _over(deflections, table.values[:, 0])
+    fastest = 0.0
+    for way, against in zip((1.0, -1.0), torques_by_current(plant), strict=True):
+        start = int(np.argmax(torques >= -against)) if way > 0.0 else _last(torques <= against)
+        energy = against * way * (deflections - deflections[start]) + held[start] - held
+        fastest = max(fastest, 2.0 * float(np.max(energy)) / numbers[drive.body.inertia or ""])
+    speed = math.sqrt(fastest)
+    if voltage_is_limited(drive):
+        turned = drive.motor.gear_ratio
+        constant = numbers[drive.motor.torque_constant] * (numbers[turned] if turned else 1.0)
+        speed = min(speed, numbers[f"{drive.body.name}.voltage_limit"] / constant)
+    return speed
+
+
+def _over(deflections: Array, slopes: Array) -> tuple[Array, Array]:
+    """Return torque at rest and energy over the deflections of a spring; both are 0 in the middle."""
+    results = [slopes]
+    for _ in range(2):
+        cells = (results[-1][1:] + results[-1][:-1]) / 2.0 * np.diff(deflections)
+        summed = np.concatenate([[0.0], np.cumsum(cells)])
+        results.append(summed - np.interp(0.0, deflections, summed))
+    return results[1], results[2]
+
+
+def _last(which: Array) -> int:
+    """Return the last place that is true."""
+    return len(which) - 1 - int(np.argmax(which[::-1]))
+
+
+def rate_remarks(plant: FlatModel) -> list[str]:
+    """Return that an encoder of the motor declares less speed than drive and spring can reach, if so."""
+    try:
+        angle = KnownDrive(plant).names.angle
+        limits, speed = declared_reading(plant, angle).limits, largest_speed(plant)
+    except NlsError:
+        return []  # without a series spring and a held load nothing is scheduled
+    if limits is None or speed <= limits[2]:
+        return []
+    return [
+        f"largest_rate of the encoder of {angle} is {limits[2]:.4g} rad/s, the drive reaches {speed:.4g} rad/s "
+        "when its largest current is reversed: good readings beyond the rate are refused -> declare at least "
+        f"{math.ceil(speed):g} rad/s, or a smaller current_limit"
+    ]

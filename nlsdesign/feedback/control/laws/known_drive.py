@@ -332,6 +332,12 @@ def check_torque(plant: FlatModel, torque: float) -> None:
         )
 
 
+def torques_by_current(plant: FlatModel) -> tuple[float, float]:
+    """Return the torques against which the largest current just creeps on, forward and backward, as sizes."""
+    by_current = _by_current(KnownDrive(plant))
+    return by_current(1.0), by_current(-1.0)
+
+
 def _sides(drive: KnownDrive) -> list[tuple[float, float]]:
     """Return what current and contour let a drive hold, forward and backward, as sizes."""
     loose = [b.name for b in drive.plant.bodies if not b.prescribed and b.name != drive.body.name]
