@@ -102,6 +102,6 @@ def rate_remarks(plant: FlatModel) -> list[str]:
         return []
     return [
         f"largest_rate of the encoder of {angle} is {limits[2]:.4g} rad/s, the drive reaches {speed:.4g} "
-        "rad/s when its largest current is reversed: good readings beyond the rate are refused -> declare at least "
-        f"{math.ceil(speed):g} rad/s, or a smaller current_limit"
+        "rad/s when its largest current is reversed: good readings beyond the rate are refused "
+        f"-> declare at least {math.ceil(speed):g} rad/s, or a smaller current_limit"
     ]
