@@ -21,10 +21,10 @@ from .certificates import (
     write_certificate,
 )
 from .certificates.held_estimate import held_assumptions as held_assumptions
-from .scheduling.angle_form import Minimal, PaperForm
+from .scheduling.angle_form import Minimal, PaperForm, StateForm
 from .scheduling.measured_angle import observe
 from .scheduling.scheduled import ObserverDesign, design_observer_with_details
-from .scheduling.step import CascadeGain, ConstantGain, PolePlacement, SteadyStateKalman
+from .scheduling.step import CascadeGain, ConstantGain, GainRule, PolePlacement, SteadyStateKalman
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
 from .scheduling.torque_grid import GridByTorqueError
 from .spread.choice import (
@@ -51,6 +51,7 @@ __all__ = [
     "CorrectedDesign",
     "DesignedObserver",
     "FixedGrid",
+    "GainRule",
     "Grid",
     "GridByTolerance",
     "GridByTorqueError",
@@ -61,6 +62,7 @@ __all__ = [
     "PaperForm",
     "PolePlacement",
     "SpreadErrors",
+    "StateForm",
     "SteadyStateKalman",
     "Trust",
     "certified_design",
