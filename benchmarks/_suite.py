@@ -160,6 +160,7 @@ SUITE = (
 
 ELSEWHERE = (
     ("Flash, memory and instructions on Cortex-M", "targets.md", "python -m benchmarks.targets"),
+    ("Start-up, installation and disk", "install.md", "python -m benchmarks.first_minute --install"),
     ("FMUs in foreign masters", "fmi_masters.md", "python -m benchmarks.foreign_masters"),
     ("Deviations from MISRA C", "misra.md", "python -m benchmarks.misra"),
     ("How often the diagnosis is right", "discrepancy.md", "python -m benchmarks.discrepancy_score"),

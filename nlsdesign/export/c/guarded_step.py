@@ -123,11 +123,6 @@ def reading_numbers(variable: Variable, sample_time: float, real: Real) -> Readi
     )
 
 
-def change_of_command(variable: Variable, sample_time: float, real: Real) -> float:
-    """Return the largest change of a command from sample to sample, the largest number where it has none."""
-    return min(variable.largest_rate * sample_time, real.largest)
-
-
 def mover(model: FlatModel, variable: Variable) -> tuple[str, int] | None:
     """Return the group, ``"inputs"`` or ``"states"``, and the index of what moves a measured reading."""
     name = variable.plausibility.moved_by if variable.plausibility is not None else None
@@ -246,10 +241,12 @@ class GuardedModel:
             usable = min(max(given, variable.minimum), variable.maximum)
             if usable != given:
                 status |= INPUT_SATURATED | index_bit(i)
-            followed = self._followed(i, usable)
-            if followed != usable:
-                status |= COMMAND_SLOWED | index_bit(i)
-            self._inputs[i] = followed
+            if self.begun:
+                change = variable.largest_rate * float(self.model.sample_time or 0.0)
+                followed = min(max(usable, self._inputs[i] - change), self._inputs[i] + change)
+                status |= COMMAND_SLOWED | index_bit(i) if followed != usable else 0
+                usable = followed
+            self._inputs[i] = usable
         for i, guard in self._guards.items():
             moved = self._movers[i]
             driver = 0.0
@@ -259,13 +256,6 @@ class GuardedModel:
             status |= flags | (index_bit(i) if flags else 0)
             resume = resume or again
         return status, resume
-
-    def _followed(self, i: int, usable: float) -> float:
-        """Return a command as near as it can be followed; the first one is taken as it is."""
-        if not self.begun:
-            return usable
-        change = change_of_command(self.model.inputs[i], float(self.model.sample_time or 0.0), self.real)
-        return min(max(usable, self._inputs[i] - change), self._inputs[i] + change)
 
     def _settled(self, state: Array, which: int) -> Array:
         if self.model.begin is None:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from math import inf
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -25,7 +26,6 @@ from .guarded_step import (
     GAP,
     MOST,
     ReadingNumbers,
-    change_of_command,
     index_bit,
     mover,
     reading_numbers,
@@ -245,7 +245,7 @@ def guard_functions(c: CWriter) -> list[str]:
     }
     wanted = {
         "controller_guard.c": len(c.model.inputs) > len(c.readings),
-        "controller_command.c": any(_is_slowed(v) for v in c.model.inputs),
+        "controller_command.c": any(v.largest_rate < inf for v in c.model.inputs if v.name not in c.readings),
         "controller_reading.c": bool(c.readings),
         "controller_parameter.c": bool(c.model.parameters),
     }
@@ -262,7 +262,12 @@ def take_statements(c: CWriter) -> list[str]:
         bit, taken = f"0x{index_bit(i):x}u, &status", f"&state->inputs.{path}"
         if v.name not in c.readings:
             limits = f"{real.bound(v.minimum)}, {real.bound(v.maximum)}"
-            commands.append(_command(c, v, f"inputs->{path}, {limits}", f"{taken}, {bit}"))
+            if v.largest_rate < inf:
+                # The first command is taken as it is, as fast as it may be.
+                change = real.bound(v.largest_rate * float(c.model.sample_time or 0.0))
+                limits += f", state->begun == 0u ? {real.bound(inf)} : {change}"
+            function = "followed" if v.largest_rate < inf else "usable"
+            commands.append(f"{function}(inputs->{path}, {limits}, {taken}, {bit});")
             continue
         number, _, driver = c.readings[v.name]
         remembered = f"&reading_{number}, &state->readings[{number}]"
@@ -276,19 +281,6 @@ def take_statements(c: CWriter) -> list[str]:
     }
     beginning = c.filled("controller_beginning.c", values).splitlines()
     return [*(commands + readings or ["(void)inputs;"]), *beginning]
-
-
-def _is_slowed(variable: Variable) -> bool:
-    return variable.plausibility is None and variable.largest_rate < float("inf")
-
-
-def _command(c: CWriter, variable: Variable, given: str, taken: str) -> str:
-    """Return the statement that takes a command, as fast as it is followed once the model has begun."""
-    if not _is_slowed(variable):
-        return f"usable({given}, {taken});"
-    change = c.real.literal(change_of_command(variable, float(c.model.sample_time or 0.0), c.real))
-    any_change = c.real.bound(float("inf"))
-    return f"followed({given}, state->begun == 0u ? {any_change} : {change}, {taken});"
 
 
 def step_body(c: CWriter) -> tuple[list[str], set[int]]:

@@ -120,14 +120,14 @@ class _Wiring:
         What limits the driven output can only be lowered: the observer believes no more than that.
         """
         limits = (-self.driven.minimum, self.driven.maximum)
-        said = []
+        parameters: list[Variable] = []
         for v in self.controller.parameters:
             if not v.name.startswith(f"{GAIN}."):
                 is_limit = v.unit == self.driven.unit and v.start in limits
                 words = f"{v.description}; controller only: the observer keeps the number of its design"
                 v = replace(v, maximum=v.start) if is_limit else replace(v, description=words)
-            said.append(v)
-        return tuple(said)
+            parameters.append(v)
+        return tuple(parameters)
 
     def _measured(self, variable: Variable) -> Variable:
         """Return an input whose reading is moved by what acts, now a state."""

@@ -26,7 +26,10 @@ def with_command_limits(controller: FlatModel, plant: FlatModel) -> FlatModel:
     drive = KnownDrive(plant)
     try:
         lowest, highest = torque_range(plant)
-        rate = _largest_rate(drive)
+        limits, rate = declared_reading(plant, drive.names.angle).limits, math.inf
+        if limits is not None:
+            slope = float(np.max(stiffness_table(drive).values))
+            rate = slope * abs(drive.spring_turns_value) * limits[2]
     except NlsError:
         return controller
     current = plant.values[drive.motor.current_limit]
@@ -39,14 +42,6 @@ def with_command_limits(controller: FlatModel, plant: FlatModel) -> FlatModel:
             v = replace(v, minimum=-rate, maximum=rate)
         inputs.append(v)
     return replace(controller, inputs=tuple(inputs))
-
-
-def _largest_rate(drive: KnownDrive) -> float:
-    """Return how fast the torque of the spring can change at rest, in N·m/s."""
-    limits = declared_reading(drive.plant, drive.names.angle).limits
-    if limits is None:
-        return math.inf
-    return float(np.max(stiffness_table(drive).values)) * abs(drive.spring_turns_value) * limits[2]
 
 
 def largest_speed(plant: FlatModel) -> float:
@@ -65,7 +60,11 @@ def largest_speed(plant: FlatModel) -> float:
     torques, held = _over(deflections, table.values[:, 0])
     fastest = 0.0
     for way, against in zip((1.0, -1.0), torques_by_current(plant), strict=True):
-        start = int(np.argmax(torques >= -against)) if way > 0.0 else _last(torques <= against)
+        start = (
+            int(np.argmax(torques >= -against))
+            if way > 0.0
+            else len(torques) - 1 - int(np.argmax(torques[::-1] <= against))
+        )
         energy = against * way * (deflections - deflections[start]) + held[start] - held
         fastest = max(fastest, 2.0 * float(np.max(energy)) / numbers[drive.body.inertia or ""])
     speed = math.sqrt(fastest)
@@ -84,11 +83,6 @@ def _over(deflections: Array, slopes: Array) -> tuple[Array, Array]:
         summed = np.concatenate([[0.0], np.cumsum(cells)])
         results.append(summed - np.interp(0.0, deflections, summed))
     return results[1], results[2]
-
-
-def _last(which: Array) -> int:
-    """Return the last place that is true."""
-    return len(which) - 1 - int(np.argmax(which[::-1]))
 
 
 def rate_remarks(plant: FlatModel) -> list[str]:

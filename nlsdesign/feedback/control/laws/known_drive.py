@@ -365,7 +365,9 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
 
         def pushes_on(torque: float) -> bool:
             inputs[places.index(effort)] = against * torque
-            slopes = opened.equations(0.0, states, inputs, numbers, opened.look_up(states, inputs))[0]
+            slopes = opened.equations(
+                0.0, states, inputs, numbers, opened.look_up(list(states), list(inputs))
+            )[0]
             return way * float(slopes[rate]) > 0.0
 
         if not pushes_on(0.0):
