@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from nlsdesign.bench.calibration import (
-    CalibrationRecords,
-    CalibrationTest,
     FreeRunTest,
     HungWeightTest,
     LoadCellTest,
     load_calibration,
 )
-from nlsdesign.bench.calibration.estimate import Estimate
+from nlsdesign.bench.calibration.bench_test import CalibrationTest
+from nlsdesign.bench.calibration.estimate import CalibrationRecords, Estimate
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck

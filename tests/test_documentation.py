@@ -434,6 +434,26 @@ def test_the_two_walks_name_the_lines_and_enter_no_room_twice(root: Path) -> Non
         assert len(entered) == len(set(entered)), entered
 
 
+@pytest.mark.parametrize(
+    ("page", "above", "room"),
+    [
+        ("decision.md", "| section | where |", "bench/discrepancy"),
+        ("architecture.md", "| what the model holds |", "export/c"),
+    ],
+)
+def test_tables_of_places_name_what_the_code_defines(root: Path, page: str, above: str, room: str) -> None:
+    text = (root / "docs" / page).read_text(encoding="utf-8")
+    rows = text[text.index(above) :].partition("\n\n")[0].splitlines()[2:]
+    places = [place for row in rows for place in re.findall(r"`([\w./]+)`", row.rpartition(" | ")[2])]
+    code = "".join(f.read_text("utf-8") for f in sorted((root / "nlsdesign" / room).rglob("*.py")))
+    files = [place for place in places if place.endswith(".py")]
+    names = [place.rpartition(".")[2] for place in places if place not in files]
+    found = [p for p in files if any((root / "nlsdesign" / r / p).exists() for r in ("", room))]
+    assert len(names) > 5
+    assert found == files
+    assert not [n for n in names if not re.search(rf"(def|class) {n}\b", code)]
+
+
 def test_messages_that_are_explained_are_messages_of_the_package(root: Path) -> None:
     page = (root / "docs" / "when_it_says.md").read_text(encoding="utf-8")
     messages = [

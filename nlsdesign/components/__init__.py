@@ -43,7 +43,7 @@ from .materials.loss_tangent import (
     measured_relaxation,
     peaked_relaxation,
 )
-from .materials.material_law import MaterialLaw, law_of, rubber_of
+from .materials.material_law import law_of, rubber_of
 from .materials.material_law import material_laws as material_laws
 from .materials.named_networks import (
     burgers,
@@ -186,7 +186,6 @@ __all__ = [
     "Mass",
     "MassOnArm",
     "Material",
-    "MaterialLaw",
     "NeoHooke",
     "NotDeclared",
     "Ogden",

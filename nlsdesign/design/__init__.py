@@ -1,7 +1,7 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
 from ..foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
-from .curves.compliance import OddSpring, OneSidedSpring, SpringSymmetry, TwoBranchSpring
+from .curves.compliance import OddSpring, OneSidedSpring, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.target import (
     ExponentialTorque,
@@ -91,7 +91,7 @@ from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import cam_from_profile, contour_of_cam
 from .statics.equilibrium import elastic_law, equilibrium_torque
-from .tolerance.causes import Cause, MaterialScatter, OneBatch, SeparateModuli, SpreadRules
+from .tolerance.causes import Cause, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
 from .tolerance.trimming import Trim
@@ -125,7 +125,6 @@ __all__ = [
     "MachinedCam",
     "MachinedOneSidedCam",
     "MachinedTwoSidedCam",
-    "MaterialScatter",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumLastingStrain",
@@ -138,7 +137,6 @@ __all__ = [
     "NormalSpread",
     "NumberRange",
     "OddSpring",
-    "OneBatch",
     "OneNumber",
     "OneSidedSpring",
     "OverTravel",
@@ -155,7 +153,6 @@ __all__ = [
     "Spread",
     "SpreadRules",
     "SpringLimits",
-    "SpringSymmetry",
     "Stock",
     "TabulatedStiffness",
     "TabulatedTorque",

@@ -1,4 +1,4 @@
-"""Fixed C shells, and atomic writing of several files."""
+"""Fixed C templates, and atomic writing of several files."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ BROKEN_ARCHIVE = (
 _PLACEHOLDER = re.compile(r"^(?P<indent> *)@(?P<row>\w+)@\n|@(?P<name>\w+)@", re.MULTILINE)
 
 
-def shell(name: str) -> str:
-    """Return the text of a fixed shell."""
-    return (files(__package__) / "shells" / name).read_text(encoding="utf-8")
+def template(name: str) -> str:
+    """Return the text of a fixed template."""
+    return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
 
 
 def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
-    """Return a shell with its ``@name@`` placeholders replaced.
+    """Return a template with its ``@name@`` placeholders replaced.
 
     ``values``: by name of the placeholder: a text, or rows where the placeholder is a line of its own. Rows
     get the indentation of that line; without rows the line is left out.
@@ -38,13 +38,13 @@ def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
     def replacement(match: re.Match[str]) -> str:
         key = match["row"] or match["name"]
         if key not in values:
-            raise ExportError(f"shell '{name}'", f"has a placeholder '{key}' without a value")
+            raise ExportError(f"template '{name}'", f"has a placeholder '{key}' without a value")
         value = values[key]
         if isinstance(value, str):
             return match[0].replace(f"@{key}@", value)
         return "".join(f"{match['indent']}{row}\n" if row else "\n" for row in value)
 
-    return _PLACEHOLDER.sub(replacement, shell(name))
+    return _PLACEHOLDER.sub(replacement, template(name))
 
 
 def write_all(texts: Mapping[Path, str]) -> None:

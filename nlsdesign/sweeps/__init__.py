@@ -3,7 +3,7 @@
 The report of a sweep and the command import it. It decides no physics: questions ask the rooms below.
 """
 
-from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axes import GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import Subject
 from .point_deck import point_deck_text as point_deck_text
 from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
@@ -19,12 +19,11 @@ from .sweep_columns import SweepColumn
 from .sweep_columns import libraries as libraries
 from .sweep_file import read_sweep_file as read_sweep_file
 from .sweep_folder import standing_points as standing_points
-from .sweep_question import FunctionQuestion, SweepQuestion
+from .sweep_question import FunctionQuestion
 from .sweep_table import SweepTable, read_sweep
 
 __all__ = [
     "AngleQuestion",
-    "AxisSet",
     "DesignQuestion",
     "DiagnosisQuestion",
     "FunctionQuestion",
@@ -42,7 +41,6 @@ __all__ = [
     "SpreadQuestion",
     "Subject",
     "SweepColumn",
-    "SweepQuestion",
     "SweepTable",
     "SweepTask",
     "read_sweep",

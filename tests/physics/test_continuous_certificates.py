@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.feedback.observer import (
     Certificate,
-    ContinuousContraction,
     Minimal,
     PaperForm,
     certify_continuous,
@@ -25,6 +24,7 @@ from nlsdesign.feedback.observer import (
     verify,
     write_certificate,
 )
+from nlsdesign.feedback.observer.certificates.continuous import ContinuousContraction
 from nlsdesign.feedback.observer.certificates.error_system import hull
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck

@@ -21,7 +21,6 @@ from nlsdesign.feedback.observer import (
     Assumptions,
     CascadeGain,
     FixedGrid,
-    HeldEstimate,
     Trust,
     certify_held_estimate,
     design_adaptive_observer,
@@ -30,7 +29,7 @@ from nlsdesign.feedback.observer import (
     verify,
     write_certificate,
 )
-from nlsdesign.feedback.observer.certificates.held_estimate import held_estimate_bound
+from nlsdesign.feedback.observer.certificates.held_estimate import HeldEstimate, held_estimate_bound
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.model import FlatModel, flatten

@@ -5,16 +5,14 @@ It never adds an effect to a machine: what does not fit is refused, or widens wh
 """
 
 from .bench_test import KINDS as KINDS
-from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, Instruments, LoadCellTest
+from .bench_test import FreeRunTest, HungWeightTest, Instruments, LoadCellTest
 from .calibrated_deck import calibrated, read_joint_numbers, shown_numbers, write_calibration
-from .estimate import CalibrationRecords, estimate, load_calibration
+from .estimate import estimate, load_calibration
 from .estimate import record_findings as record_findings
 from .plan import CalibrationPlan, what_calibration_buys, write_plan
 
 __all__ = [
     "CalibrationPlan",
-    "CalibrationRecords",
-    "CalibrationTest",
     "FreeRunTest",
     "HungWeightTest",
     "Instruments",

@@ -5,7 +5,7 @@ from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
 from .planning.candidate_commands import MachineLimits
-from .planning.experiment import Experiment, next_experiment, write_command
+from .planning.experiment import next_experiment, write_command
 from .reporting.refit import Refit, refit
 from .reporting.refit import refit_of_run as refit_of_run
 from .reporting.verdict import Verdict
@@ -17,7 +17,6 @@ __all__ = [
     "ALL",
     "Candidate",
     "Effect",
-    "Experiment",
     "MachineLimits",
     "Refit",
     "Unknown",

@@ -26,7 +26,7 @@ from ...model.origin import derived
 from ..identification.equation_error.block import Block
 from ..identification.equation_error.block_noise import LEAST_COVERED
 from ..identification.equation_error.evidence import Bench
-from ..identification.equation_error.told_sampling import nothing
+from ..identification.equation_error.inferred_sampling import no_terms
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from .effects import Candidate
@@ -121,7 +121,7 @@ def diagnose(
     case, base = case.read_as_declared(case.comparison.base(actuator))
     effects = known_effects() if catalogue is None else catalogue
     outcome, decision = _decided(case, base, effects, progress)
-    again = case.read_as_told_beside(outcome)
+    again = case.read_as_inferred_beside(outcome)
     if again is not None:
         progress("reading inputs between their samples as they run beside what is named")
         case = again
@@ -157,7 +157,7 @@ class _Case:
         before = self.excesses(base)
         if _leaves_nothing(before):
             return self, base
-        other = self._read_as(self.bench.inferred(self._blocks(self.actuator), nothing), 0.0)
+        other = self._read_as(self.bench.inferred(self._blocks(self.actuator), no_terms), 0.0)
         if other is None:
             return self, base
         again = other.comparison.base(self.actuator)
@@ -166,7 +166,7 @@ class _Case:
         explains = _leaves_nothing(after) and least >= self.criteria.closed_share
         return (other, again) if explains else (self, base)
 
-    def read_as_told_beside(self, outcome: Outcome) -> _Case | None:
+    def read_as_inferred_beside(self, outcome: Outcome) -> _Case | None:
         """Return the case with inputs read between their samples as records tell it beside what is named.
 
         Backlash that nobody declared, for instance, hides at first that a current is held. Nothing is

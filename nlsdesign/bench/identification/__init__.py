@@ -8,7 +8,6 @@ and the rooms above may import it. It never changes the structure of a model.
 from .least_squares import Huber, Loss, Squares
 from .multiple_shooting import (
     Prediction,
-    SimulatedFit,
     coloured_sigma,
     fit_by_simulation,
     predict_in_windows,
@@ -31,7 +30,6 @@ __all__ = [
     "Record",
     "RecordSet",
     "Shots",
-    "SimulatedFit",
     "Squares",
     "Weights",
     "agreement",

@@ -60,13 +60,7 @@ class MaterialLaw:
         return law.members[0][1] if isinstance(law, QuasilinearRelaxation) else law
 
     def in_place_of(self, piece: Specimen) -> Specimen:
-        """Return a piece of this rubber in the sizes of another.
-
-        Parameters
-        ----------
-        piece
-            Its section and rest length stay.
-        """
+        """Return a piece of this rubber with section and rest length of another."""
         return replace(piece, members=self.members, strength=self.strength)
 
     def __str__(self) -> str:

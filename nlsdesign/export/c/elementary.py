@@ -4,7 +4,7 @@ Libraries of mathematics differ in the last digit, and not every controller has 
 products, quotients and comparisons alone, and of ``math.h`` what has only one right answer: ``fabs``,
 ``copysign``, ``floor``, ``fmod`` and ``sqrt``. So the code on the controller and its FMU on the desk give the
 same bits, provided the compiler forms no fused multiply-add (``-ffp-contract=off``). Their errors, in units
-of the last place, stand at each function in the shell ``elementary.c``; tests hold them.
+of the last place, stand at each function in the template ``elementary.c``; tests hold them.
 
 Arguments are reduced as in Cody and Waite 1980 (Software Manual for the Elementary Functions): constants such
 as ln 2 stand in several parts, whose products with a small integer are exact.
@@ -20,7 +20,7 @@ from fractions import Fraction
 from functools import lru_cache
 from types import MappingProxyType
 
-from ..files import filled, shell
+from ..files import filled, template
 from .c_text import Real
 
 _LN2 = Fraction("0.693147180559945309417232121458176568075500134360255254120680009493")
@@ -136,7 +136,7 @@ _VARIABLE = {"exp": "r", "erfc": "t"}
 @lru_cache(maxsize=1)
 def own_functions() -> frozenset[str]:
     """Return the names of the functions of ``math.h`` that ours replace."""
-    return frozenset(re.findall(r"^static .* portable_(\w+)@f@\(", shell("elementary.c"), re.MULTILINE))
+    return frozenset(re.findall(r"^static .* portable_(\w+)@f@\(", template("elementary.c"), re.MULTILINE))
 
 
 def elementary_functions(real: Real, lines: Iterable[str]) -> list[str]:
@@ -156,7 +156,7 @@ def _called(text: str, real: Real) -> set[str]:
 
 @lru_cache(maxsize=2)
 def _definitions(real: Real) -> tuple[str, Mapping[str, str]]:
-    """Return the head of the shell, and the text of each function, each defined before it is used."""
+    """Return the head of the template, and the text of each function, each defined before it is used."""
     single = real is Real.FLOAT
     numbers = {
         "real": real,
@@ -183,7 +183,7 @@ def _format(single: bool) -> tuple[int, int, float]:
 
 
 def _integers(single: bool) -> dict[str, int]:
-    """Return the whole numbers of the shell."""
+    """Return the whole numbers of the template."""
     digits, bias, shift = _format(single)
     return {
         "digits": digits,
@@ -196,7 +196,7 @@ def _integers(single: bool) -> dict[str, int]:
 
 
 def _reals(real: Real) -> dict[str, float]:
-    """Return the floating-point numbers of the shell."""
+    """Return the floating-point numbers of the template."""
     single = real is Real.FLOAT
     digits, bias, shift = _format(single)
     ln2 = _parts(_LN2, 15 if single else 41, parts=2)

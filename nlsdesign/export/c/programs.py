@@ -20,7 +20,7 @@ DOUBLE_TOLERANCE = 1e-12
 FLOAT_TOLERANCE = 2e-4
 """The same for float: some 3000 times its rounding error of 6e-8. This covers the rounding of a few
 hundred operations, accumulated by stable poles over some ten samples, and still reveals a wrong term."""
-ROUNDINGS, MOST = 8.0, 10.0
+ROUNDINGS, WIDENING = 8.0, 10.0
 """Difference that one rounding of each state per sample makes, times this, is allowed where it is more: a
 state is the sum of some tens of terms. At most so often the tolerances above, for a rounding at a corner can
 tip it, and nothing would be compared."""
@@ -80,7 +80,7 @@ def selftest_source(c: CWriter) -> str:
         for k, row in enumerate(inputs.tolist()):
             carried = np.maximum(carried, np.abs(np.array(run.step(row)[0]) - outputs[k]))
             run.state = run.state * (1.0 + real.epsilon * np.sign(np.sin(1.7 * (k + 1.0) * number + first)))
-    allowed = np.clip(ROUNDINGS * carried, relative * size, MOST * relative * size)
+    allowed = np.clip(ROUNDINGS * carried, relative * size, WIDENING * relative * size)
     tolerance = [float(v) + real.epsilon**2 for v in allowed]
     values = {
         "samples": str(len(results)),
@@ -138,6 +138,6 @@ def write_examples(source: CSource) -> list[Path]:
         "CMakeLists.txt": "CMakeLists.txt",
         f"{name}.mk": "example.mk",
     }
-    texts = {folder / file: filled(shell, values) for file, shell in files.items()}
+    texts = {folder / file: filled(template, values) for file, template in files.items()}
     write_all(texts)
     return list(texts)

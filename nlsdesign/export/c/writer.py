@@ -164,10 +164,10 @@ class CWriter:
         results = ca.substitute([ca.densify(s.derivative), ca.densify(s.output)], [s.input], [used])
         return StepEquations(s, gap, *_without_parameter_numbers(results, s.parameter))
 
-    def filled(self, shell: str, values: Mapping[str, str | Sequence[str]]) -> str:
+    def filled(self, template: str, values: Mapping[str, str | Sequence[str]]) -> str:
         """Return a fixed text with the names of the model and the number type, and further values."""
         return filled(
-            shell,
+            template,
             {"name": self.name, "NAME": self.name.upper(), "real": self.real, "zero": self.real.literal(0.0)}
             | dict(values),
         )
@@ -249,7 +249,7 @@ def guard_functions(c: CWriter) -> list[str]:
         "controller_reading.c": bool(c.readings),
         "controller_parameter.c": bool(c.model.parameters),
     }
-    texts = [c.filled(shell, values) for shell, is_wanted in wanted.items() if is_wanted]
+    texts = [c.filled(template, values) for template, is_wanted in wanted.items() if is_wanted]
     return [line for text in texts for line in (*text.splitlines(), "")]
 
 

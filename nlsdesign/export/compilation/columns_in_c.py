@@ -17,7 +17,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...simulation.column_graph import Call, ColumnGraph, Operation, TableReading
-from ..files import filled, shell
+from ..files import filled, template
 
 WIDTH = 8
 """Columns that are computed together."""
@@ -109,7 +109,7 @@ def sampled_run_in_c(graph: ColumnGraph) -> ColumnsInC:
     """Return C code of a run of samples, for many columns."""
     written = [filled("columns.c", {"width": str(WIDTH)})]
     if graph.tables:
-        written.append(shell("columns_look_up.c"))
+        written.append(template("columns_look_up.c"))
     used = {
         step.code for each in (graph, *graph.bodies) for step in each.steps if isinstance(step, Operation)
     }

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from ...foundation.errors import ExportError, unknown_name
 from ...foundation.processes import run_to_end, usual_temporary_folder
-from ..files import shell
+from ..files import template
 
 STRICT = (
     "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wfloat-equal",
@@ -171,9 +171,9 @@ def compile_library(
 
 
 def _windows(folder: Path) -> list[str | Path]:
-    """Return arguments that omit the start-up code of Windows libraries, see the shell for the reason."""
+    """Return arguments that omit the start-up code of Windows libraries, see the template for the reason."""
     start = folder / "windows.c"
-    start.write_text(shell("windows.c"), encoding="utf-8")
+    start.write_text(template("windows.c"), encoding="utf-8")
     home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent
     headers = home / "lib" / "libc" / "include" / "any-windows-any"
     return ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]

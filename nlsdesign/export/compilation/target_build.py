@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ...foundation.errors import ExportError
 from ..c.writer import CSource
-from ..files import filled, shell
+from ..files import filled, template
 from .cross_compiler import STRICT, run_compiler
 from .processors import Processor
 
@@ -84,7 +84,7 @@ _OWN = ("-std=gnu99",)
 def controller_object(source: CSource, processor: Processor, folder: Path) -> Path:
     """Compile the generated code alone, under the warnings that it must pass."""
     for name in ("math.h", "string.h"):
-        (folder / name).write_text(shell(f"target_{name}"), encoding="utf-8")
+        (folder / name).write_text(template(f"target_{name}"), encoding="utf-8")
     target = folder / f"{source.name}.o"
     run_compiler(
         [*_machine(processor), *_COMMON, *STRICT, "-isystem", folder, "-c", source.source, "-o", target],
@@ -101,10 +101,10 @@ def image(
     main: str,
     values: Mapping[str, str | Sequence[str]],
 ) -> Path:
-    """Link the controller with a main program from a shell."""
+    """Link the controller with a main program from a template."""
     (folder / "run.c").write_text(filled(main, {"name": source.name, **values}), encoding="utf-8")
     for name in ("target_start.c", "target_link.ld", "target.h"):
-        (folder / name).write_text(shell(name), encoding="utf-8")
+        (folder / name).write_text(template(name), encoding="utf-8")
     target = folder / f"{source.name}.elf"
     include: list[str | Path] = ["-isystem", folder, "-I", source.header.parent.resolve()]
     files = [folder / "target_start.c", folder / "run.c", folder / f"{source.name}.o"]

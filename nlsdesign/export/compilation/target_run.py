@@ -77,7 +77,7 @@ def emulated(image: Path, processor: Processor) -> list[list[int]]:
 
 
 _NS_PER_TICK = 40  # the clock of the boards runs at 25 MHz, an instruction takes 1 ns
-_KNOWN, _NOTHING = 2003, 2  # instructions of the two functions of the shell
+_KNOWN, _NOTHING = 2003, 2  # instructions of the two functions of the template
 
 
 @dataclass(frozen=True, eq=False)

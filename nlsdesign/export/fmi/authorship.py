@@ -35,7 +35,7 @@ class Authorship:
     Parameters
     ----------
     author, copyright, licence
-        As text; without a licence that of the shells is named.
+        As text; without a licence that of the templates is named.
     version
         Of the model; by default the first digits of the deck's digest.
     date

@@ -33,7 +33,7 @@ from ..compilation.cross_compiler import (
     compile_library,
     flags_of_environment,
 )
-from ..files import shell
+from ..files import template
 from .authorship import Authorship, with_origin
 from .fmu_documentation import icon, page
 from .fmu_sources import fmu_sources, main_source
@@ -98,7 +98,7 @@ def _compiler() -> bytes:
     except importlib.metadata.PackageNotFoundError:
         version = ""  # the compiler itself says that it is missing, where it is needed
     digest = hashlib.sha256(f"{version}\0".encode())
-    digest.update(Path(cross_compiler.__file__).read_bytes() + shell("windows.c").encode())
+    digest.update(Path(cross_compiler.__file__).read_bytes() + template("windows.c").encode())
     for header in sorted(fmi_headers().glob("*.h")):
         digest.update(header.read_bytes())
     return digest.digest()
@@ -218,7 +218,7 @@ def fmu_texts(
     texts = {path: text.replace(_TOKEN, token) for path, text in sources.items()}
     texts["modelDescription.xml"] = description(token, about)
     texts["documentation/index.html"] = page(variables, about)
-    texts["documentation/licenses/license.txt"] = shell("license.txt")
+    texts["documentation/licenses/license.txt"] = template("license.txt")
     if version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(variables)
         texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(variables)

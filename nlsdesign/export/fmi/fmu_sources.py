@@ -1,4 +1,4 @@
-"""The C sources of an FMU: generated equations in fixed shells."""
+"""The C sources of an FMU: generated equations in fixed templates."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..c.controller_code import check_discrete, header_text, source_text
 from ..c.instructions import print_statements
 from ..c.table_lookup import look_up, look_up_slopes
 from ..c.writer import CWriter, named_indices, step_body
-from ..files import filled, shell
+from ..files import filled, template
 from .fmu_variables import FmuLayout
 
 
 def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
-    """Return the sources by file name; the shell ``fmi2.c`` or ``fmi3.c`` is the only one to be compiled."""
+    """Return the sources by file name; only the template ``fmi2.c`` or ``fmi3.c`` is to be compiled."""
     model = layout.model
     main = main_source(version)
-    texts = {name: shell(name) for name in (main, "instance.c", "exchange.c", "saved_state.c")}
+    texts = {name: template(name) for name in (main, "instance.c", "exchange.c", "saved_state.c")}
     if model.sample_time is None:
         if model.tables:
             raise ExportError(
@@ -29,7 +29,7 @@ def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
             )
         body = _continuous(layout)
         texts |= {
-            name: shell(name)
+            name: template(name)
             for name in ("integrator.c", *(("events.c", "switched.c") if layout.modes else ()))
         }
     else:

@@ -29,7 +29,7 @@ def model_description(
 ) -> str:
     """Return ``modelDescription.xml``.
 
-    ``authorship``: author, licence and date; nothing but the licence of the shells by default.
+    ``authorship``: author, licence and date; nothing but the licence of the templates by default.
     """
     model, two = layout.model, version == "2.0"
     root = _element(

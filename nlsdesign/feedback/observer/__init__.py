@@ -3,16 +3,13 @@
 from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
 from .adaptive.corrected_cascade import CorrectedDesign, design_corrected_observer
 from .adaptive.duty_and_directions import AdaptiveSettings, Trust
-from .adaptive.estimator_bound import EstimatorBound, estimator_bound
+from .adaptive.estimator_bound import estimator_bound
 from .certificates import (
     Assumptions,
     Certificate,
     CertifiedGain,
     CodeToCompare,
-    ContinuousContraction,
     Contraction,
-    HeldEstimate,
-    Verification,
     certified_design,
     certify,
     certify_continuous,
@@ -26,7 +23,7 @@ from .certificates import (
 from .certificates.held_estimate import held_assumptions as held_assumptions
 from .scheduling.angle_form import Minimal, PaperForm, StateForm
 from .scheduling.measured_angle import observe
-from .scheduling.scheduled import ErrorStability, ObserverDesign, design_observer_with_details
+from .scheduling.scheduled import ObserverDesign, design_observer_with_details
 from .scheduling.step import CascadeGain, ConstantGain, GainRule, PolePlacement, SteadyStateKalman
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
 from .scheduling.torque_grid import GridByTorqueError
@@ -50,18 +47,14 @@ __all__ = [
     "CertifiedGain",
     "CodeToCompare",
     "ConstantGain",
-    "ContinuousContraction",
     "Contraction",
     "CorrectedDesign",
     "DesignedObserver",
-    "ErrorStability",
-    "EstimatorBound",
     "FixedGrid",
     "GainRule",
     "Grid",
     "GridByTolerance",
     "GridByTorqueError",
-    "HeldEstimate",
     "Minimal",
     "ObserverBench",
     "ObserverDesign",
@@ -72,7 +65,6 @@ __all__ = [
     "StateForm",
     "SteadyStateKalman",
     "Trust",
-    "Verification",
     "certified_design",
     "certify",
     "certify_continuous",

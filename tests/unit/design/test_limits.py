@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from inspect import isabstract
 
 import casadi as ca
 import numpy as np
 import pytest
 
+from nlsdesign import design
 from nlsdesign.components import Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.components.transmission.cam_drive import through
@@ -27,6 +29,7 @@ from nlsdesign.design import (
     RestLengthRange,
     design_cam,
 )
+from nlsdesign.design.optimisation import limits
 from nlsdesign.design.optimisation.design_search import row_of
 from nlsdesign.design.optimisation.problem import design_problem
 from nlsdesign.design.optimisation.program import Program, Rows
@@ -40,6 +43,13 @@ from tests.cam_cases import CONCAVE, KEEP, RUBBER, TARGET, actuator
 def test_quantities_and_bare_numbers_are_the_same() -> None:
     assert MaximumCamRadius(quantity(20.0, "mm")) == MaximumCamRadius(0.02)
     assert MaximumStrain(quantity(100.0, "%")) == MaximumStrain(1.0)
+
+
+def test_every_limit_of_the_package_is_handed_out() -> None:
+    own = [kind for kind in vars(limits).values() if isinstance(kind, type) and issubclass(kind, Limit)]
+    names = {kind.__name__ for kind in own if not isabstract(kind)}
+    assert "MaximumCamRadius" in names
+    assert not names - set(design.__all__), "add them to nlsdesign/design/__init__.py"
 
 
 @pytest.mark.parametrize(

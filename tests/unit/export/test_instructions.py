@@ -158,14 +158,14 @@ def test_names_and_comments_cannot_break_the_c_text():
 
 def test_a_shell_is_filled_by_texts_and_rows(monkeypatch):
     text = "int @name@_size;\n    @rows@\n@none@\nend @name@\n"
-    monkeypatch.setattr(files, "shell", lambda name: text)
+    monkeypatch.setattr(files, "template", lambda name: text)
     values = {"name": "@rows@", "rows": ["a = 1;", "", "b = @name@;"], "none": []}
     assert files.filled("a.c", values) == "int @rows@_size;\n    a = 1;\n\n    b = @name@;\nend @rows@\n"
     with pytest.raises(ExportError, match="placeholder 'rows' without a value"):
         files.filled("a.c", {"name": "x"})
 
 
-def test_functions_of_c_stand_in_shells(root):
+def test_functions_of_c_stand_in_templates(root):
     """Python fills rows: no text in it is an include, a loop, a return or the head of a fixed function."""
     quoted = ("#include", "return ", "for (", "int main", "static void", "void ", "if (", "} else")
     found = [

@@ -36,7 +36,7 @@ class Excess:
     chi2
         Sum of squares of the latter in units of the floor.
     rows, effective
-        EffectNumber of residuals, and of independent ones they are equivalent to.
+        Number of residuals, and of independent ones they are equivalent to.
     open
         Whether that is more than noise.
     pieces
@@ -66,7 +66,7 @@ class Excess:
 
     @property
     def colour(self) -> float:
-        """EffectNumber of residuals for each independent one."""
+        """Number of residuals for each independent one."""
         return max(1.0, self.rows / max(self.effective, 1.0))
 
 

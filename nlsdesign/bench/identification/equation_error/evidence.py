@@ -20,9 +20,9 @@ from .between_samples import BlockRecord, on_clock, refined_filter, resolving_st
 from .block import Block
 from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
+from .inferred_sampling import Missing, SeenBlock, plain_terms, with_inferred_sampling, with_sampling
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
-from .told_sampling import Missing, SeenBlock, plain_terms, with_sampling, with_told_sampling
 
 _SPARSE = 0.5
 """Share of the power of a motion in the rows of a block, below which a remark says so: most is not judged."""
@@ -150,7 +150,7 @@ class Bench:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.
 
         ``blocks``: of the declared model, or of a better one with the same names. ``missing``: what they may
-        lack, see :mod:`.told_sampling`.
+        lack, see :mod:`.inferred_sampling`.
         """
         seen = [
             SeenBlock(
@@ -165,7 +165,7 @@ class Bench:
             for block in blocks
             if block.name in self.filters
         ]
-        return with_told_sampling(self._as_measured, seen, missing)
+        return with_inferred_sampling(self._as_measured, seen, missing)
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None

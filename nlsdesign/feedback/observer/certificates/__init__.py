@@ -6,11 +6,11 @@ It never trusts the solver: what is written is checked in exact or interval arit
 
 from .certificate import CERTIFICATE, Certificate, Proof, write_certificate
 from .co_design import CertifiedGain
-from .continuous import ContinuousContraction, certify_continuous
+from .continuous import certify_continuous
 from .contraction import Contraction, certify, declared_assumptions
-from .held_estimate import HeldEstimate, certify_held_estimate, clamped_estimate_bound
+from .held_estimate import certify_held_estimate, clamped_estimate_bound
 from .torque_bound import Assumptions
-from .verification import CodeToCompare, Verification, certified_design, read_certificate, verify
+from .verification import CodeToCompare, certified_design, read_certificate, verify
 
 __all__ = [
     "CERTIFICATE",
@@ -18,11 +18,8 @@ __all__ = [
     "Certificate",
     "CertifiedGain",
     "CodeToCompare",
-    "ContinuousContraction",
     "Contraction",
-    "HeldEstimate",
     "Proof",
-    "Verification",
     "certified_design",
     "certify",
     "certify_continuous",

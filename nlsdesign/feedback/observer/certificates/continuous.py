@@ -102,13 +102,7 @@ class ContinuousContraction:
 
     @classmethod
     def read(cls, content: dict[str, Any]) -> ContinuousContraction:
-        """Return the proof that the content of a file holds.
-
-        Raises
-        ------
-        ValueError
-            If the states are not known, or a matrix does not have one row per state.
-        """
+        """Return the proof that the content of a file holds; ``ValueError`` where it does not fit."""
         form, e = content["observer"]["form"], content["system"]
         states: Minimal | PaperForm = Minimal()
         if form["states"] == "published":

@@ -338,13 +338,7 @@ class HeldEstimate:
 
     @classmethod
     def read(cls, content: dict[str, Any]) -> HeldEstimate:
-        """Return the proof that a file holds.
-
-        Parameters
-        ----------
-        content
-            Of the file.
-        """
+        """Return the proof that the content of a file holds."""
         o, b = content["observer"], content["bound"]
         boxes = {name: (float(box[0]), float(box[1])) for name, box in b["boxes"].items()}
         bound = HeldEstimateBound(float(b["learned"]), float(b["cascade"]), float(b["limit"]), boxes)

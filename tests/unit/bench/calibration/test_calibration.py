@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.calibration import (
-    CalibrationTest,
     FreeRunTest,
     HungWeightTest,
     Instruments,
@@ -27,6 +26,7 @@ from nlsdesign.bench.calibration import (
 )
 from nlsdesign.bench.calibration.bench_response import BenchCourse, bench_response
 from nlsdesign.bench.calibration.bench_rows import RecordedRun, SampleNoise, rows_of, windows
+from nlsdesign.bench.calibration.bench_test import CalibrationTest
 from nlsdesign.bench.calibration.estimate import Estimate
 from nlsdesign.components import Assembly, CoulombFriction
 from nlsdesign.components.assembly.deck_writer import declare

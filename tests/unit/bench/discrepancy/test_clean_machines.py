@@ -11,7 +11,7 @@ from nlsdesign.bench.discrepancy import diagnose
 from nlsdesign.bench.discrepancy.diagnose import blocks_of
 from nlsdesign.bench.identification.equation_error import block_noise
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.equation_error.told_sampling import nothing
+from nlsdesign.bench.identification.equation_error.inferred_sampling import no_terms
 from nlsdesign.model import flatten
 from tests.rig.kind_cases import write_kind_case
 
@@ -41,7 +41,7 @@ def test_numbers_that_blocks_share_tell_when_a_current_acts(kind: str, tmp_path:
     bench = Bench(records, blocks)
     plainly, nothing_missing = (
         next(c.sampling.late for c in told.columns if c.sampling and c.signal == "amplifier_reading.reading")
-        for told in (bench.inferred(blocks), bench.inferred(blocks, nothing))
+        for told in (bench.inferred(blocks), bench.inferred(blocks, no_terms))
     )
     assert nothing_missing == pytest.approx(LATE[kind], abs=0.01)
     assert plainly == 0.0, "terms that may be missing take what tells it"

@@ -1,4 +1,4 @@
-"""How an input runs between its samples, told from the records where nobody says it.
+"""How an input runs between its samples, inferred from the records where nobody says it.
 
 Half a sample is seen in a balance of efforts long before it is seen in a picture. Each way to run between
 samples gives other residuals of the blocks that the input drives; their likelihoods are compared. What else
@@ -13,7 +13,7 @@ is missing; so it counts only where the one with the terms, which is true in any
 
 Channels of one recorder can also be shifted against each other by a part of a sample, as where they are
 sampled in turn. Up to half a sample of each of the two, such a shift is a number without a meaning of its
-own: it is found in the same way, and told. A delay beyond that is left for effects to explain.
+own: it is inferred in the same way, and stated. A delay beyond that is left for effects to explain.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class SeenBlock(NamedTuple):
     floors: Mapping[str, BlockNoise]
 
 
-def with_told_sampling(records: RecordSet, seen: Sequence[SeenBlock], missing: Missing) -> RecordSet:
+def with_inferred_sampling(records: RecordSet, seen: Sequence[SeenBlock], missing: Missing) -> RecordSet:
     """Return the records in which every input runs between its samples as they tell best, with remarks.
 
     ``records``: inputs of which nothing is said have columns without a sampling. ``missing``: what the blocks
@@ -254,7 +254,7 @@ def _rows(seen: SeenBlock, records: Sequence[Record], signal: str, missing: Miss
     return _Rows(np.hstack(residuals), dict(zip(free, np.vstack(slopes).T, strict=True)), np.vstack(terms))
 
 
-def nothing(_block: Block, _record: Record, _span: float) -> Iterator[Array]:
+def no_terms(_block: Block, _record: Record, _span: float) -> Iterator[Array]:
     """Yield no term: the block lacks nothing."""
     yield from ()
 
