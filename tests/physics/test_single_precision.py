@@ -39,9 +39,8 @@ EXACT = {
 def machine(which: str) -> nls.FlatModel:
     plant = nls.flatten(nls.declare(nls.load_deck("austin2015_figure_consistent")))
     observer = design_observer_with_details(plant).model
-    return unguarded(
-        observer if which == "observer" else joined(observer, nls.torque_controller(plant, law=PidTorque()))
-    )
+    controller = nls.torque_controller(plant, law=PidTorque())
+    return unguarded(observer if which == "observer" else joined(observer, controller))
 
 
 def rounded(function: ca.Function, arguments: list[ca.SX]) -> tuple[list[ca.SX], ca.SX, list[float]]:

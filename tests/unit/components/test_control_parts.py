@@ -133,7 +133,7 @@ def test_gains_in_one_list_are_the_same_parts() -> None:
 
 
 def test_by_default_speed_by_tangent_stiffness_or_a_pid_that_says_why() -> None:
-    """By default the inputs stay the same: with a moved load the scheduled law wants the angle of the spring."""
+    """The inputs stay the same: with a moved load the scheduled law wants the angle of the spring."""
     fixed = ob.bench()
     default, asked = (torque_controller(fixed, law=law) for law in (None, ScheduledTorque()))
     assert (default.values, default.description) == (asked.values, asked.description)
