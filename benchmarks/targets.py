@@ -53,7 +53,7 @@ def models() -> dict[str, FlatModel]:
     plant = nls.flatten(nls.declare(nls.load_deck(DECK)))
     cascade = design_observer_with_details(plant).model
     corrected, adaptive = design_corrected_observer(plant).model, design_adaptive_observer(plant).model
-    controller = nls.torque_controller(plant)
+    controller = nls.torque_controller(plant, law=nls.control.PidTorque())
     scheduled = nls.torque_controller(plant, law=nls.control.ScheduledTorque())
     return {
         "cascade observer": cascade,

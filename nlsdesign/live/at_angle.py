@@ -249,7 +249,8 @@ def loop_responses(
     linear = linear_loop(loop, angles)
     answers = linear.response(f"plant.{torque}", loop.desired, _FREQUENCIES)
     words = (
-        "torque over wanted torque, small deviations around the torque that is held there: PID by default, "
+        "torque over wanted torque, small deviations around the torque that is held there: "
+        f"{controller.description}, "
         "cascade observer, 1 kHz, one sample of delay, numbers of the deck; limits and counts take no part"
     )
     stable, reached = linear.stable(), linear.reached

@@ -476,7 +476,7 @@ def exported_dxf(stage: Callable[[str], None], design: ShownDesign) -> ExportedD
 
 
 def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
-    """Return cascade observer and PID controller as C, in an archive."""
+    """Return cascade observer and torque controller as C, in an archive."""
     from ..export import export_c
     from ..feedback.control import joined, torque_controller
     from ..feedback.observer import CascadeGain, design_observer

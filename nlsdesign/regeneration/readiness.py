@@ -74,17 +74,17 @@ def readiness(declared: Assembly) -> list[Readiness]:
         grid = FixedGrid(-reach, reach, points=_POINTS)
         design_observer_with_details(model, gain=CascadeGain(), sample_time=_SAMPLE_TIME, grid=grid)
 
-    def loop() -> None:
-        flatten(with_moved_load(declared))
-        observer()
-        torque_controller(model, sample_time=_SAMPLE_TIME)
-
     def over_angle() -> None:
         series_spring(model)
         rest_points(model, np.linspace(0.0, reach, _ANGLES), angle=swept_angle(model, None))
 
     def controller() -> None:
         torque_controller(model, law=ScheduledTorque(), sample_time=_SAMPLE_TIME)
+
+    def loop() -> None:
+        flatten(with_moved_load(declared))
+        observer()
+        controller()
 
     def plant() -> None:
         """Ask for nothing more than the flat model."""

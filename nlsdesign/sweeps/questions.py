@@ -192,7 +192,7 @@ class LoopQuestion(SweepQuestion):
     amplitude, frequency
         Of a sine of the desired torque, in N·m and Hz, that the loop is run on; amplitude 0 for none.
     gains
-        Of the controller; picked for the sample time where they are left out.
+        Of a PID; the default law of a torque controller where they are left out.
     """
 
     sample_time: float = in_unit(1e-3, "s")

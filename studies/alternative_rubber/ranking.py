@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr
 
 from nlsdesign.foundation.arrays import Array
 
@@ -14,7 +15,7 @@ from .merits import METRICS, MORE_IS_BETTER, Merits
 DRAWS = 4000
 PUBLISHED = "PMC-770"
 RESOLUTION = 0.02
-"""Relative difference of two figures below which they are alike: as well as gain and figures are known."""
+"""Standard deviation of the relative difference of two figures: as well as gain and figures are known."""
 _REACH = 2.0
 """Standard deviations at which the factor of the modulus is cut off: the figures are not known beyond."""
 
@@ -61,8 +62,8 @@ class Ranking:
 def rankings(merits: Sequence[Merits], *, draws: int = DRAWS, seed: int = 1) -> dict[str, Ranking]:
     """Return the ranking by each figure of merit, and by the mean rank over all, by name.
 
-    Loss tangents are drawn evenly from their ranges, factors of the moduli from normal distributions, each
-    rubber for itself.
+    Loss tangents are drawn evenly from their ranges, each rubber for itself, factors of the moduli from
+    normal distributions, one for each elastic curve.
     """
     chosen = [m for m in merits if m.met]
     drawn = {metric: _drawn(chosen, metric, draws, seed, skewed=False) for metric in METRICS}
@@ -79,10 +80,12 @@ def rankings(merits: Sequence[Merits], *, draws: int = DRAWS, seed: int = 1) -> 
 def _drawn(merits: Sequence[Merits], metric: str, draws: int, seed: int, *, skewed: bool) -> Array:
     """Return a figure of merit of each rubber over the draws, shape (rubbers, draws); less is better."""
     sign = -1.0 if metric in MORE_IS_BETTER else 1.0
-    rows = []
+    rows, curves = [], [each.candidate.elastic.name for each in merits]
     for number, each in enumerate(merits):
-        random = np.random.default_rng([seed, number])
-        share, deviation = random.uniform(size=draws), random.normal(size=draws)
+        share = np.random.default_rng([seed, number]).uniform(size=draws)
+        # A rubber whose curve is another's is as much stiffer as that one.
+        curve = curves.index(each.candidate.elastic.name)
+        deviation = np.random.default_rng([seed, curve, 1]).normal(size=draws)
         low, high = each.candidate.loss.lower, each.candidate.loss.upper
         tangents = low * (high / low) ** share if skewed else low + (high - low) * share
         moduli = 1.0 + each.candidate.spread * np.clip(deviation, -_REACH, _REACH)
@@ -127,8 +130,8 @@ def _ranked(
 
 
 def _before(first: Array, second: Array) -> float:
-    """Return how often the first is less than the second; what is closer than the resolution counts half."""
+    """Return the probability that the first is less than the second, both known as well as the resolution."""
     if np.any(np.isnan(first) | np.isnan(second)):
         return float("nan")
-    alike = np.abs(first - second) <= RESOLUTION * np.abs(second)
-    return float(np.mean(np.where(alike, 0.5, first < second)))
+    scale = RESOLUTION * np.sqrt((first**2 + second**2) / 2.0)
+    return float(np.mean(ndtr((second - first) / np.maximum(scale, np.finfo(float).tiny))))

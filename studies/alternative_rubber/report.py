@@ -102,8 +102,8 @@ def _order(rankings: Mapping[str, Ranking]) -> Section:
         ("by", "first", "second", "first is best", "first two", "skewed"),
         rows,
         caption="Probabilities that the first is the best of all, that the first two are in this order, and "
-        "the same where small losses are more probable (evenly over the logarithm). 50 % is a toss-up: what "
-        f"differs by less than {RESOLUTION:.0%} counts half.",
+        "the same where small losses are more probable (evenly over the logarithm). 50 % is a toss-up; a "
+        f"difference of two figures is known to {RESOLUTION:.0%}, one standard deviation.",
     )
 
 

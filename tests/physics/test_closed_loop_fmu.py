@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
-from nlsdesign.feedback.control import DisturbanceObserver, ScheduledTorque, VelocityLoop
+from nlsdesign.feedback.control import DisturbanceObserver, PidTorque, ScheduledTorque, VelocityLoop
 
 WIRES = {
     "observer.motor.angle": "plant.motor_encoder.reading",
@@ -51,7 +51,7 @@ def test_co_simulated_loop_is_that_of_one_piece_at_every_step(
     The desired torque is not zero at the start, so that it matters what is there before the first sample.
     """
     velocity = VelocityLoop(disturbance=DisturbanceObserver())
-    law = {"law": ScheduledTorque(), "velocity": velocity} if scheduled else {}
+    law = {"law": ScheduledTorque(), "velocity": velocity} if scheduled else {"law": PidTorque()}
     controller = nls.torque_controller(models["plant"], **law)
     given = fmus | {"controller": nls.export_fmu(controller, tmp_path / "controller.fmu")}
     desired = nls.sine("controller.spring.torque.desired", 0.6, 1.0, offset=0.2)

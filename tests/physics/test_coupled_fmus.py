@@ -211,7 +211,7 @@ def test_a_closed_loop_with_a_moved_load_converges_at_second_order(tmp_path: Pat
     fixed = nls.flatten(base, outputs=["motor.angle", "spring.torque"])
     moved = nls.flatten(base.with_part("load", Driven()), outputs=["motor.angle", "spring.torque"])
     observer = nls.design_observer(fixed, gain=nls.observer.CascadeGain())
-    controller = nls.torque_controller(fixed)
+    controller = nls.torque_controller(fixed, law=nls.control.PidTorque())
     desired = nls.sine("controller.spring.torque.desired", 0.5, 4.0, offset=0.8)
     whole = nls.ClosedLoop(
         plant=with_moving_load(moved, fixed), observer=observer, controller=controller, substeps=80

@@ -35,7 +35,7 @@ from nlsdesign.export.c.guarded_step import (
 )
 from nlsdesign.export.c.writer import member_paths
 from nlsdesign.export.compilation.compiled_step import CompiledStep
-from nlsdesign.feedback.control import ScheduledTorque, TorqueGains, joined
+from nlsdesign.feedback.control import PidTorque, ScheduledTorque, TorqueGains, joined
 from nlsdesign.feedback.observer import design_adaptive_observer, design_observer_with_details
 from nlsdesign.foundation.errors import NlsError
 from tests.compiling import compile_program
@@ -342,7 +342,7 @@ def after_one_command(both: nls.FlatModel, bad: float | None) -> tuple[np.ndarra
 @pytest.mark.parametrize("law", ["scheduled", pytest.param("pid", marks=pytest.mark.slow)])
 def test_one_sample_of_the_command_is_named_and_soon_forgotten(law: str) -> None:
     """Without a range and a largest rate 540 N·m were seen for 0.2 s, 5e5 N·m for 0.29 s."""
-    outer = ScheduledTorque() if law == "scheduled" else None
+    outer = ScheduledTorque() if law == "scheduled" else PidTorque()
     both = joined(cascade(), nls.torque_controller(plant(), law=outer))
     undisturbed, words = after_one_command(both, None)
     assert set(words) == {0}

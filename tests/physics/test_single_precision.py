@@ -21,7 +21,7 @@ import pytest
 import nlsdesign as nls
 from nlsdesign.export.c.guarded_step import GuardedModel
 from nlsdesign.export.compilation.compiled_step import CompiledStep
-from nlsdesign.feedback.control import joined
+from nlsdesign.feedback.control import PidTorque, joined
 from nlsdesign.feedback.observer import design_observer_with_details
 from nlsdesign.model.graph import applied, as_results, fold, read_graph
 from tests.unguarded import unguarded
@@ -39,7 +39,8 @@ EXACT = {
 def machine(which: str) -> nls.FlatModel:
     plant = nls.flatten(nls.declare(nls.load_deck("austin2015_figure_consistent")))
     observer = design_observer_with_details(plant).model
-    return unguarded(observer if which == "observer" else joined(observer, nls.torque_controller(plant)))
+    controller = nls.torque_controller(plant, law=PidTorque())
+    return unguarded(observer if which == "observer" else joined(observer, controller))
 
 
 def rounded(function: ca.Function, arguments: list[ca.SX]) -> tuple[list[ca.SX], ca.SX, list[float]]:

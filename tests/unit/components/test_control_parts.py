@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,6 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.feedback.control import (
-    REPRODUCED_GAINS,
     AntiWindup,
     BackCalculation,
     ConditionalIntegration,
@@ -130,6 +130,19 @@ def test_gains_in_one_list_are_the_same_parts() -> None:
     assert one.values == other.values
     with pytest.raises(ArrangementError, match="are those of a PID law"):
         torque_controller(plant, gains=gains, law=PidTorque())
+
+
+def test_by_default_speed_by_tangent_stiffness_or_a_pid_that_says_why() -> None:
+    """The inputs stay the same: with a moved load the scheduled law wants the angle of the spring."""
+    fixed = ob.bench()
+    default, asked = (torque_controller(fixed, law=law) for law in (None, ScheduledTorque()))
+    assert (default.values, default.description) == (asked.values, asked.description)
+    moved = torque_controller(flatten(ob.actuator(load=Driven())))
+    assert "controller.proportional" in moved.values
+    assert "would have to be given spring.angle as well" in moved.description
+    assert {v.name for v in moved.inputs} == {v.name for v in default.inputs}
+    asked_for = torque_controller(fixed, law=PidTorque())
+    assert "would have to be given" not in asked_for.description
 
 
 # --- the scheduled law ------------------------------------------------------------------------------------
@@ -386,9 +399,8 @@ def test_the_largest_torque_is_what_the_current_leaves_beside_friction() -> None
 def test_a_command_has_the_range_and_the_rate_of_the_drive() -> None:
     """By hand: k·I − friction on both sides; slope of the spring times the declared speed of the encoder."""
 
-    def wished(plant: FlatModel, gains: TorqueGains | None = None) -> Variable:
-        controller = torque_controller(plant, gains=gains)
-        (wish,) = (v for v in controller.inputs if v.name == "spring.torque.desired")
+    def wished(plant: FlatModel, **law: Any) -> Variable:
+        (wish,) = (v for v in torque_controller(plant, **law).inputs if v.name == "spring.torque.desired")
         return wish
 
     most = 20.0 * ob.CONSTANT - 0.02 - ob.DAMPING
@@ -402,7 +414,7 @@ def test_a_command_has_the_range_and_the_rate_of_the_drive() -> None:
     cable = flatten(declare(load_deck("one_sided_cable_drive")))
     pull = wished(cable)
     assert sorted((pull.minimum, pull.maximum), key=abs) == pytest.approx([0.0, largest_torque(cable)])
-    loose = wished(flatten(ob.actuator(load=Inertia(inertia=1e-3))), REPRODUCED_GAINS)
+    loose = wished(flatten(ob.actuator(load=Inertia(inertia=1e-3))), gains=TorqueGains())
     assert (loose.minimum, loose.maximum, loose.largest_rate) == (-math.inf, math.inf, math.inf)
 
 

@@ -24,7 +24,9 @@ def chosen():
     cascade = design_observer_with_details(plant).model
     return {
         "cascade observer": cascade,
-        "cascade observer and controller": joined(cascade, nls.torque_controller(plant)),
+        "cascade observer and controller": joined(
+            cascade, nls.torque_controller(plant, law=nls.control.PidTorque())
+        ),
         "corrected observer": nls.design_observer(plant),
     }
 

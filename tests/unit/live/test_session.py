@@ -133,7 +133,9 @@ def test_the_loop_is_that_of_the_angle_and_of_the_design(one: Session) -> None:
     for each in (there, further):
         assert each["value"]["stable"]
         assert each["value"]["magnitude"][0] == pytest.approx(0.0, abs=0.3), "it holds a torque that rests"
-        assert each["value"]["magnitude"][-1] < -3.0
+        # The rate of the desired torque is fed forward, so at 12 Hz the answer has not fallen.
+        frequencies, sizes = each["value"]["frequencies"], each["value"]["magnitude"]
+        assert abs(float(np.interp(12.0, frequencies, sizes))) < 3.0
     assert there["value"]["magnitude"] != further["value"]["magnitude"]
     assert "17.1°" in there["message"] or "of 41 angles" in there["message"]
     one.edit("SetNumber", name="spring.rubber.area", value=55e-6)

@@ -9,7 +9,7 @@ from nlsdesign.components import CoulombFriction, Inertia, assembly, tie
 from nlsdesign.export import natively
 from nlsdesign.export.compilation import compiled_step
 from nlsdesign.export.compilation.columns_in_c import ColumnsInC, sampled_run_in_c
-from nlsdesign.feedback.control import ClosedLoop, torque_controller
+from nlsdesign.feedback.control import ClosedLoop, PidTorque, torque_controller
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
@@ -34,7 +34,8 @@ def plant() -> FlatModel:
 @pytest.fixture(scope="module")
 def loop(plant: FlatModel) -> ClosedLoop:
     observer = design_observer(plant, gain=CascadeGain(), grid=FixedGrid(-1.2, 1.2, points=241))
-    return ClosedLoop(plant=plant, observer=observer, controller=torque_controller(plant), wires=ob.WIRES)
+    controller = torque_controller(plant, law=PidTorque())
+    return ClosedLoop(plant=plant, observer=observer, controller=controller, wires=ob.WIRES)
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....model import FlatModel, Variable
-from ....model.roles import with_declared_reading
+from ....model.roles import series_spring, with_declared_reading
 from .command_limits import with_command_limits
 from .known_drive import KnownDrive, voltage_is_limited
 from .law_writer import DESIRED, LawWriter
 from .law_writer import LoopNames as LoopNames
 from .law_writer import loop_names as loop_names
-from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
+from .outer_laws import Heard, PidTorque, ScheduledTorque, TorqueLaw, check_settings
 from .velocity_loop import VelocityLoop
 
 CARRIED = 0.1
@@ -122,8 +122,10 @@ def torque_controller(
     plant
         Continuous, on the bench: load fixed or prescribed.
     law
-        Outer law, such as :class:`~nlsdesign.feedback.control.laws.outer_laws.ScheduledTorque`; a PID with
-        the gain that the spring allows if neither a law nor gains are given.
+        Outer law. If neither a law nor gains are given it is
+        :class:`~nlsdesign.feedback.control.laws.outer_laws.ScheduledTorque` where the angle of the motor
+        alone tells that of the spring, as with a fixed load; else a PID with the gain that the spring allows,
+        and the description says why.
     velocity
         Velocity loop inside; with its defaults if only a law is given.
     gains
@@ -145,9 +147,9 @@ def torque_controller(
     """
     if not (math.isfinite(sample_time) and sample_time > 0.0):
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
-    outer, inner = _parts(law, velocity, gains)
-    _check_bandwidths(outer, inner, sample_time)
     drive, writer = KnownDrive(plant), LawWriter(sample_time, plant.origin)
+    outer, inner, reason = _parts(drive, law, velocity, gains)
+    _check_bandwidths(outer, inner, sample_time)
     names = drive.names
     heard = Heard(
         writer.input(names.desired, "N*m", "torque that the spring should have"),
@@ -166,7 +168,7 @@ def torque_controller(
         nominal=limit, minimum=-limit, maximum=limit,
     )  # fmt: skip
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
-    description = f"{outer.title} around a velocity loop{supply}"
+    description = f"{outer.title} around a velocity loop{reason}{supply}"
     model = writer.model("torque_controller", description, (output, motor.current))
     return with_command_limits(_with_declared_angle(model, plant, names.angle), plant)
 
@@ -178,16 +180,23 @@ def _with_declared_angle(controller: FlatModel, plant: FlatModel, angle: str) ->
 
 
 def _parts(
-    law: TorqueLaw | None, velocity: VelocityLoop | None, gains: TorqueGains | None
-) -> tuple[TorqueLaw, VelocityLoop]:
+    drive: KnownDrive, law: TorqueLaw | None, velocity: VelocityLoop | None, gains: TorqueGains | None
+) -> tuple[TorqueLaw, VelocityLoop, str]:
+    """Return outer law and velocity loop, and why it is not the usual law where nobody has chosen one."""
     if gains is not None and (law is not None or velocity is not None):
         raise ArrangementError(
             "gains", "are those of a PID law and its velocity loop, and law or velocity is given as well",
             next_step="give law=PidTorque(...) and velocity=VelocityLoop(...) alone",
         )  # fmt: skip
     if gains is not None:
-        return gains.law, gains.velocity
-    return law or PidTorque(), velocity or VelocityLoop()
+        return gains.law, gains.velocity, ""
+    inner = velocity or VelocityLoop()
+    if law is not None:
+        return law, inner, ""
+    if drive.spring_seen_at_the_motor:
+        return ScheduledTorque(), inner, ""
+    angle = series_spring(drive.plant).motion
+    return PidTorque(), inner, f", for a law by tangent stiffness would have to be given {angle} as well"
 
 
 def _check_bandwidths(law: TorqueLaw, velocity: VelocityLoop, sample_time: float) -> None:
