@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....foundation.arrays import Array
-from ....foundation.errors import NlsError
+from ....foundation.errors import ArrangementError
 from ....model import FlatModel
 from ....model.roles import declared_reading
 from .known_drive import KnownDrive, torque_range, torques_by_current, voltage_is_limited
@@ -30,7 +30,7 @@ def with_command_limits(controller: FlatModel, plant: FlatModel) -> FlatModel:
         if limits is not None:
             slope = float(np.max(stiffness_table(drive).values))
             rate = slope * abs(drive.spring_turns_value) * limits[2]
-    except NlsError:
+    except ArrangementError:  # no torque at rest: the drive could hold none; any other error is one
         return controller
     current = plant.values[drive.motor.current_limit]
     reason = f"what the drive can hold with {current:g} A and on the contour of its cam"
@@ -60,11 +60,8 @@ def largest_speed(plant: FlatModel) -> float:
     torques, held = _over(deflections, table.values[:, 0])
     fastest = 0.0
     for way, against in zip((1.0, -1.0), torques_by_current(plant), strict=True):
-        start = (
-            int(np.argmax(torques >= -against))
-            if way > 0.0
-            else len(torques) - 1 - int(np.argmax(torques[::-1] <= against))
-        )
+        allowed = np.flatnonzero(torques >= -against if way > 0.0 else torques <= against)
+        start = allowed[0 if way > 0.0 else -1]
         energy = against * way * (deflections - deflections[start]) + held[start] - held
         fastest = max(fastest, 2.0 * float(np.max(energy)) / numbers[drive.body.inertia or ""])
     speed = math.sqrt(fastest)
@@ -90,7 +87,7 @@ def rate_remarks(plant: FlatModel) -> list[str]:
     try:
         angle = KnownDrive(plant).names.angle
         limits, speed = declared_reading(plant, angle).limits, largest_speed(plant)
-    except NlsError:
+    except ArrangementError:
         return []  # without a series spring and a held load nothing is scheduled
     if limits is None or speed <= limits[2]:
         return []

@@ -132,7 +132,7 @@ class Contraction:
         Raises
         ------
         ValueError
-            If a matrix does not have one row per state.
+            If a matrix does not have one row per state, or an index names none.
         """
         p, torque = content["polytope"], content["torque"]
         gain = ConstantGain(tuple(tuple(float(v) for v in row) for row in content["observer"]["gain"]))
@@ -152,6 +152,10 @@ class Contraction:
         sized = lyapunov.shape == (n, n) and len(transition) == n and len(polytope.sizes) == n
         if not sized or min(polytope.sizes) <= 0.0:
             raise ValueError("matrices do not have one row per state")
+        places = {*polytope.moving, *polytope.seen}
+        used = {e.column for row in transition for e in row if e.column is not None}
+        if not (places <= set(range(n)) and used <= set(range(len(polytope.columns)))):
+            raise ValueError("an index names a state or a column that there is not")
         bound: TorqueErrorBound | str = torque
         if not isinstance(torque, str):
             start = {k: (v[0], v[1]) for k, v in torque["start"].items()}

@@ -85,6 +85,16 @@ def test_any_touched_digit_fails(
     assert not verify(certificate, untouched=untouched).holds
 
 
+@pytest.mark.parametrize("place", ["moving", "seen"])
+def test_an_index_of_no_state_is_unreadable(folder: Path, tmp_path: Path, place: str) -> None:
+    content = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
+    content["polytope"][place][0] = len(content["polytope"]["states"])
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(MeasurementError, match="an index names a state or a column that there is not"):
+        read_certificate(path)
+
+
 @pytest.mark.parametrize(
     "spoil",
     [
