@@ -32,6 +32,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -44,6 +45,7 @@ from ....foundation.quantity import with_unit
 from ..filters import Smoothing, blurred, derivative, difference, filter_weights, filtered, kernel, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
+from .batch import ColumnFunction
 from .block import Block, Drive
 from .noise import Noise, NoisePart, independent_number
 
@@ -398,14 +400,25 @@ def output_slopes(block: Block, inputs: Array, stride: int) -> Array:
 
     ``inputs``: shape (inputs, n).
     """
-    s, model = block.model.symbols(), block.model
-    slope = ca.Function(
-        "slope", [s.state, s.input, s.parameter, s.table], [ca.densify(ca.jacobian(s.output, s.input))]
-    )
-    some = inputs[:, ::stride]
+    model, some = block.model, inputs[:, ::stride]
     start, values = model.start(model.states), model.start(model.parameters)
-    flat = slope.map(some.shape[1])(start, some, values, np.zeros(0)).full()
-    return np.asarray(flat.reshape(some.shape[1], -1).T, dtype=np.float64)
+    return _functions(block).slopes(some.shape[1], [start, some, values])
+
+
+class _BlockFunctions(NamedTuple):
+    """The output of a block and its derivatives with respect to the inputs."""
+
+    output: ColumnFunction
+    slopes: ColumnFunction
+
+
+@lru_cache(maxsize=16)
+def _functions(block: Block) -> _BlockFunctions:
+    """Return both, of states, inputs and parameters; they are asked for on every record."""
+    s = block.model.symbols()
+    slopes = ca.densify(ca.jacobian(s.output, s.input)).T
+    made = (ca.Function("of", [s.state, s.input, s.parameter], [each]) for each in (s.output, slopes))
+    return _BlockFunctions(*map(ColumnFunction, made))
 
 
 def measured_inputs(block: Block, record: Record, span: float) -> Array:
@@ -427,14 +440,13 @@ def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[s
     that of a lossy gear where the power turns over, noise is rectified: half the sum of what it causes
     upwards and downwards stays. Rates are smooth already, and so is a motion.
     """
-    model, s = block.model, block.model.symbols()
-    output = ca.Function("output", [s.state, s.input, s.parameter, s.table], [s.output])
+    model, output = block.model, _functions(block).output
     inputs = measured_inputs(block, record, span)[:, :: max(1, len(record.trace) // _PROBES)]
     start, values = model.start(model.states), model.start(model.parameters)
     motions = {d.signal for d in block.drives.values() if d.order > 0}
 
     def at(shifted: Array) -> Array:
-        return np.asarray(output.map(shifted.shape[1])(start, shifted, values, np.zeros(0)).full()[0])
+        return output(shifted.shape[1], [start, shifted, values])[0]
 
     shifts = {}
     for i, variable in enumerate(model.inputs):

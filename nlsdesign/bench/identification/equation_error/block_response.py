@@ -396,7 +396,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
         whole = ca.substitute(together[:n], seen, seen + left) if n else ca.SX(0, 1)
         together = ca.vertcat(whole, straight)
     given = ca.vertcat(s.input, rates)
-    core, symbols, parts = ca.extract_parametric(ca.cse(together), given)
+    core, symbols, parts = ca.extract_parametric(together, given)
     core = ca.cse(core)
     # Inputs that stand alone, as a factor of a parameter, are not extracted: they pass as they are.
     bare = [given[i] for i in range(given.numel()) if depends(core, given[i])]

@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -23,6 +24,7 @@ from ....model import FlatModel, Table
 from ....model.graph import applied, as_results, fold, read_graph
 from ....model.roles import measured_motion
 from ....model.transform import named
+from ....simulation.buffered import Buffered
 from ...analysis.rest import evaluate_rows, rate_state, rest_states
 
 _PARAMETER = 3
@@ -42,10 +44,13 @@ def with_fine_counts(model: FlatModel) -> FlatModel:
         Continuous or discrete.
     """
     quanta = {f"{sensor}.quantum" for reading in model.readings for sensor in reading.sensors}
-    places = {i for i, v in enumerate(model.parameters) if v.name in quanta}
-    if not places:
-        return model
-    function = model.equations
+    places = frozenset(i for i, v in enumerate(model.parameters) if v.name in quanta)
+    return replace(model, equations=_fine(model.equations, places)) if places else model
+
+
+@lru_cache(maxsize=16)
+def _fine(function: ca.Function, places: frozenset[int]) -> ca.Function:
+    """Return equations that do not round by the parameters at these places; the same for drawn numbers."""
     arguments = [ca.SX.sym(function.name_in(i), function.sparsity_in(i)) for i in range(function.n_in())]
     values = fold(
         read_graph(function),
@@ -56,7 +61,7 @@ def with_fine_counts(model: FlatModel) -> FlatModel:
     results = as_results(function, {place: each.value for place, each in values.items()})
     names = ([function.name_in(i) for i in range(function.n_in())],
              [function.name_out(i) for i in range(function.n_out())])  # fmt: skip
-    return replace(model, equations=ca.Function(function.name(), arguments, results, *names))
+    return ca.Function(function.name(), arguments, results, *names)
 
 
 @dataclass(frozen=True)
@@ -299,12 +304,6 @@ class LinearBlock:
 
     def __init__(self, model: FlatModel, tables: TableSlope) -> None:
         self.model, self.tables = model, tables
-        s = model.symbols()
-        results = [s.derivative, s.output]
-        slopes = [ca.jacobian(e, v) for e in results for v in (s.state, s.input, s.table)]
-        self._function = ca.Function(
-            "block", [s.state, s.input, s.parameter, s.table], [ca.densify(e) for e in (*results, *slopes)]
-        )
 
     def at(self, state: Array, inputs: Array) -> BlockPoint:
         """Return values and slopes.
@@ -324,16 +323,38 @@ class LinearBlock:
             slope[:, :, place] = self.tables.of(table, at)
             into.append(slope)
         w, dw = np.concatenate(columns, axis=1), np.concatenate(into, axis=1)
-        p = np.tile(model.start(model.parameters)[:, None], (1, n))
-        result = self._function.map(n).call([state.T, inputs.T, p, w.T])
-        arrays = [
-            np.array(r).reshape(self._function.size1_out(i), n, self._function.size2_out(i)).swapaxes(0, 1)
-            for i, r in enumerate(result)
-        ]
-        following, output, fx, fu, fw, yx, yu, yw = arrays
+        p = model.start(model.parameters)
+        following, output, fx, fu, fw, yx, yu, yw = _with_slopes(model.equations, n)(state, inputs, p, w)
         count = len(names)
         return BlockPoint(
             following[:, :, 0], output[:, :, 0],
             fx + fw @ dw[:, :, :count], fu + fw @ dw[:, :, count:],
             yx + yw @ dw[:, :, :count], yu + yw @ dw[:, :, count:],
         )  # fmt: skip
+
+
+class _AtPoints:
+    """A function at a fixed number of points, without conversion of arrays."""
+
+    def __init__(self, function: ca.Function, count: int) -> None:
+        self._given = [np.zeros((count, function.size1_in(i))) for i in range(function.n_in())]
+        self._shapes = [(count, function.size2_out(i), function.size1_out(i)) for i in range(function.n_out())]
+        self._buffered = Buffered(function.map(count), self._given)
+
+    def __call__(self, *arrays: Array) -> list[Array]:
+        """Return all outputs, shape (points, rows, columns) each, of inputs of shape (points, rows)."""
+        for given, array in zip(self._given, arrays, strict=True):
+            given[:] = array
+        self._buffered.evaluate()
+        results = zip(self._buffered.results, self._shapes, strict=True)
+        # Columns lie one behind the other in CasADi.
+        return [result.reshape(shape).swapaxes(1, 2).copy() for result, shape in results]
+
+
+@lru_cache(maxsize=16)
+def _with_slopes(equations: ca.Function, count: int) -> _AtPoints:
+    """Return the equations of a discrete block at rest of time, with slopes over state, input and table."""
+    t, x, u, p, w = (ca.SX.sym(equations.name_in(i), equations.size1_in(i)) for i in range(5))
+    results = equations.call([t, x, u, p, w])[:2]
+    slopes = [ca.jacobian(e, v) for e in results for v in (x, u, w)]
+    return _AtPoints(ca.Function("block", [x, u, p, w], [ca.densify(e) for e in (*results, *slopes)]), count)
