@@ -338,7 +338,8 @@ class _AtPoints:
 
     def __init__(self, function: ca.Function, count: int) -> None:
         self._given = [np.zeros((count, function.size1_in(i))) for i in range(function.n_in())]
-        self._shapes = [(count, function.size2_out(i), function.size1_out(i)) for i in range(function.n_out())]
+        sizes = [(function.size2_out(i), function.size1_out(i)) for i in range(function.n_out())]
+        self._shapes = [(count, *size) for size in sizes]
         self._buffered = Buffered(function.map(count), self._given)
 
     def __call__(self, *arrays: Array) -> list[Array]:
