@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from models.test_rig import test_rig_deck
@@ -16,10 +16,10 @@ declared_rig = test_rig_deck
 
 
 def rig_set(
-    folder: Path, actuator: str, effects: Mapping[str, float], seed: int
+    folder: Path, actuator: str, effects: Mapping[str, float], seed: int, *, only: Sequence[str] | None = None
 ) -> tuple[Assembly, RecordSet]:
-    """Write a set as a bench leaves it, and read it back as a user would."""
-    write_set(folder, ACTUATORS[actuator], make_records(ACTUATORS[actuator], effects, seed))
+    """Write a set, or only some of its records, as a bench leaves it, and read it back as a user would."""
+    write_set(folder, ACTUATORS[actuator], make_records(ACTUATORS[actuator], effects, seed, only=only))
     declared = declared_rig(folder / "rig.toml", folder / "cam.csv")
     return declared, load_records(folder, flatten(declared))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks._score_run import opened
-from nlsdesign.bench.discrepancy import diagnose
+from nlsdesign.bench.discrepancy import diagnose, effects
 from nlsdesign.bench.discrepancy.diagnose import blocks_of
 from nlsdesign.bench.identification.equation_error import block_noise
 from nlsdesign.bench.identification.equation_error.evidence import Bench
@@ -65,5 +65,6 @@ def test_a_span_of_rates_leaves_what_a_damped_mode_does(
 def test_a_shift_that_explains_a_third_is_no_answer(tmp_path: Path) -> None:
     """Behind coarse counts friction is little beyond noise; a shift takes a third of it, and hid the name."""
     write_kind_case(tmp_path, "belt_axis", ("load_dependent_friction",), 1.0, 1120, condition="coarse")
-    verdict = diagnose(*opened(tmp_path))
+    rivals = (effects.load_dependent_friction, effects.coulomb_friction, effects.current_sensor_bias)
+    verdict = diagnose(*opened(tmp_path), catalogue=rivals)
     assert [effect.name for effect in verdict.effects] == ["load_dependent_friction"]
