@@ -6,26 +6,16 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.presentation.figures.loop_evaluation import passivity_words
-from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
+from nlsdesign.presentation.report import FigureSection, FoldedSection, Section, TableSection
 
 from .evaluation import AMPLITUDES, KP
 from .results import ActuatorResults, Results
 
 
 def evaluation_sections(results: Results) -> list[Section]:
-    """Show where the loop holds, and where it stops doing so, for both actuators."""
-    sections: list[Section] = [
-        Chapter(
-            "Torque loop: margins and limits",
-            f"PID with Kp {KP:g} rad/s per N·m behind the cascade observer, exact numbers. Every simulated "
-            "figure has a verdict; what does not settle has no number. The paper prints no gains: with these "
-            "the loop follows its figures. The code is generated with the scheduled law.",
-        ),
-        _table(results),
-    ]
-    for name, each in results.both.items():
-        sections += _of_one(name, each)
-    return sections
+    """Show where the loop holds, and where it stops doing so, for both actuators; figures folded."""
+    figures = [figure for name, each in results.both.items() for figure in _of_one(name, each)]
+    return [_table(results), FoldedSection("Responses, margins and impedance", tuple(figures))]
 
 
 def _of_one(name: str, results: ActuatorResults) -> list[Section]:
@@ -88,6 +78,8 @@ def _table(results: Results) -> TableSection:
         "Where the loop holds",
         ("actuator", "least gain margin in dB", "unstable angles", *settled, "onset Kp, simulated", "linear"),
         tuple(rows),
-        caption="Onset: gain from which the loop limit-cycles while it holds the larger torque, by "
-        "simulation and by linearisation.",
+        caption=f"PID with Kp {KP:g} rad/s per N·m behind the cascade, exact numbers. The paper prints no "
+        "gains: with these the loop follows its figures; the code is generated with the scheduled law. "
+        "Onset: gain from which the loop limit-cycles while it holds the larger torque, by simulation and "
+        "by linearisation. What does not settle has no number.",
     )

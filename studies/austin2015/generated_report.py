@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import nlsdesign as nls
-from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
+from nlsdesign.presentation.report import Chapter, FigureSection, FoldedSection, Section, TableSection
 
 from .generated import AMPLITUDE, CYCLES, FREQUENCY, GeneratedCode
 
@@ -19,7 +19,7 @@ def generated_sections(generated: GeneratedCode) -> list[Section]:
             "`nlsdesign export check FOLDER --deck FILE` compares them.",
         ),
         _table(generated),
-        _figure(generated),
+        FoldedSection("One run", (_figure(generated),)),
     ]
 
 

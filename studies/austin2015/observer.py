@@ -31,8 +31,6 @@ class ObserverComparison:
     stiffer, stiffer_estimate
         The same run with rubber that is stiffer and wider than the observer knows, and the minimal form's
         estimate.
-    free
-        Simulated run with a light link in place of the fixed load side.
     """
 
     minimal: ObserverDesign
@@ -42,7 +40,6 @@ class ObserverComparison:
     published_estimate: nls.Trace
     stiffer: nls.Trace
     stiffer_estimate: nls.Trace
-    free: nls.Trace
 
     @property
     def minimal_error(self) -> float:
@@ -88,14 +85,12 @@ def _times(quantity: nls.Quantity, factor: float) -> nls.Quantity:
 
 
 def compare_observers(actuator: nls.Assembly, model: nls.FlatModel, stop: float) -> ObserverComparison:
-    """Design both observers and run them on the bench; simulate the free drivetrain as well."""
+    """Design both observers and run them on the bench."""
     minimal, published = (
         nls.design_observer_with_details(model),
         nls.design_observer_with_details(model, form=nls.PaperForm()),
     )
     time = np.arange(0.0, stop, minimal.step.sample_time)
-    link = nls.Inertia(inertia=nls.quantity(2e-3, "kg*m^2", source="assumed: a light link"))
-    free = nls.flatten(actuator.with_part("load", link), inputs=["motor.current"])
     other = nls.flatten(with_stiffer_rubber(actuator), outputs=[v.name for v in model.outputs])
     drive = nls.sine("motor.current", 6.0, 2.0)
     bench, stiffer = (nls.simulate(each, time, inputs=drive, hold=True) for each in (model, other))
@@ -108,5 +103,4 @@ def compare_observers(actuator: nls.Assembly, model: nls.FlatModel, stop: float)
         nls.observe(published.model, bench, readings=READINGS),
         stiffer,
         nls.observe(minimal.model, stiffer, readings=READINGS, start=wrong),
-        nls.simulate(free, time, inputs=nls.sine("motor.current", 0.5, 2.0), hold=True),
     )

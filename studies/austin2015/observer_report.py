@@ -6,20 +6,37 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.foundation.quantity import three_digits
-from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection, TextSection
+from nlsdesign.presentation.report import FigureSection, FoldedSection, Section, TableSection, TextSection
 
 from .observer import STIFFER, WIDER
 from .results import ActuatorResults, Results
 
 
 def observer_sections(results: Results) -> list[Section]:
-    """Show observability, and the errors of the observers on the bench, for both actuators."""
+    """Show the errors of the observers over the spread; observability and proofs are folded."""
+    designed, published = (_spread_figure(name, results.both[name]) for name in ("designed", "published"))
+    more = (
+        published,
+        *(_generated(name, each) for name, each in results.both.items()),
+        _on_bench("designed", results.designed),
+        _errors_with_known_numbers(results),
+    )
+    proved = (_bounds(results), *(_proved(name, each) for name, each in results.both.items()))
+    return [
+        designed,
+        _errors_in_numbers(results),
+        FoldedSection("Observability and stability over the angle", _over_angle(results)),
+        FoldedSection("More on the observers", more),
+        FoldedSection("What is proved", proved),
+    ]
+
+
+def _over_angle(results: Results) -> tuple[Section, ...]:
     # The designed one first: its colour is that of what a figure is about.
     both = dict(reversed(results.both.items()))
     charts = {name: each.chart for name, each in both.items()}
     drops = {name: each.spread.drops for name, each in both.items()}
-    sections: list[Section] = [
-        Chapter("Observer", "The torque is not measured: it is estimated from the encoder and the current."),
+    return (
         FigureSection(
             "Observability over the cam angle",
             nls.figures.observability_over_angle(charts, drops=drops),
@@ -39,13 +56,7 @@ def observer_sections(results: Results) -> list[Section]:
             caption="Poles of the plant while it slides and while dry friction holds it; stiffness at rest. "
             "With pretension the designed spring is stiff at zero too.",
         ),
-    ]
-    for name, each in results.both.items():
-        sections += _spread_sections(name, each)
-    for name, each in results.both.items():
-        sections += _bench_sections(name, each)
-    sections.append(_errors_with_known_numbers(results))
-    return [*sections, _bounds(results), *(_proved(name, each) for name, each in results.both.items())]
+    )
 
 
 def _errors_with_known_numbers(results: Results) -> TableSection:
@@ -73,63 +84,59 @@ def _more(factor: float) -> str:
     return f"{100 * (factor - 1):.0f} %"
 
 
-def _bench_sections(name: str, results: ActuatorResults) -> list[Section]:
+def _on_bench(name: str, results: ActuatorResults) -> FigureSection:
     observers = results.observers
-    bench, free = observers.bench, observers.free
+    bench = observers.bench
     estimates = {"cascade": observers.minimal_estimate, "published form": observers.published_estimate}
-    first = bench.time <= 1.0
+    first = bench.time <= 0.5  # one period
     shown = {label: estimate["spring.torque"][first] for label, estimate in estimates.items()}
-    angles = {body: np.degrees(free[f"{body}.angle"]) for body in ("motor", "load")}
-    return [
-        FigureSection(
-            f"Estimated torque on the bench, exact numbers, {name}",
-            nls.figures.observer_error(bench.time[first], bench["spring.torque"][first], shown),
-            caption="Current 6 A at 2 Hz, 8192 counts per turn; the cascade starts wrong.",
-            means=f"With exact numbers, after 1 s: {1e3 * observers.minimal_error:.2f} mN·m rms of the "
-            f"cascade, {1e3 * observers.published_error:.2f} in the paper's form. What the spread of the "
-            "deck makes of this stands above.",
-            assumed="The observer knows every number of the actuator exactly.",
-        ),
-        FigureSection(
-            f"Motor and free load, {name}",
-            nls.figures.over_time(free.time, angles, quantity="angle", unit="deg"),
-            caption="The load is let go: a link of 2e-3 kg·m² behind the spring, current 0.5 A at 2 Hz.",
-        ),
-    ]
+    return FigureSection(
+        f"Estimated torque on the bench, exact numbers, {name}",
+        nls.figures.observer_error(bench.time[first], bench["spring.torque"][first], shown),
+        caption="Current 6 A at 2 Hz, 8192 counts per turn; the cascade starts wrong.",
+        means=f"With exact numbers, after 1 s: {1e3 * observers.minimal_error:.2f} mN·m rms of the "
+        f"cascade, {1e3 * observers.published_error:.2f} in the paper's form. What the spread of the "
+        "deck makes of this stands above.",
+        assumed="The observer knows every number of the actuator exactly.",
+    )
 
 
-def _spread_sections(name: str, results: ActuatorResults) -> list[Section]:
-    errors, chosen = results.spread.errors, results.spread.chosen
+def _spread_figure(name: str, results: ActuatorResults) -> FigureSection:
+    errors = results.spread.errors
     draws = errors.drawn.shape[1]
     middle, paper = (float(np.max(errors.quantile(each, 0.5))) for each in ("best", "published form"))
     ranked = errors.ranked_causes("best")[:3]
     causes = ", ".join(f"{cause} ({1e3 * size:.0f})" for cause, size in ranked)
-    rows = tuple(tuple(row) for row in errors.rows())
-    return [
-        FigureSection(
-            f"Torque errors over the spread, {name}",
-            nls.figures.errors_over_spread(errors),
-            caption=f"Sines of {errors.torque:.2f} N·m, one run for all; {draws} machines drawn from the "
-            "spreads of the deck. Dashed: bound of Cramér and Rao on the rms over all machines, for any "
-            "estimator with encoder and current.",
-            means=f"Median over the spread at the worse frequency: {1e3 * middle:.0f} mN·m of the observer "
-            f"that is generated, {1e3 * paper:.0f} of the published form. Most costs what rubber and drive "
-            f"are not known: {causes} mN·m.",
-            assumed=f"{draws} draws scatter; numbers of the deck are independent.",
-        ),
-        TableSection(
-            f"Torque errors in numbers, {name}",
-            ("observer", "Hz", "median", "90 %", "rms", "bound on the rms", "exact numbers"),
-            rows,
-            caption="mN·m rms. `best` is the observer that is generated, by the error that is expected over "
-            "the spread before anything is drawn.",
-        ),
-        TextSection(
-            f"The observer that is generated, {name}",
-            f"Taken was {chosen.reason}. It is not certified.",
-            drawing=str(chosen.design),
-        ),
-    ]  # fmt: skip
+    return FigureSection(
+        f"Torque errors over the spread, {name}",
+        nls.figures.errors_over_spread(errors),
+        caption=f"Sines of {errors.torque:.2f} N·m, one run for all; {draws} machines drawn from the "
+        "spreads of the deck. Dashed: bound of Cramér and Rao on the rms over all machines, for any "
+        "estimator with encoder and current.",
+        means=f"Median over the spread at the worse frequency: {1e3 * middle:.0f} mN·m of the observer "
+        f"that is generated, {1e3 * paper:.0f} of the published form. Most costs what rubber and drive "
+        f"are not known: {causes} mN·m.",
+        assumed=f"{draws} draws scatter; numbers of the deck are independent.",
+    )
+
+
+def _errors_in_numbers(results: Results) -> TableSection:
+    return TableSection(
+        "Torque errors in numbers",
+        ("actuator", "observer", "Hz", "median", "90 %", "rms", "bound on the rms", "exact numbers"),
+        tuple((name, *row) for name, each in results.both.items() for row in each.spread.errors.rows()),
+        caption="mN·m rms. `best` is the observer that is generated, by the error that is expected over "
+        "the spread before anything is drawn.",
+    )
+
+
+def _generated(name: str, results: ActuatorResults) -> TextSection:
+    chosen = results.spread.chosen
+    return TextSection(
+        f"The observer that is generated, {name}",
+        f"Taken was {chosen.reason}. It is not certified.",
+        drawing=str(chosen.design),
+    )
 
 
 def _bounds(results: Results) -> TableSection:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import nlsdesign as nls
+from nlsdesign.feedback.control.evaluation.spread_margins import GAIN_MARGIN, PHASE_MARGIN, SpreadMargins
 from nlsdesign.presentation.report import (
     CamSection,
     Chapter,
     EquationsSection,
     FigureSection,
     FileSection,
+    FoldedSection,
     KeyNumber,
     NumbersSection,
     PublishedNumber,
@@ -25,6 +29,7 @@ from nlsdesign.presentation.report import (
     tolerance_sections,
     verdict_sections,
 )
+from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 
 from .._designed import drawing_section
 from .evaluation_report import evaluation_sections
@@ -39,6 +44,12 @@ ABSTRACT = (
     "code; then what bench records of the published one show is missing."
 )
 
+CONTROL = (
+    "The torque is not measured: it is estimated from the encoder and the current. Tracking and margins are "
+    "of the same observer rule (the cascade, exact numbers), controller and gains on both actuators; only "
+    "the spring differs."
+)
+
 RECORDS = (
     "The diagnosis is of the published actuator, of which there are no public bench records. These come from "
     "a rig simulation that shares no model code with the package (`tests/rig`): servoed motor, encoder, "
@@ -48,22 +59,70 @@ RECORDS = (
 
 
 def write_page(results: Results, out: Path) -> None:
-    """Write ``report.html``."""
+    """Write ``report.html``: what came out, a chapter for each of two readers, and the rest folded."""
     nls.write_report(
         out / "report.html",
         key_numbers(results),
-        *actuator_sections(results),
-        *figure_sections(results),
+        answers(results),
         *chapter_of_design(results),
+        Chapter("Estimate and control, for the control engineer", CONTROL),
         *observer_sections(results),
         *loop_sections(results),
         *evaluation_sections(results),
-        *verdict_sections(results.verdict),
-        TextSection("Where the records come from", RECORDS),
+        *diagnosis_sections(results),
         *generated_sections(results.generated),
+        *figure_sections(results),
+        *actuator_sections(results),
         *file_sections(results, out),
         title="A cam-rubber actuator, from deck to report",
         abstract=ABSTRACT,
+    )
+
+
+def diagnosis_sections(results: Results) -> list[Section]:
+    """Show the verdict; its tables and figures are folded."""
+    chapter, card = verdict_sections(results.verdict)
+    evidence = card.parts if isinstance(card, VerdictSection) else ()
+    shown = replace(card, parts=()) if isinstance(card, VerdictSection) else card
+    return [chapter, shown, FoldedSection("Evidence", (*evidence, TextSection("The records", RECORDS)))]
+
+
+def answers(results: Results) -> TableSection:
+    """Return what was designed, whether it can be made, and how well it is known and held."""
+    design, numbers, both = results.cam.design, results.numbers, results.both
+    built, trimmed = (
+        f"{numbers[f'design_quantile{when}_mNm_rms']:.0f}" for when in ("", "_after_trim")
+    )  # fmt: skip
+    bound = ", ".join(design.active_limits) or "none"
+    limits = f"every limit is kept; it sits on: {bound}" if design.met else str(design.miss)
+    known, followed, margins = [], [], []
+    for each in both.values():
+        median, most = (
+            1e3 * float(np.max(each.spread.errors.quantile("best", share))) for share in (0.5, 0.9)
+        )
+        known.append(f"{median:.0f} mN·m rms, in nine of ten machines below {most:.0f}")
+        followed.append(f"{100 * each.followed(32.0, 5.0).relative_error:.0f} % of a sine at 5 Hz, Kp 32")
+        margins.append(margins_in_words(each.evaluation.spread))
+    rows = (
+        (
+            "Which torque?", f"that of Fig. 8, the model within {numbers['fig8_rms_error_Nm']:.3f} N·m rms",
+            f"5 N·m at 53°; 95 % of made springs within {built} mN·m rms, {trimmed} once trimmed",
+        ),
+        ("Can it be made?", "it was, in 2015", limits),
+        ("How well is its torque known?", *known),
+        ("How well is it held?", *followed),
+        ("With which margins in 95 % of the machines?", *margins),
+    )  # fmt: skip
+    caption = "What was designed, whether it can be made, and how well its torque is known and held."
+    return TableSection("In brief", ("question", *both), rows, caption=caption)
+
+
+def margins_in_words(margins: SpreadMargins) -> str:
+    """Return the margins of a gain in 95 % of the machines, and the gain that has enough."""
+    gain, phase = margins.spread
+    has = f"{gain:.2g} dB and {phase:.2g}°" if math.isfinite(gain) else "none, some are unstable"
+    return (
+        f"{has} with Kp {margins.value:g}; {GAIN_MARGIN:g} dB and {PHASE_MARGIN:g}° with {margins.enough:.2g}"
     )
 
 
@@ -113,18 +172,21 @@ def actuator_sections(results: Results) -> list[Section]:
     """Show what was declared."""
     actuator = results.published.actuator
     return [
-        Chapter(
-            "The published actuator",
-            "Every number has a unit, a source and a spread; what is assumed says so.",
-        ),
-        TextSection("Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)),
-        numbers_table("Numbers of the deck", actuator.quantities(), folded=True),
-        EquationsSection(
-            "Equations",
-            nls.equations(results.published.model),
-            "The flat model; `f(…)` stands for a long law.",
-            folded=True,
-        ),
+        FoldedSection(
+            "What was declared",
+            (
+                TextSection(
+                    "Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)
+                ),
+                numbers_table("Numbers of the deck", actuator.quantities()),
+                EquationsSection(
+                    "Equations",
+                    nls.equations(results.published.model),
+                    "The flat model; `f(…)` stands for a long law.",
+                ),
+            ),
+            "Parts, numbers with unit, source and spread, and the equations of the published actuator",
+        )
     ]
 
 
@@ -132,7 +194,7 @@ def chapter_of_design(results: Results) -> list[Section]:
     """Show the designed cam, what its spreads do, and the part."""
     cam = results.cam
     head = Chapter(
-        "Design",
+        "The spring, for the mechanical designer",
         "Contour, pretension, section and rest length of the rubber designed together for 5 N·m at 53°, the "
         "curve of 2014. Curvature, cable tension, stress and strain are held by limits that follow from the "
         "declared cable and rubber. Observer and torque loop are shown for both actuators: the `published` "
@@ -140,18 +202,15 @@ def chapter_of_design(results: Results) -> list[Section]:
     )
     moved = CamSection(
         "Cam, cable and rubber",
-        nls.figures.cam_motion_of(results.designed.model, cam.design.contour),
+        nls.figures.cam_motion_of(results.designed.model, cam.design.contour, count=61),
         caption="The designed cam. Move the slider to turn it.",
         means="The contact point moves outwards, so the lever arm grows and the spring stiffens.",
         assumed="Rubber at rest.",
     )
-    return [
-        head,
-        moved,
-        *design_sections(cam.design),
-        *tolerance_sections(cam.tolerance),
-        drawing_section(cam),
-    ]  # fmt: skip
+    picture, torque, result, limits = design_sections(cam.design)
+    made, band, tolerance, causes = tolerance_sections(cam.tolerance)
+    more = FoldedSection("More on the spring", (result, limits, picture, band, tolerance, causes))
+    return [head, moved, torque, made, drawing_section(cam), more]
 
 
 def figure_sections(results: Results) -> list[Section]:
@@ -187,21 +246,29 @@ def figure_sections(results: Results) -> list[Section]:
             caption="Points: measured. Lines: model with all relaxation at rest, and the best linear spring.",
             assumed="The cam follows from this figure by energy: this checks the chain, not the law.",
         ),
-        FigureSection(
-            "Fig. 1: hysteresis",
-            nls.figures.torque_loops(loops),
-            caption="Measured and simulated loops.",
-            assumed="Driven at 1 Hz, which is not printed; the viscosity was chosen for the 45° loop.",
-        ),
-        comparison_table(
-            "In the metrics of the paper", rows, caption="Torque over the angle: the paper beside this model."
-        ),
-        TableSection(
-            "Fig. 6: force of one element",
-            ("amplitude", "mean relative error", "rms error"),
-            element,
-            caption="Sine stretch at 10.8 Hz assumed. In drawing order the measured force lags it, "
-            "which no passive element can do, so only the mean of both strokes is compared.",
+        FoldedSection(
+            "More on model and measurement",
+            (
+                FigureSection(
+                    "Fig. 1: hysteresis",
+                    nls.figures.torque_loops(loops),
+                    caption="Measured and simulated loops.",
+                    assumed="Driven at 1 Hz, which is not printed; the viscosity was chosen for "
+                    "the 45° loop.",
+                ),
+                comparison_table(
+                    "In the metrics of the paper",
+                    rows,
+                    caption="Torque over the angle: the paper beside this model.",
+                ),
+                TableSection(
+                    "Fig. 6: force of one element",
+                    ("amplitude", "mean relative error", "rms error"),
+                    element,
+                    caption="Sine stretch at 10.8 Hz assumed. In drawing order the measured force lags it, "
+                    "which no passive element can do, so only the mean of both strokes is compared.",
+                ),
+            ),
         ),
     ]
 
@@ -228,7 +295,7 @@ def file_sections(results: Results, out: Path) -> list[Section]:
             each.spread.file: f"its certificate, {name}",
         }
     files |= dict.fromkeys(results.cam.files, "drawing of the designed cam")
+    caption = "Decks, code, FMUs and drawings."
     return [
-        Chapter("Files"),
-        FileSection("Written beside this page", files, caption="Decks, code, FMUs and drawings."),
+        FoldedSection("Files", (FileSection("Written beside this page", files, caption=caption),), caption)
     ]

@@ -18,6 +18,7 @@ from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.model import flatten
 from studies._published import declared_actuator
 from studies.austin2015.diagnosis import diagnose_bench
+from tests.browser import browser, chromium
 from tests.command_line import Run, run
 from tests.selection import quick_only
 
@@ -75,6 +76,8 @@ def test_the_study_keeps_its_claims(study: tuple[Path, dict[str, float]]) -> Non
         "drawing/sheet.pdf",
     ):
         assert heading in text
+    assert "mathdefault" not in text
+    assert len(text.encode("utf-8")) < 1.5e6
     verdict = json.loads((out / "diagnosis" / "verdict.json").read_text(encoding="utf8"))
     assert (verdict["verdict"], [e["name"] for e in verdict["effects"]]) == ("named", ["second_relaxation"])
     error = verdict["error"]["held_out"]
@@ -91,6 +94,18 @@ def test_the_whole_catalogue_names_the_same_as_the_fast_way(
     whole = diagnose_bench(declared_actuator(), tmp_path, nls.progress.Steps(), fast=False)
     assert whole.held_out_ratio == results["verdict_held_out_error_over_noise"]
     assert (tmp_path / "diagnosis" / "model.toml").read_bytes() == (out / "diagnosis/model.toml").read_bytes()
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+def test_what_is_not_folded_fits_on_twelve_screens(study: tuple[Path, dict[str, float]]) -> None:
+    out, _ = study
+    with browser() as tab:
+        tab.look(1400, height=900)
+        tab.open(out / "report.html")
+        assert tab.evaluate("document.documentElement.scrollHeight") < 12 * 900
+        first = tab.evaluate("document.querySelectorAll('main > section')[1].getBoundingClientRect().bottom")
+        assert first < 1.2 * 900, "what was designed, whether it can be made, how it is known and held"
+        assert tab.evaluate("[...document.querySelectorAll('details')].every((each) => !each.open)")
 
 
 def test_code_belongs_to_the_deck_that_it_is_from(run: Run, study: tuple[Path, dict[str, float]]) -> None:

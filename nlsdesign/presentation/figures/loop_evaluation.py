@@ -15,7 +15,20 @@ from ...feedback.control.evaluation.onset import SaturationLine
 from ...feedback.control.evaluation.responses import SineResponse
 from ...foundation.quantity import typeset_number
 from ...foundation.text_files import make_folder
-from .style import DASHES, HOLDS, INK, LIMIT, MUTED, described, legend, log_axis, look, panels, styled
+from .style import (
+    DASHES,
+    HOLDS,
+    INK,
+    LIMIT,
+    MUTED,
+    described,
+    legend,
+    log_axis,
+    look,
+    panels,
+    styled,
+    symmetric_log_axis,
+)
 from .svg import write_figures
 
 
@@ -86,10 +99,10 @@ def impedance_over_frequency(result: OutputImpedance) -> Figure:
         words.append(f"{label}: {passivity_words(float(first[k]))}.")
     upper.set_title("Torque that a moved load feels per angle")
     if upper.lines:
-        upper.set_yscale("log")
+        log_axis(upper)
     upper.set_ylabel("|jω·Z| in N·m/rad")
     lower.axhline(0.0, color=INK.light, linewidth=0.9, linestyle=DASHES[1])
-    lower.set_yscale("symlog", linthresh=1e-3)
+    symmetric_log_axis(lower, 1e-3)
     lower.set_title("Real part of the impedance (passive above the dashed line)")
     lower.set_ylabel("Re Z in N·m·s/rad")
     log_axis(lower, abscissa=True)
@@ -127,7 +140,7 @@ def margins_over_angle(result: Sequence[LoopMargins]) -> Figure:
         panel.set_ylabel(title)
         panel.set_xlabel("angle in degrees")
         panel.set_ylim(bottom=0.0)
-    axes[2].set_yscale("symlog", linthresh=1.0)
+    symmetric_log_axis(axes[2], 1.0)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=2)
     return described(figure, f"Margins over the angle, plant {result[0].linear.mode}. {' '.join(words)}")
@@ -148,7 +161,7 @@ def coupled_stability_map(result: CoupledStability) -> Figure:
             axes.plot(masses[mask], springs[mask], color=tone, marker=marker, linestyle="none", label=label)
     log_axis(axes, abscissa=True)
     positive = result.stiffnesses[result.stiffnesses > 0.0]
-    axes.set_yscale("symlog", linthresh=float(positive[0]) if len(positive) else 1.0)
+    symmetric_log_axis(axes, float(positive[0]) if len(positive) else 1.0)
     axes.margins(0.05)
     axes.set_xlabel("inertia of the load in kg·m²")
     axes.set_ylabel("stiffness to the frame in N·m/rad")

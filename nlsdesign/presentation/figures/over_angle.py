@@ -15,7 +15,19 @@ from ...feedback.observer import SpreadErrors
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import typeset_number
 from ...foundation.written_numbers import shared_prefix
-from .style import AFTER, DASHES, INK, MUTED, described, legend, log_axis, look, panels, styled
+from .style import (
+    AFTER,
+    DASHES,
+    INK,
+    MUTED,
+    described,
+    legend,
+    log_axis,
+    look,
+    panels,
+    styled,
+    symmetric_log_axis,
+)
 
 
 @styled
@@ -88,7 +100,7 @@ def stability_over_angle(charts: Mapping[str, Chart]) -> Figure:
         ):
             stiffness.plot(degrees, chart[name], color=tone, linestyle=dash, label=prefix + state)
     decay.axhline(0.0, color=INK.light, linewidth=0.9, linestyle=(0, (4, 2)))
-    decay.set_yscale("symlog", linthresh=10.0)
+    symmetric_log_axis(decay, 10.0)
     for panel, title, unit in (
         (decay, "Slowest real part (stable below zero)", "real part in 1/s"),
         (frequency, "Frequency of the least damped oscillation", "frequency in Hz"),

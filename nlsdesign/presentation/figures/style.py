@@ -247,9 +247,16 @@ def log_axis(axes: Axes, *, abscissa: bool = False) -> None:
     axis.set_tick_params(which="minor", labelsize=8.0, labelcolor=INK.light)
 
 
+def symmetric_log_axis(axes: Axes, linear: float) -> None:
+    """Make the ordinate logarithmic to both sides of zero, straight up to ``linear``, with plain numbers."""
+    axes.set_yscale("symlog", linthresh=linear)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _plain(value)))
+
+
 def _plain(value: float) -> str:
-    exponent = math.floor(math.log10(value) + 1e-9) if value > 0.0 else 0
-    return f"{value:g}" if -3 <= exponent <= 4 else f"10{superscript(exponent)}"
+    exponent = math.floor(math.log10(abs(value)) + 1e-9) if value else 0
+    text = f"{abs(value):g}" if -3 <= exponent <= 4 else f"10{superscript(exponent)}"
+    return f"−{text}" if value < 0.0 else text
 
 
 def _short(axis: Axis) -> bool:

@@ -42,6 +42,7 @@ from .sections import (
     PagePosition,
     Section,
     TableSection,
+    inner_sections,
 )
 
 if TYPE_CHECKING:
@@ -98,15 +99,6 @@ class VerdictSection(Section):
 
     def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the verdict and the contents of its parts."""
-        parts = [
-            {
-                "title": part.title,
-                "template": part.template,
-                "key": place.inner(i).key,
-                **part.content(place.inner(i)),
-            }
-            for i, part in enumerate(self.parts, start=1)
-        ]
         return {
             "verdict": self.verdict,
             "badge": VERDICTS[self.verdict],
@@ -114,7 +106,7 @@ class VerdictSection(Section):
             "gap": None if self.gap is None else _drawn(self.gap, self.after),
             "words": self.words,
             "detail": self.detail,
-            "parts": parts,
+            "parts": inner_sections(self.parts, place),
         }
 
 

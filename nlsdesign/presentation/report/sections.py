@@ -6,7 +6,7 @@ import json
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from html import escape
 from pathlib import Path
@@ -191,6 +191,41 @@ class TextSection(Section):
     def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return text and drawing."""
         return {"text": self.text, "drawing": self.drawing}
+
+
+@dataclass(frozen=True, eq=False)
+class FoldedSection(Section):
+    """Sections that stay closed until the reader opens them; on paper they are open.
+
+    Parameters
+    ----------
+    parts
+        In reading order.
+    caption
+        What they show, in one line; by default their headings.
+    """
+
+    parts: tuple[Section, ...]
+    caption: str = ""
+    template: ClassVar[str] = "folded.html"
+
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return the headings and contents of the parts."""
+        caption = self.caption or "; ".join(part.title for part in self.parts)
+        return {"caption": caption, "parts": inner_sections(self.parts, place)}
+
+
+def inner_sections(parts: Sequence[Section], place: PagePosition) -> list[dict[str, Any]]:
+    """Return what ``inner.html`` shows of sections within one."""
+    return [
+        {
+            "title": part.title,
+            "template": part.template,
+            "key": place.inner(i).key,
+            **part.content(place.inner(i)),
+        }
+        for i, part in enumerate(parts, start=1)
+    ]
 
 
 @dataclass(frozen=True, eq=False)

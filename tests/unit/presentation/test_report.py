@@ -460,6 +460,17 @@ def test_the_equations_of_a_model_stand_in_the_page(text: str) -> None:
 # --- writing --------------------------------------------------------------------------------------
 
 
+def test_what_is_folded_is_one_closed_entry_that_lists_its_headings(tmp_path: Path) -> None:
+    inner = (report.TextSection("Parts", "All of them."), report.TextSection("Numbers", "Some."))
+    page = report.write_report(tmp_path / "r.html", report.FoldedSection("More", inner), title="folded")
+    text = page.read_text(encoding="utf8")
+    assert re.search(r'<details class="folded">\s*<summary>Parts; Numbers</summary>', text)
+    assert text.count("<details") == 1
+    assert [text.count(f'id="s1{end}"') for end in ("", "-1", "-2")] == [1, 1, 1]
+    assert '<h4 id="s1-1-title">Parts</h4>' in text
+    assert "All of them." in text
+
+
 def test_a_report_that_fails_leaves_the_old_one_alone(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     report.write_report(path, report.TextSection("One", "first"), title="t")
