@@ -49,6 +49,7 @@ from .jobs.written_design import (
     write_design,
     write_part,
 )
+from .optimisation.coil_limits import GoodmanSafety, MaximumTravel, SpringIndexRange
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import (
     BothStrokes,
@@ -114,6 +115,7 @@ __all__ = [
     "ExponentialTorque",
     "FerruleSeat",
     "Goal",
+    "GoodmanSafety",
     "InsensitiveStiffness",
     "LeastEnergy",
     "LeastMass",
@@ -131,6 +133,7 @@ __all__ = [
     "MaximumStrain",
     "MaximumStress",
     "MaximumTorqueError",
+    "MaximumTravel",
     "MinimumRadiusOfCurvature",
     "MotorAndGear",
     "MotorCycle",
@@ -153,6 +156,7 @@ __all__ = [
     "Spread",
     "SpreadRules",
     "SpringLimits",
+    "SpringIndexRange",
     "Stock",
     "TabulatedStiffness",
     "TabulatedTorque",
