@@ -49,7 +49,7 @@ from .jobs.written_design import (
     write_design,
     write_part,
 )
-from .optimisation.coil_limits import GoodmanSafety, MaximumTravel, SpringIndexRange
+from .optimisation.coil_limits import GoodmanSafety, MaximumSpringIndex, MaximumTravel, MinimumSpringIndex
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import (
     BothStrokes,
@@ -130,11 +130,13 @@ __all__ = [
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumLastingStrain",
+    "MaximumSpringIndex",
     "MaximumStrain",
     "MaximumStress",
     "MaximumTorqueError",
     "MaximumTravel",
     "MinimumRadiusOfCurvature",
+    "MinimumSpringIndex",
     "MotorAndGear",
     "MotorCycle",
     "NormalSpread",
@@ -156,7 +158,6 @@ __all__ = [
     "Spread",
     "SpreadRules",
     "SpringLimits",
-    "SpringIndexRange",
     "Stock",
     "TabulatedStiffness",
     "TabulatedTorque",

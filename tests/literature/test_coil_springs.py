@@ -1,8 +1,8 @@
 """Worked examples of coil springs in textbooks, in the units in which they are printed.
 
-Numbers given and results are those of Budynas and Nisbett, Shigley's Mechanical Engineering Design, 10th edition,
-2015, examples 10-1 and 10-6, taken at second hand from a public set of tests that states them with page numbers
-(518 and 561); the book itself was not at hand.
+Numbers given and results are those of Budynas and Nisbett, Shigley's Mechanical Engineering Design, 10th
+edition, 2015, examples 10-1 (p. 519) and 10-6 (p. 561). They were taken at second hand, from public tests of
+other software that transcribe them with page numbers; the book itself was not at hand.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def test_extension_spring_of_hard_drawn_wire() -> None:
     loaded = at(coil, 0.227)
     assert loaded["coil.force"] / POUND == pytest.approx(5.25, abs=0.01)
     assert loaded["coil.shear_stress"] / KPSI == pytest.approx(82.0, abs=0.2)
-    assert 1.19 * POUND < greatest_initial_tension(0.035 * INCH, 0.213 * INCH)
+    assert greatest_initial_tension(0.035 * INCH, 0.213 * INCH) > 1.19 * POUND
 
 
 def test_compression_spring_of_music_wire() -> None:

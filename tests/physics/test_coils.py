@@ -22,15 +22,16 @@ from nlsdesign.components import (
     Winding,
     WireStrength,
     assembly,
+    through,
     tie,
     torsion_coil,
 )
-from nlsdesign.components.mechanics.coils import Coil
 from nlsdesign.components.assembly.deck_remarks import deck_remarks
-from nlsdesign.design import DesignSettings, GoodmanSafety, MaximumTravel, NumberRange, safe_limits
-from nlsdesign.foundation.errors import InfeasibleError, ValueRangeError
-from nlsdesign.foundation.quantity import Quantity, quantity
-from tests.cam_cases import TARGET, actuator
+from nlsdesign.components.mechanics.coils import Coil
+from nlsdesign.design import DesignSettings, MaximumTravel, NumberRange, safe_limits
+from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.foundation.quantity import quantity
+from tests.cam_cases import CONCAVE, TARGET, actuator
 from tests.physics.table import Row
 
 WOUND = Winding(
@@ -138,3 +139,57 @@ def test_stiffness_of_a_twisted_coil_is_that_of_its_bent_wire() -> None:
 def test_coils_that_cannot_be_are_named(make: object, words: str) -> None:
     with pytest.raises(ValueRangeError, match=words):
         make()  # type: ignore[operator]
+
+
+def test_what_is_likely_a_slip_is_remarked_with_the_least_change() -> None:
+    slips = replace(PULLED, initial_tension=quantity(60.0, "N"), free_length=quantity(20.0, "mm"))
+    tension, length, travel = deck_remarks(machine(slips))
+    # By hand: C = 7, 33500/e^0.735 + 1000·(4 − 4/6.5) = 19450 psi, 134.1 MPa.
+    assert "initial_tension: coiling such wire leaves 30.09 N at most, not 60 N -> write at" in tension
+    assert "12 coils of this wire are 26 mm long when they touch, more than 20 mm" in length
+    least = float(travel.split("let it travel ")[1].split(" mm")[0]) * 1e-3
+    at_end = forces(slips, np.array([least]), "shear_stress")[0]
+    assert at_end == pytest.approx(0.45 * 1783e6 * 2.0**-0.19, rel=1e-3)
+    assert not deck_remarks(machine(replace(slips, winding=StatedRate(4800.0))))  # type: ignore[arg-type]
+
+
+def machine(coil: Coil) -> nls.components.Assembly:
+    """A motor that pulls one coil over a cam."""
+    bare = actuator(CONCAVE)
+    cam = replace(bare["spring.cam"], elements=quantity(1.0, "1"))
+    spring = tie(through(cam, coil=coil, pretension=1e-3), "motor", "load")
+    return assembly("bench", motor=bare["motor"], load=bare["load"], spring=spring)
+
+
+def test_a_cam_and_the_wire_of_its_coil_are_designed_together() -> None:
+    wire = [f"spring.coil.{name}" for name in ("wire_diameter", "mean_diameter", "active_coils")]
+    design = nls.design_cam(
+        machine(PULLED),
+        target=TARGET,
+        free=["spring.cam.contour", "spring.pretension", *wire],
+        keep=[NumberRange(wire[1], 5e-3, 16e-3)],
+        settings=DesignSettings(draws=0, look_for_size_ranges=False, starts=2),
+    )
+    assert design.met
+    chosen = design.actuator.quantities()
+    d, mean, n = (chosen[name].number for name in wire)
+    # The torque by hand, of the drawn contour and the chosen wire.
+    rate = 79.3e9 * d**4 / (8 * mean**3 * n)
+    force = 30.0 + rate * design.curves.extensions
+    assert design.curves.forces == pytest.approx(force, rel=1e-4)
+    angles, arms = design.curves.angles, design.curves.lever_arms
+    assert arms * force == pytest.approx(TARGET.torque(angles), abs=0.005)
+    # Goodman by hand: it binds, by default.
+    factor = (4 * mean / d + 2) / (4 * mean / d - 3)
+    low, high = (8 * factor * f * mean / (math.pi * d**3) for f in (force[0], force[-1]))
+    strength = 0.67 * 1783e6 * (1e3 * d) ** -0.19
+    used = (high - low) / 2 / (241e6 / (1 - 379e6 / strength)) + (high + low) / 2 / strength
+    assert 1 / used == pytest.approx(1.5, rel=1e-4)
+    assert "GoodmanSafety" in {state.limit for state in design.limits if state.active}
+
+
+def test_limits_follow_from_what_a_coil_declares() -> None:
+    words = [type(each).__name__ for each in safe_limits(nls.flatten(machine(PULLED)))]
+    assert words == ["MaximumTravel", "MinimumSpringIndex", "MaximumSpringIndex", "GoodmanSafety"]
+    stated = safe_limits(nls.flatten(machine(replace(PULLED, **STATED))))  # type: ignore[arg-type]
+    assert stated == (MaximumTravel(0.04),)

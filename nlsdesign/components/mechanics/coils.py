@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -18,7 +19,10 @@ from ..core.part_numbers import NotDeclared, Reading, parameter, read_as, templa
 from ..core.springs import Elastic, Spring
 
 INDEX = (4.0, 16.0)
-"""Least and greatest spring index D/d: below it wire cracks as it is coiled, above it coils tangle and buckle."""
+"""Least and greatest spring index D/d: below wire cracks as it is coiled, above coils tangle."""
+SETS = 0.45
+"""Shear stress over tensile strength from which coils of cold-drawn wire set: Budynas and Nisbett 2015, Table
+10-6 for pushed coils before the set is removed, Table 10-7 for pulled ones."""
 STEEL = 7850.0
 """Density of spring steel in kg/m³, by which a stated mass becomes a volume of wire."""
 _ROUNDED = 0.1
@@ -112,8 +116,22 @@ class Winding(CoilRate):
         scope
             Of the coil.
         """
-        d, mean, n, modulus = (scope.parameter(name) for name in templates(Winding))
-        return modulus * d**4 / (8 * mean**3 * n)
+        return wound_rate(*(scope.parameter(name) for name in templates(Winding)))
+
+    @property
+    def diameters(self) -> tuple[float, float]:
+        """Diameter of the wire and mean diameter of the coils in m."""
+        return self.wire_diameter.number, self.mean_diameter.number
+
+    @property
+    def rate(self) -> float:
+        """The rate in N/m."""
+        return float(wound_rate(*(getattr(self, name).number for name in templates(Winding))))
+
+
+def wound_rate(wire: Expression, mean: Expression, coils: Expression, modulus: Expression) -> Expression:
+    """Return G·d⁴/(8·D³·n)."""
+    return modulus * wire**4 / (8 * mean**3 * coils)
 
 
 def shear_stress(force: Expression, wire: Expression, mean: Expression) -> Expression:
@@ -221,6 +239,35 @@ class Coil(Elastic):
             scope.signal("wire_volume", volume, "m^3", f"volume of the wire of {scope.path} that twists")
         return force
 
+    def remarks(self) -> Iterator[str]:
+        """Yield what is lawful and likely to be a slip, each with the least change that mends it."""
+        wound, travel = self.winding, self.valid[1]
+        if not isinstance(wound, Winding):
+            return
+        wire, mean = wound.diameters
+        tension = getattr(self, "initial_tension", Quantity(0.0, "N")).number
+        greatest = greatest_initial_tension(wire, mean)
+        if tension > greatest:
+            yield (
+                f"initial_tension: coiling such wire leaves {greatest:.4g} N at most, not {tension:.4g} N -> "
+                f"write at most that, or wind closer coils: a smaller mean diameter"
+            )
+        closed = (wound.active_coils.number + 1.0) * wire
+        if closed > self.free_length.number:
+            yield (
+                f"free_length: {wound.active_coils.number:g} coils of this wire are {1e3 * closed:.4g} mm "
+                f"long when they touch, more than {self.free_length} -> write at least that"
+            )
+        if isinstance(self.strength, WireStrength):
+            given = (self.strength.strength_at_1_mm.number, self.strength.strength_exponent.number)
+            most = SETS * tensile_strength(*given, wire) / shear_stress(1.0, wire, mean)
+            if tension + wound.rate * travel > most:
+                length = 1e3 * max(most - tension, 0.0) / wound.rate
+                yield (
+                    f"{self.idle[1]}: over a travel of {1e3 * travel:.4g} mm the wire bears more than "
+                    f"{SETS:g} of its tensile strength, and sets -> let it travel {length:.4g} mm at most"
+                )
+
     @abstractmethod
     def closed(self, scope: Scope, motion: Expression) -> Expression:
         """Return the force beside k·e, that of coils which touch."""
@@ -322,8 +369,8 @@ def torsion_coil(
 ) -> Spring:
     """Return a coil that is twisted as a spring of torque over angle: k = E·d⁴/(64·D·n), wire in bending.
 
-    Without friction between the coils and on an arbor, which makes coils up to 6 % softer over a turn. Source:
-    Budynas and Nisbett 2015, sec. 10-12.
+    Without friction between the coils and on an arbor, by which coils seem 6 % softer. Source: Budynas and
+    Nisbett 2015, sec. 10-12.
 
     Parameters
     ----------

@@ -6,11 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
+import casadi as ca
+
 from ...foundation.errors import ArrangementError
 from ...foundation.quantity import Quantity
 from ..curves.numbers import plain
 from .design_point import DesignPoint
-from .limits import Bound, Limit, OneNumber, ParameterRange
+from .limits import Bound, Limit, OneNumber
+
+_MOST = 1000.0
+"""Safety beyond which it is not told apart."""
 
 
 def _require(design: DesignPoint, known: bool, what: str, step: str) -> None:
@@ -45,31 +50,69 @@ class MaximumTravel(Limit):
 
 
 @dataclass(frozen=True)
-class SpringIndexRange(ParameterRange):
-    """Mean diameter over wire diameter of each wound coil between two numbers.
+class SpringIndexLimit(Limit):
+    """Base of the limits on mean diameter over wire diameter.
 
     Parameters
     ----------
-    minimum, maximum
-        Least and largest spring index, pure numbers.
+    index
+        Spring index, a pure number.
     """
 
-    possible: ClassVar[tuple[str, float, float]] = ("1", 2.0, 50.0)
+    index: Quantity | float
 
-    minimum: Quantity | float
-    maximum: Quantity | float
+    def __post_init__(self) -> None:
+        self.number("index", "1", 2.0, 50.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
-        """Yield both sides for each coil whose wire is declared."""
-        for coil in design.cam.coils:
-            if coil.winding:
-                wire, mean = (design.parameters[name] for name in coil.winding[:2])
-                yield from self._both(f"spring index of {coil.name}", mean / wire, "1")
+        """Yield one bound for each coil whose wire is declared."""
+        wound = [coil for coil in design.cam.coils if coil.winding]
+        _require(design, bool(wound), "coil of declared wire", "declare its Winding, or leave this limit out")
+        for coil in wound:
+            wire, mean = (design.parameters[name] for name in coil.winding[:2])
+            upper = self.described is not None and self.described.upper
+            yield self.bound(
+                f"spring index of {coil.name}", mean / wire, plain(self.index), upper=upper, unit="1"
+            )
+
+
+@dataclass(frozen=True)
+class MinimumSpringIndex(SpringIndexLimit):
+    """Mean diameter over wire diameter ≥ index: below 4 wire is hard to coil, and cracks.
+
+    Parameters
+    ----------
+    index
+        Least spring index, a pure number.
+    """
+
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "index", "spring index of the coil", unit="1", shown_unit="1", upper=False
+    )
+
+    index: Quantity | float
+
+
+@dataclass(frozen=True)
+class MaximumSpringIndex(SpringIndexLimit):
+    """Mean diameter over wire diameter ≤ index: above 16 coils tangle, and do not keep their diameter.
+
+    Parameters
+    ----------
+    index
+        Largest spring index, a pure number.
+    """
+
+    described: ClassVar[OneNumber | None] = OneNumber(
+        "index", "spring index of the coil", unit="1", shown_unit="1", upper=True
+    )
+
+    index: Quantity | float
 
 
 @dataclass(frozen=True)
 class GoodmanSafety(Limit):
-    """Safety of the wire of each coil against fatigue by Goodman ≥ safety, from angle zero to the last and back.
+    """Safety of the wire of each coil by Goodman ≥ safety, from angle zero to the last and back for good.
 
     τ_a/S_e + τ_m/S_su ≤ 1/safety with the amplitude τ_a and the mean τ_m of the shear stress at the inside of
     the coil, S_su = 0.67·S_ut and S_e = S_a/(1 − S_m/S_su). The amplitude S_a that any spring wire up to
@@ -108,9 +151,10 @@ class GoodmanSafety(Limit):
             # Lever arms are not negative, so the extension rises from angle zero on.
             low, high = coil.shear_stress[0], coil.shear_stress[-1]
             shear_strength = 0.67 * coil.tensile_strength[0]
-            endured = plain(self.amplitude) / (1 - plain(self.mean) / shear_strength)
+            # Of soft wire the strength alone decides: Zimmerli's point lies beyond it.
+            slope = ca.fmax(1 - plain(self.mean) / shear_strength, plain(self.amplitude) / shear_strength)
+            endured = plain(self.amplitude) / slope
             used = (high - low) / 2 / endured + (high + low) / 2 / shear_strength
-            # Over the safety itself, a load of nothing would have no end.
-            yield self.bound(
-                f"share of the endurance of {path}", used, 1.0 / plain(self.safety), upper=True, unit="1"
-            )
+            # A coil that is hardly loaded has no finite safety.
+            safety = 1 / ca.fmax(used, 1 / _MOST)
+            yield self.bound(f"safety of {path}", safety, plain(self.safety), upper=False, unit="1")
