@@ -87,7 +87,7 @@ from .optimisation.result import CamDesign, LimitState
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import GOALS as GOALS
 from .optimisation.solve import design_cam
-from .optimisation.stock import RubberStock, Stock
+from .optimisation.stock import CoilStock, RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import cam_from_profile, contour_of_cam
@@ -108,6 +108,7 @@ __all__ = [
     "CamPart",
     "Cause",
     "ClampScrew",
+    "CoilStock",
     "Contour",
     "DesignJob",
     "DesignSettings",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,8 +29,16 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_remarks import deck_remarks
 from nlsdesign.components.mechanics.coils import Coil
-from nlsdesign.design import DesignSettings, MaximumTravel, NumberRange, safe_limits
-from nlsdesign.foundation.errors import ValueRangeError
+from nlsdesign.design import (
+    CoilStock,
+    DesignSettings,
+    MaximumTravel,
+    NumberRange,
+    Target,
+    read_job,
+    safe_limits,
+)
+from nlsdesign.foundation.errors import NlsError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from tests.cam_cases import CONCAVE, TARGET, actuator
 from tests.physics.table import Row
@@ -193,3 +202,54 @@ def test_limits_follow_from_what_a_coil_declares() -> None:
     assert words == ["MaximumTravel", "MinimumSpringIndex", "MaximumSpringIndex", "GoodmanSafety"]
     stated = safe_limits(nls.flatten(machine(replace(PULLED, **STATED))))  # type: ignore[arg-type]
     assert stated == (MaximumTravel(0.04),)
+
+
+HEADS = (
+    "number,wire_diameter [mm],mean_diameter [mm],active_coils,initial_tension [N],largest_extension [mm]\n"
+)
+SMALL, LARGE = "2815,2.8,19.6,14,29.5,33.5\n", "3219,3.2,22.4,14,38.5,37.5\n"
+WEAK = "1601,1.6,8.8,14,14.1,12.0\n"
+
+
+def test_the_smallest_coil_of_a_catalogue_that_holds_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "coils.csv").write_text("# made up\n" + HEADS + LARGE + WEAK + SMALL, encoding="utf-8")
+    job = tmp_path / "job.toml"
+    job.write_text(
+        """free = ["spring.cam.contour", "spring.pretension"]
+        [target]
+        ExponentialTorque = {maximum = "5 N*m", angle = "53 deg", shape = 1.0}
+        [stock]
+        coil = "coils.csv"
+        """,
+        encoding="utf-8",
+    )
+    settings = DesignSettings(draws=0, look_for_size_ranges=False, look_for_remedies=False, starts=2)
+    asked = read_job(job)
+    assert isinstance(asked.target, Target)
+    drive = nls.declare(nls.load_deck("coil_cable_drive"))
+    design = nls.design_cam(drive, target=asked.target, free=asked.free, settings=settings)
+    large, weak, small = design.alternatives
+    assert large.met
+    assert small.met
+    declared, chosen = (a.quantities()["spring.coil.wire_diameter"] for a in (drive, design.actuator))
+    assert chosen == quantity(2.8, "mm", source="coils.csv, line 5", spread=declared.spread)
+    assert declared.spread
+    turns = math.pi**2 / 4 * 2.8e-3**2 * 19.6e-3 * 14
+    assert small.rubber_volume == pytest.approx(turns, rel=1e-9)
+    # By hand: 14.1 N·12 mm + 1/2·7.92 N/mm·(12 mm)².
+    assert "spring.coil = no. 1601 of coils.csv, line 4" in weak.choice
+    assert "over its travel of 12 mm: stores 0.65" in weak.reason
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (HEADS + SMALL.replace("19.6", "9.6"), r"coils.csv, line 2: .*spring index 3.43 must lie in"),
+        ("number,mean_diametre [mm]\n1,20\n", r"mean_diametre.*did you mean 'mean_diameter'"),
+        ("number,mass [g],strength_at_1_mm [MPa]\n1,20,1800\n", "says nothing without strength_exponent"),
+    ],
+)
+def test_a_catalogue_that_cannot_be_is_refused(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "coils.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(NlsError, match=words):
+        list(CoilStock(tmp_path / "coils.csv").options(machine(replace(PULLED, strength=NotDeclared()))))

@@ -64,16 +64,13 @@ class SpringIndexLimit(Limit):
     def __post_init__(self) -> None:
         self.number("index", "1", 2.0, 50.0)
 
-    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
-        """Yield one bound for each coil whose wire is declared."""
+    def _indices(self, design: DesignPoint, *, upper: bool) -> Iterator[Bound]:
         wound = [coil for coil in design.cam.coils if coil.winding]
         _require(design, bool(wound), "coil of declared wire", "declare its Winding, or leave this limit out")
         for coil in wound:
             wire, mean = (design.parameters[name] for name in coil.winding[:2])
-            upper = self.described is not None and self.described.upper
-            yield self.bound(
-                f"spring index of {coil.name}", mean / wire, plain(self.index), upper=upper, unit="1"
-            )
+            of = f"spring index of {coil.name}"
+            yield self.bound(of, mean / wire, plain(self.index), upper=upper, unit="1")
 
 
 @dataclass(frozen=True)
@@ -92,6 +89,10 @@ class MinimumSpringIndex(SpringIndexLimit):
 
     index: Quantity | float
 
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield one bound for each coil whose wire is declared."""
+        yield from self._indices(design, upper=False)
+
 
 @dataclass(frozen=True)
 class MaximumSpringIndex(SpringIndexLimit):
@@ -108,6 +109,10 @@ class MaximumSpringIndex(SpringIndexLimit):
     )
 
     index: Quantity | float
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield one bound for each coil whose wire is declared."""
+        yield from self._indices(design, upper=True)
 
 
 @dataclass(frozen=True)

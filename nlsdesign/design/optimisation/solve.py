@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ...components.assembly.named_parts import Assembly
 from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
 from ...foundation.work_sharing import parallel_map
@@ -13,7 +15,8 @@ from ...model.origin import derived
 from ...model.roles import series_cam
 from ..curves.target import Target
 from ..statics.declared_cam import with_contour
-from ..statics.equilibrium import with_smooth_cables
+from ..statics.equilibrium import elastic_law, with_smooth_cables
+from .coil_limits import MaximumTravel
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
 from .design_search import Question
@@ -28,6 +31,8 @@ from .stock import StockChoice, combinations, require_once
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 """Torque error; the other two only choose between designs of equal torque."""
+_SAMPLES = 201
+"""Extensions at which the force of a coil is summed up."""
 USUAL = DesignSettings()
 """Eight starts, 1 % of the largest torque as the largest error, limits of the declared cable and rubber."""
 
@@ -59,8 +64,8 @@ def design_cam(
         Full names of what may change: the contour ``<cam>.contour`` (or ``<cam>.lever_arm``, which is the
         same), pretension, area and rest length of the rubber, distance of the anchor, or any other single
         number behind the cam, for instance ``spring.cam.contour`` and ``spring.rubber.area``. The contour
-        alone by default. A :class:`Stock` or :class:`RubberStock` among them is chosen from: every
-        combination is designed, and all are listed in ``alternatives``.
+        alone by default. A :class:`Stock`, :class:`RubberStock` or :class:`CoilStock` among them is chosen
+        from: every combination is designed, and all are listed in ``alternatives``.
     keep
         Limits, besides those of the settings.
     spring
@@ -167,6 +172,26 @@ class Wanted:
         taken = min(solved, key=lambda i: outcomes[i].cost)
         return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
+    def require_energy(self, actuator: Assembly, settings: DesignSettings) -> None:
+        """Refuse, without a search, a coil that cannot do the work below the target over its whole travel."""
+        model = flatten(with_smooth_cables(actuator))
+        law = elastic_law(model, self.spring)
+        coil = next((coil for coil in law.cam.coils if coil.name == law.cam.element), None)
+        limited = settings.defaults is None and not any(isinstance(each, MaximumTravel) for each in self.keep)
+        if coil is None or not limited or {*coil.winding, law.cam.elements} & {*(self.free or ())}:
+            return
+        travel = np.linspace(0.0, model.variable(coil.extension).maximum, _SAMPLES)
+        stored = model.values[law.cam.elements] * float(np.trapezoid(law.force(travel), travel))
+        # An error of the torque takes at most its mean square over the angle from the work.
+        end = self.target.last_angle
+        needed = float(self.target.energy(end)) - settings.largest_error * self.target.largest * end
+        if stored < needed:
+            raise InfeasibleError(
+                f"'{coil.name}' over its travel of {1e3 * travel[-1]:.4g} mm",
+                f"stores {stored:.3g} J, the torque needs {needed:.3g} J",
+                next_step="take a coil that stores more, or more elements",
+            )
+
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
         """Return the best design over all combinations of a stock, with what became of the others."""
         hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
@@ -175,14 +200,14 @@ class Wanted:
         def one(number: int) -> tuple[Alternative, NlsError | None]:
             label, assembly = options[number]
             try:
+                self.require_energy(assembly, settings)
                 design = self.designed(assembly, hasty)
             except (InfeasibleError, ConvergenceError) as error:
                 # One thickness that does not do is a line of the table; only if none does is it an error.
                 return Alternative(label, None, None, False, str(error)), error
             cost = design.starts[design.taken].cost
-            return Alternative(
-                label, cost, design.rms, design.met, "" if design.met else str(design.miss)
-            ), None
+            reason = "" if design.met else str(design.miss)
+            return Alternative(label, cost, design.rms, design.met, reason, design.rubber_volume), None
 
         table: list[Alternative] = []
         errors: list[NlsError] = []
