@@ -247,6 +247,11 @@ class CamNames:
     coils: tuple[CoilNames, ...] = ()
 
     @property
+    def contour(self) -> str:
+        """Name by which a design frees the contour; the name of the lever arm means the same."""
+        return f"{self.name}.contour"
+
+    @property
     def lengths(self) -> tuple[str, ...]:
         """Parameters: length without load of each piece of material and each coil."""
         return (*(piece.rest_length for piece in self.specimens), *(coil.free_length for coil in self.coils))

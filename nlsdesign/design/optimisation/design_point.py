@@ -46,15 +46,6 @@ class CoilColumns(NamedTuple):
     wire_volume: Expression
 
 
-def coil_columns(table: Expression, cam: CamNames) -> dict[str, CoilColumns]:
-    """Return what coils do by path, of a table with a row for each of their columns."""
-    width = len(CoilColumns._fields)
-    return {
-        coil.name: CoilColumns(*(table[width * i + k, :].T for k in range(width)))
-        for i, coil in enumerate(cam.coils)
-    }
-
-
 @dataclass(frozen=True, eq=False)
 class DesignPoint:
     """A cam with its rubber at nodes over the angle; columns of shape (n,), all in SI.
@@ -77,8 +68,8 @@ class DesignPoint:
         e₀ + δ, F and dF/de of one element.
     strains, stresses
         Nominal strain and nominal stress by path of the piece of rubber.
-    coils
-        What coils do, by path.
+    coil_rows
+        Four rows for each coil: the columns of :class:`CoilColumns`.
     torque_errors
         N·h·F minus target.
     parameters
@@ -108,7 +99,7 @@ class DesignPoint:
     stiffnesses: Expression
     strains: Mapping[str, Expression]
     stresses: Mapping[str, Expression]
-    coils: Mapping[str, CoilColumns]
+    coil_rows: Expression
     torque_errors: Expression
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
@@ -153,9 +144,18 @@ class DesignPoint:
             stiffnesses=at.stiffness,
             strains={path: at.strains[i] for i, path in enumerate(self.strains)},
             stresses={path: at.stresses[i] for i, path in enumerate(self.stresses)},
-            coils=coil_columns(at.coils, self.cam),
+            coil_rows=at.coils,
             torque_errors=self.torque_errors[-1],
         )
+
+    @property
+    def coils(self) -> dict[str, CoilColumns]:
+        """What coils do, by path."""
+        width = len(CoilColumns._fields)
+        return {
+            coil.name: CoilColumns(*(self.coil_rows[width * i + k, :].T for k in range(width)))
+            for i, coil in enumerate(self.cam.coils)
+        }
 
     @property
     def tangent_stiffness(self) -> Expression:

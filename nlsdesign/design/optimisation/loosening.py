@@ -141,13 +141,13 @@ class Loosened:
         self.free = tuple(free)
         self.candidates = tuple(name for name in cam.sizes if name not in (*free, held))
         self.open = search.question.search([*free, *self.candidates], search.rounding)
+        pretension = [self.open.problem.at(start) for start in starts(2, 0, [])]
+        self.starts = pretension if best is None else [carried_over(search, best, self.open)]
         bounds = self.open.bounds
         if largest_error is not None:
             bounds += tuple(MaximumTorqueError(largest_error).bounds(self.open.problem.design))
         self.bounds, self.error = bounds, None if largest_error is None else len(bounds) - 1
         self.count = len(self.open.problem.variables)
-        pretension = [self.open.problem.at(start) for start in starts(2, 0, [])]
-        self.starts = pretension if best is None else [carried_over(search, best, self.open)]
         self.every = tuple(range(len(bounds))) if self.error is None else (self.error,)
 
     @cached_property

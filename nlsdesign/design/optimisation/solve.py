@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -23,7 +24,6 @@ from .design_search import Question
 from .finish import SolvedSearch, finished, narrowed
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Limit
-from .problem import contour_names
 from .result import Alternative, CamDesign
 from .settings import DesignSettings, no_progress
 from .several_starts import SeveralStarts
@@ -151,7 +151,7 @@ class Wanted:
             goals=self.goals,
             settings=settings,
         )
-        return question, contour_names(names)[:1] if self.free is None else self.free
+        return question, (names.contour,) if self.free is None else self.free
 
     def designed(self, actuator: Assembly, settings: DesignSettings) -> CamDesign:
         """Return the design of one assembly."""
@@ -172,35 +172,32 @@ class Wanted:
         taken = min(solved, key=lambda i: outcomes[i].cost)
         return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
-    def require_energy(self, actuator: Assembly, settings: DesignSettings) -> None:
-        """Refuse, without a search, a coil that cannot do the work below the target over its whole travel."""
-        model = flatten(with_smooth_cables(actuator))
-        law = elastic_law(model, self.spring)
-        coil = next((coil for coil in law.cam.coils if coil.name == law.cam.element), None)
-        limited = settings.defaults is None and not any(isinstance(each, MaximumTravel) for each in self.keep)
-        if coil is None or not limited or {*coil.winding, law.cam.elements} & {*(self.free or ())}:
-            return
-        travel = np.linspace(0.0, model.variable(coil.extension).maximum, _SAMPLES)
-        stored = model.values[law.cam.elements] * float(np.trapezoid(law.force(travel), travel))
-        # An error of the torque takes at most its mean square over the angle from the work.
+    def least_work(self, error: float) -> float:
+        """Return the work in J that a spring must do up to the last angle, or miss by more than an error.
+
+        ``error``: rms, relative to the largest torque; it takes at most its product with the angle.
+        """
         end = self.target.last_angle
-        needed = float(self.target.energy(end)) - settings.largest_error * self.target.largest * end
-        if stored < needed:
-            raise InfeasibleError(
-                f"'{coil.name}' over its travel of {1e3 * travel[-1]:.4g} mm",
-                f"stores {stored:.3g} J, the torque needs {needed:.3g} J",
-                next_step="take a coil that stores more, or more elements",
-            )
+        return float(self.target.energy(end)) - error * self.target.largest * end
 
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
         """Return the best design over all combinations of a stock, with what became of the others."""
         hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
         hasty = replace(hasty, progress=no_progress)
 
+        work = self.least_work(settings.largest_error)
+        held = settings.defaults is None and not any(isinstance(each, MaximumTravel) for each in self.keep)
+
         def one(number: int) -> tuple[Alternative, NlsError | None]:
             label, assembly = options[number]
+            stored = _stored_at_most(assembly, self.spring, self.free or ()) if held else math.inf
             try:
-                self.require_energy(assembly, settings)
+                if stored < work:
+                    raise InfeasibleError(
+                        f"coil that stores {stored:.3g} J over its whole travel",
+                        f"the torque needs {work:.3g} J",
+                        next_step="take one that stores more, or more elements",
+                    )
                 design = self.designed(assembly, hasty)
             except (InfeasibleError, ConvergenceError) as error:
                 # One thickness that does not do is a line of the table; only if none does is it an error.
@@ -221,3 +218,18 @@ class Wanted:
             raise errors[0].at(place)
         best = min(costs, key=lambda i: (not table[i].met, costs[i]))
         return replace(self.designed(options[best][1], settings), alternatives=tuple(table))
+
+
+def _stored_at_most(actuator: Assembly, spring: str | None, free: Sequence[str]) -> float:
+    """Return the work in J that coils behind a cam store over their whole travel.
+
+    ``free``: infinite where it holds a number of the coil or the number of elements, and without a coil.
+    """
+    model = flatten(with_smooth_cables(actuator))
+    law = elastic_law(model, spring)
+    coil = next((coil for coil in law.cam.coils if coil.name == law.cam.element), None)
+    if coil is None or {*law.cam.numbers} & {*free} - {law.cam.pretension}:
+        return math.inf
+    travel = np.linspace(0.0, model.variable(coil.extension).maximum, _SAMPLES)
+    forces = np.array(law.function(travel.reshape(1, -1), law.numbers)[0]).ravel()
+    return model.values[law.cam.elements] * float(np.trapezoid(forces, travel))

@@ -146,7 +146,7 @@ class CamQuestion:
     @property
     def contour(self) -> str:
         """Name by which the contour is free."""
-        return f"{self.cam.name}.contour"
+        return self.cam.contour
 
     @cached_property
     def target(self) -> TabulatedTorque:
