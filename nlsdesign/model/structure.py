@@ -481,16 +481,16 @@ def _specimen(path: str, part: Specimen) -> SpecimenNames:
 
 def _coil(path: str, part: Coil) -> CoilNames:
     wire = templates(Winding) if isinstance(part.winding, Winding) else ()
+    named = {name: f"{path}.{name}" for name in part.signals()}
     return CoilNames(
         name=path,
         extension=f"{path}.{part.domain.motion}",
         free_length=f"{path}.free_length",
         winding=tuple(f"{path}.{field}" for field in wire),
         idle=tuple(f"{path}.{field}" for field in part.of_no_law()),
-        **{
-            name: f"{path}.{name}" if name in part.signals() else None
-            for name in ("shear_stress", "tensile_strength", "wire_volume")
-        },
+        shear_stress=named.get("shear_stress"),
+        tensile_strength=named.get("tensile_strength"),
+        wire_volume=named.get("wire_volume"),
     )
 
 

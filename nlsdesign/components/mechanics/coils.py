@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, Self, TypeVar
 
 import casadi as ca
 
@@ -18,6 +18,7 @@ from ..core.element import Range, Scope
 from ..core.part_numbers import NotDeclared, Reading, parameter, read_as, templates
 from ..core.springs import Elastic, Spring
 
+Size = TypeVar("Size", float, Expression)
 INDEX = (4.0, 16.0)
 """Least and greatest spring index D/d: below wire cracks as it is coiled, above coils tangle."""
 SETS = 0.45
@@ -93,6 +94,11 @@ class Winding(CoilRate):
         ----------
         domain
             Of the coil.
+
+        Raises
+        ------
+        ValueRangeError
+            If the spring index lies out of range.
         """
         checked = super().within(domain)
         d, mean = checked.wire_diameter, checked.mean_diameter
@@ -126,15 +132,15 @@ class Winding(CoilRate):
     @property
     def rate(self) -> float:
         """The rate in N/m."""
-        return float(wound_rate(*(getattr(self, name).number for name in templates(Winding))))
+        return wound_rate(*self.diameters, self.active_coils.number, self.shear_modulus.number)
 
 
-def wound_rate(wire: Expression, mean: Expression, coils: Expression, modulus: Expression) -> Expression:
+def wound_rate(wire: Size, mean: Size, coils: Size, modulus: Size) -> Size:
     """Return G·d⁴/(8·D³·n)."""
     return modulus * wire**4 / (8 * mean**3 * coils)
 
 
-def shear_stress(force: Expression, wire: Expression, mean: Expression) -> Expression:
+def shear_stress(force: Size, wire: Size, mean: Size) -> Size:
     """Return the shear stress at the inside of a coil: 8·K·F·D/(π·d³), K = (4C + 2)/(4C − 3), C = D/d.
 
     K is the factor of Bergsträsser, within 1.4 % of Wahl's; it holds curvature and direct shear.
@@ -172,7 +178,7 @@ class WireStrength(Reading):
     strength_exponent: Quantity = parameter("1", "exponent m of its fall", minimum=0.0, maximum=0.5)
 
 
-def tensile_strength(at_1_mm: Expression, exponent: Expression, wire: Expression) -> Expression:
+def tensile_strength(at_1_mm: Size, exponent: Size, wire: Size) -> Size:
     """Return the tensile strength of wire of a diameter in m; see :class:`WireStrength`."""
     return at_1_mm * (wire / _MILLIMETRE) ** -exponent
 
@@ -231,10 +237,9 @@ class Coil(Elastic):
         else:
             wire, volume = ca.SX(0), scope.parameter("mass") / STEEL if "wire_volume" in named else ca.SX(0)
         if "tensile_strength" in named:
-            given = (scope.parameter(name) for name in templates(WireStrength))
-            scope.signal(
-                "tensile_strength", tensile_strength(*given, wire), "Pa", f"tensile strength of {scope.path}"
-            )
+            first, exponent = (scope.parameter(name) for name in templates(WireStrength))
+            strength = tensile_strength(first, exponent, wire)
+            scope.signal("tensile_strength", strength, "Pa", f"tensile strength of {scope.path}")
         if "wire_volume" in named:
             scope.signal("wire_volume", volume, "m^3", f"volume of the wire of {scope.path} that twists")
         return force
@@ -259,8 +264,8 @@ class Coil(Elastic):
                 f"long when they touch, more than {self.free_length} -> write at least that"
             )
         if isinstance(self.strength, WireStrength):
-            given = (self.strength.strength_at_1_mm.number, self.strength.strength_exponent.number)
-            most = SETS * tensile_strength(*given, wire) / shear_stress(1.0, wire, mean)
+            first, exponent = self.strength.strength_at_1_mm.number, self.strength.strength_exponent.number
+            most = SETS * tensile_strength(first, exponent, wire) / shear_stress(1.0, wire, mean)
             if tension + wound.rate * travel > most:
                 length = 1e3 * max(most - tension, 0.0) / wound.rate
                 yield (
