@@ -180,7 +180,8 @@ class WireStrength(Reading):
 
 def tensile_strength(at_1_mm: Size, exponent: Size, wire: Size) -> Size:
     """Return the tensile strength of wire of a diameter in m; see :class:`WireStrength`."""
-    return at_1_mm * (wire / _MILLIMETRE) ** -exponent
+    strength: Size = at_1_mm * (wire / _MILLIMETRE) ** -exponent
+    return strength
 
 
 @dataclass(frozen=True)
