@@ -61,7 +61,7 @@ def placed_coil(assembly: Assembly, path: str | None = None) -> PlacedCoil:
         raise unknown_name("coil", path, coils)
     if path is None and len(coils) != 1:
         raise ArrangementError(
-            f"assembly '{assembly.name}'", f"has {len(coils)} coils behind its parts, not one",
+            f"assembly '{assembly.name}'", f"has {len(coils)} coils" if coils else "has no coil",
             next_step="name one of them" if coils else "declare an ExtensionCoil or a CompressionCoil first",
         )  # fmt: skip
     at = path or next(iter(coils))
