@@ -59,7 +59,7 @@ EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
     "design.jobs.written_design": ("components.assembly.deck_writer",),
     "design.statics.equilibrium": ("components.core.element",),
-    "design.optimisation.stock": ("components.assembly.library_rubber",),
+    "design.optimisation.stock": ("components.assembly.library_rubber", "components.assembly.stocked_coil"),
     "export.exported_files": ("components.assembly.deck_writer",),
     "bench.discrepancy": (ASSEMBLY,),
     "simulation.measure": (ASSEMBLY,),

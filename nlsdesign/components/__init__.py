@@ -65,6 +65,15 @@ from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
 from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
 from .mechanics.carriage import LinearDrive
+from .mechanics.coils import (
+    CoilMass,
+    CompressionCoil,
+    ExtensionCoil,
+    StatedRate,
+    Winding,
+    WireStrength,
+    torsion_coil,
+)
 from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
 from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
 from .mechanics.drive_faults import (
@@ -132,8 +141,10 @@ __all__ = [
     "CamWithProfileError",
     "CapstanFriction",
     "ClockDrift",
+    "CoilMass",
     "CommandCompression",
     "CommandSaturation",
+    "CompressionCoil",
     "ConstantLoad",
     "Controller",
     "CoulombFriction",
@@ -155,6 +166,7 @@ __all__ = [
     "EncoderOffset",
     "EndStop",
     "ExtendedTube",
+    "ExtensionCoil",
     "FittedRange",
     "Fixed",
     "FlowingChains",
@@ -221,6 +233,7 @@ __all__ = [
     "SpotFriction",
     "Spring",
     "Springpot",
+    "StatedRate",
     "StrainStiffening",
     "StressSoftening",
     "StretchyCable",
@@ -242,7 +255,9 @@ __all__ = [
     "ViscousMaterial",
     "VoltageDrivenMotor",
     "WavyFriction",
+    "Winding",
     "WindingHeat",
+    "WireStrength",
     "WlfShift",
     "WorkHeat",
     "WrapProduct",
@@ -271,6 +286,7 @@ __all__ = [
     "standard_linear_solid",
     "through",
     "tie",
+    "torsion_coil",
     "with_rubber",
 ]
 

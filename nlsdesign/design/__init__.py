@@ -49,6 +49,7 @@ from .jobs.written_design import (
     write_design,
     write_part,
 )
+from .optimisation.coil_limits import GoodmanSafety, MaximumSpringIndex, MaximumTravel, MinimumSpringIndex
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import (
     BothStrokes,
@@ -86,7 +87,7 @@ from .optimisation.result import CamDesign, LimitState
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import GOALS as GOALS
 from .optimisation.solve import design_cam
-from .optimisation.stock import RubberStock, Stock
+from .optimisation.stock import CoilStock, RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import cam_from_profile, contour_of_cam
@@ -107,6 +108,7 @@ __all__ = [
     "CamPart",
     "Cause",
     "ClampScrew",
+    "CoilStock",
     "Contour",
     "DesignJob",
     "DesignSettings",
@@ -114,6 +116,7 @@ __all__ = [
     "ExponentialTorque",
     "FerruleSeat",
     "Goal",
+    "GoodmanSafety",
     "InsensitiveStiffness",
     "LeastEnergy",
     "LeastMass",
@@ -128,10 +131,13 @@ __all__ = [
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumLastingStrain",
+    "MaximumSpringIndex",
     "MaximumStrain",
     "MaximumStress",
     "MaximumTorqueError",
+    "MaximumTravel",
     "MinimumRadiusOfCurvature",
+    "MinimumSpringIndex",
     "MotorAndGear",
     "MotorCycle",
     "NormalSpread",

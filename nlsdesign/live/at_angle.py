@@ -137,7 +137,7 @@ class AngleView:
     def rest_length(self) -> float:
         """Length of the rubber in m, as it is drawn."""
         numbers = {each.name: each.value for each in self.view.numbers}
-        lengths = [numbers[p.rest_length] for p in self.cam.specimens if p.rest_length in numbers]
+        lengths = [numbers[name] for name in self.cam.lengths if name in numbers]
         return lengths[0] if lengths else 2.0 * float(self.contour.radii.max())
 
     @cached_property

@@ -14,6 +14,7 @@ from ..components.core.part import Part, walk
 from ..components.core.part_numbers import templates
 from ..components.materials.specimen import Specimen, Strength
 from ..components.mechanics.bodies import Body, Free, GearedMotor, Inertia, Mass
+from ..components.mechanics.coils import INDEX, Coil, Winding
 from ..components.mechanics.motor import ElectricMotor
 from ..components.transmission.cam import Cable, Cam
 from ..components.transmission.cam_drive import Through
@@ -138,6 +139,40 @@ class SpecimenNames:
 
 
 @dataclass(frozen=True)
+class CoilNames:
+    """The names around one coil.
+
+    Parameters
+    ----------
+    name
+        Path of the coil.
+    extension
+        Signal of its motion, whose range is its travel.
+    free_length
+        Parameter.
+    winding
+        Parameters of its wire: diameter, mean diameter of the coils, their number and the shear modulus; none
+        where the rate is stated.
+    idle
+        Parameters that do not enter the law.
+    shear_stress, tensile_strength, wire_volume
+        Signals; ``None`` where the wire is not known well enough.
+    index_range
+        Least and greatest spring index that can be made.
+    """
+
+    name: str
+    extension: str
+    free_length: str
+    winding: tuple[str, ...]
+    idle: tuple[str, ...]
+    shear_stress: str | None
+    tensile_strength: str | None
+    wire_volume: str | None
+    index_range: tuple[float, float] = INDEX
+
+
+@dataclass(frozen=True)
 class CableNames:
     """The numbers of the cable of a cam, all parameters.
 
@@ -187,6 +222,8 @@ class CamNames:
         The declared cable; ``None`` where there is none.
     guides
         For each guide that bends its cable the parameters whose product is the exponent µφ of its friction.
+    coils
+        The coils in it.
     """
 
     name: str
@@ -207,6 +244,25 @@ class CamNames:
     specimens: tuple[SpecimenNames, ...]
     cable: CableNames | None = None
     guides: tuple[tuple[str, ...], ...] = ()
+    coils: tuple[CoilNames, ...] = ()
+
+    @property
+    def contour(self) -> str:
+        """Name by which a design frees the contour; the name of the lever arm means the same."""
+        return f"{self.name}.contour"
+
+    @property
+    def lengths(self) -> tuple[str, ...]:
+        """Parameters: length without load of each piece of material and each coil."""
+        return (*(piece.rest_length for piece in self.specimens), *(coil.free_length for coil in self.coils))
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Parameters that a designer may free besides the contour: pretension, sections, lengths, wire."""
+        pieces = [name for piece in self.specimens for name in (*piece.section, piece.rest_length)]
+        coils = [name for coil in self.coils for name in coil.winding[:3]]
+        anchor = [] if self.anchor_distance is None else [self.anchor_distance]
+        return tuple(dict.fromkeys([self.pretension, *pieces, *coils, *anchor]))
 
 
 @dataclass(frozen=True)
@@ -397,14 +453,16 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
             for name, p in pieces.items()
             if isinstance(p, CapstanFriction)
         ),
+        coils=tuple(_coil(name, p) for name, p in pieces.items() if isinstance(p, Coil)),
     )
 
 
 def _single_numbers(parts: Mapping[str, Part]) -> Iterator[str]:
     for path, part in parts.items():
-        strength = templates(type(part.strength)) if isinstance(part, Specimen) else {}
+        idle: Collection[str] = templates(type(part.strength)) if isinstance(part, Specimen) else ()
+        idle = part.of_no_law() if isinstance(part, Coil) else idle
         for field, given in part.parameters().items():
-            if not isinstance(given.value, tuple) and field not in strength:
+            if not isinstance(given.value, tuple) and field not in idle:
                 yield from number_names(path, part, field)
 
 
@@ -418,6 +476,21 @@ def _specimen(path: str, part: Specimen) -> SpecimenNames:
         force=f"{path}.{part.domain.effort}",
         tensile_strength=f"{path}.tensile_strength" if declared else None,
         elongation_at_break=f"{path}.elongation_at_break" if declared else None,
+    )
+
+
+def _coil(path: str, part: Coil) -> CoilNames:
+    wire = templates(Winding) if isinstance(part.winding, Winding) else ()
+    named = {name: f"{path}.{name}" for name in part.signals()}
+    return CoilNames(
+        name=path,
+        extension=f"{path}.{part.domain.motion}",
+        free_length=f"{path}.free_length",
+        winding=tuple(f"{path}.{field}" for field in wire),
+        idle=tuple(f"{path}.{field}" for field in part.of_no_law()),
+        shear_stress=named.get("shear_stress"),
+        tensile_strength=named.get("tensile_strength"),
+        wire_volume=named.get("wire_volume"),
     )
 
 

@@ -99,7 +99,14 @@ def test_quick_answer_of_a_template_is_the_whole_design(template: LiveDesign) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "deck", ["one_sided_cable_drive", "one-sided-finger", "austin2015_figure_consistent", "test_rig"]
+    "deck",
+    [
+        "one_sided_cable_drive",
+        "one-sided-finger",
+        "austin2015_figure_consistent",
+        "test_rig",
+        "coil_cable_drive",
+    ],
 )
 def test_quick_answers_of_other_decks_are_whole_designs(deck: str) -> None:
     live = LiveDesign(gallery_question(deck))
@@ -145,7 +152,9 @@ def test_a_path_of_drags_ends_where_a_fresh_session_begins() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("deck", ["cam-actuator", "one-sided-finger", "one_sided_cable_drive", "test_rig"])
+@pytest.mark.parametrize(
+    "deck", ["cam-actuator", "one-sided-finger", "one_sided_cable_drive", "test_rig", "coil_cable_drive"]
+)
 def test_fifty_drags_end_where_a_fresh_session_begins(deck: str) -> None:
     path(deck, 50)
 

@@ -24,7 +24,7 @@ from ..optimisation.goals import Goal
 from ..optimisation.limits import Limit, TorqueWithin
 from ..optimisation.settings import DesignSettings
 from ..optimisation.solve import GOALS
-from ..optimisation.stock import RubberStock, Stock, StockChoice
+from ..optimisation.stock import CoilStock, RubberStock, Stock, StockChoice
 from .task_target import TaskTarget
 
 Asked = TypeVar("Asked")
@@ -132,6 +132,7 @@ def job_of(text: str, file: Path) -> DesignJob:
         [stock]
         "spring.rubber.thickness" = ["2 mm", "3 mm"]
         rubber = ["PMC-770"]
+        coil = "coils.csv"
         [search]
         starts = 20
         largest_error = "1 %"
@@ -335,6 +336,9 @@ def _number(text: str, place: str) -> Quantity:
 def _stock(deck: Deck, key: str, table: Mapping[str, Any]) -> Iterator[StockChoice]:
     for name, given in table.items():
         place = deck.place(f"{key}.{name}" if key else name)
+        if name == "coil" and isinstance(given, str):
+            yield CoilStock(deck.path.parent / given if key else given)
+            continue
         if not isinstance(given, list):
             raise DeckError(place, "is not a list", next_step='write for instance ["2 mm", "3 mm"]')
         if name == "rubber":

@@ -1,4 +1,4 @@
-"""Limits that hold unless the designer says otherwise: they follow from the declared cable and rubber."""
+"""Limits that hold unless the designer says otherwise: they follow from what is declared of the spring."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import NamedTuple
 from ...model import FlatModel
 from ...model.roles import series_cam
 from ...model.structure import SpecimenNames
+from .coil_limits import GoodmanSafety, MaximumSpringIndex, MaximumTravel, MinimumSpringIndex
 from .limits import (
     Limit,
     MaximumCableTension,
@@ -30,13 +31,16 @@ LASTING_STRAIN = 1.0
 """Half of the extension of about 200 % beyond which the stress of natural rubber without filler relaxes at a
 sharply higher rate, for crystals grow (Gent, Relaxation processes in vulcanized rubber III, Rubber Chem.
 Technol. 36, 1963, 697). Assumed: the half, and that other rubbers bear as much for good."""
+COIL_SAFETY = 1.5
+"""Assumed: safety of a coil against fatigue. At it the largest shear stress is below 0.45 of the tensile
+strength, up to which coils do not set, whatever the least stress is."""
 BREAKS = 5.0
 """Nominal strain at which soft rubbers break, for rubber of which nothing is stated: the tensile curve of
 PMC-770 ends there (Schepelmann 2014)."""
 
 
 def safe_limits(model: FlatModel, spring: str | None = None) -> tuple[Limit, ...]:
-    """Return the limits that follow from what is declared of cable and rubber.
+    """Return the limits that follow from what is declared of cable, rubber and coil.
 
     Parameters
     ----------
@@ -71,6 +75,15 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
     if elongations:
         yield MaximumStrain(min(elongations) / STRAIN_FACTOR)
         yield MaximumLastingStrain(LASTING_STRAIN)
+    if cam.coils:
+        yield MaximumTravel(min(model.variable(coil.extension).maximum for coil in cam.coils))
+    wound = [coil for coil in cam.coils if coil.winding]
+    if wound:
+        least, most = wound[0].index_range
+        yield MinimumSpringIndex(least)
+        yield MaximumSpringIndex(most)
+    if any(coil.tensile_strength for coil in wound):
+        yield GoodmanSafety(COIL_SAFETY)
 
 
 def with_defaults(keep: Sequence[Limit], defaults: Sequence[Limit]) -> tuple[Limit, ...]:

@@ -28,12 +28,22 @@ def anchor_of(cam: CamNames) -> str:
 
 
 class Stretched(NamedTuple):
-    """One element stretched: force, stiffness, and strain and nominal stress of each piece of rubber."""
+    """One element stretched: force, stiffness, strain and stress of each piece of rubber, rows of coils."""
 
     force: Expression
     stiffness: Expression
     strains: Expression
     stresses: Expression
+    coils: Expression
+
+
+class CoilColumns(NamedTuple):
+    """A coil over the angle; what is not known of its wire is zero."""
+
+    extension: Expression
+    shear_stress: Expression
+    tensile_strength: Expression
+    wire_volume: Expression
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +68,8 @@ class DesignPoint:
         e₀ + δ, F and dF/de of one element.
     strains, stresses
         Nominal strain and nominal stress by path of the piece of rubber.
+    coil_rows
+        Four rows for each coil: the columns of :class:`CoilColumns`.
     torque_errors
         N·h·F minus target.
     parameters
@@ -87,6 +99,7 @@ class DesignPoint:
     stiffnesses: Expression
     strains: Mapping[str, Expression]
     stresses: Mapping[str, Expression]
+    coil_rows: Expression
     torque_errors: Expression
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
@@ -131,8 +144,18 @@ class DesignPoint:
             stiffnesses=at.stiffness,
             strains={path: at.strains[i] for i, path in enumerate(self.strains)},
             stresses={path: at.stresses[i] for i, path in enumerate(self.stresses)},
+            coil_rows=at.coils,
             torque_errors=self.torque_errors[-1],
         )
+
+    @property
+    def coils(self) -> dict[str, CoilColumns]:
+        """What coils do, by path."""
+        width = len(CoilColumns._fields)
+        return {
+            coil.name: CoilColumns(*(self.coil_rows[width * i + k, :].T for k in range(width)))
+            for i, coil in enumerate(self.cam.coils)
+        }
 
     @property
     def tangent_stiffness(self) -> Expression:
@@ -151,12 +174,13 @@ class DesignPoint:
 
     @property
     def rubber_volume(self) -> Expression:
-        """Volume of all rubber behind the cam in m³; zero where there is no specimen."""
+        """Volume of all rubber and wire behind the cam in m³; zero where nothing is declared that has one."""
         pieces = [
             math.prod((self.parameters[name] for name in (*piece.section, piece.rest_length)), start=ca.SX(1))
             for piece in self.cam.specimens
             if piece.name in self.strains
         ]
+        pieces += [coil.wire_volume[0] for coil in self.coils.values()]
         return self.elements * sum(pieces, start=ca.SX(0))
 
     def of_rubber(self, field: Literal["area", "rest_length"]) -> dict[str, Expression]:

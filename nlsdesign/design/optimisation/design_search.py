@@ -158,7 +158,7 @@ class Search:
     def of_any_rounding(self) -> Program:
         """The program with the width of rounded knots as a parameter."""
         question, names = self.question, [v.name for v in self.problem.scalars]
-        shape = contour_names(self.problem.law.cam)[:1] if self.problem.contour is not None else ()
+        shape = (self.problem.law.cam.contour,) if self.problem.contour is not None else ()
         width = ca.SX.sym("rounding")
         problem = design_problem(
             question.model, question.cam, target=question.target, free=[*shape, *names],

@@ -137,21 +137,17 @@ class Loosened:
     ) -> None:
         # The names that a designer could free besides: sizes, not the material.
         cam = search.problem.law.cam
-        sizes = [cam.pretension]
-        for piece in cam.specimens:
-            sizes += [*piece.section, piece.rest_length]
-        if cam.anchor_distance is not None and search.problem.contour is not None:
-            sizes.append(cam.anchor_distance)
+        held = cam.anchor_distance if search.problem.contour is None else None
         self.free = tuple(free)
-        self.candidates = tuple(dict.fromkeys(name for name in sizes if name not in free))
+        self.candidates = tuple(name for name in cam.sizes if name not in (*free, held))
         self.open = search.question.search([*free, *self.candidates], search.rounding)
+        pretension = [self.open.problem.at(start) for start in starts(2, 0, [])]
+        self.starts = pretension if best is None else [carried_over(search, best, self.open)]
         bounds = self.open.bounds
         if largest_error is not None:
             bounds += tuple(MaximumTorqueError(largest_error).bounds(self.open.problem.design))
         self.bounds, self.error = bounds, None if largest_error is None else len(bounds) - 1
         self.count = len(self.open.problem.variables)
-        pretension = [self.open.problem.at(start) for start in starts(2, 0, [])]
-        self.starts = pretension if best is None else [carried_over(search, best, self.open)]
         self.every = tuple(range(len(bounds))) if self.error is None else (self.error,)
 
     @cached_property
@@ -263,6 +259,6 @@ class Loosened:
         model, cam = self.open.question.model, self.open.problem.law.cam
         now = model.variable(variable.name).start
         if variable.name == cam.pretension:
-            lengths = [model.values[piece.rest_length] for piece in cam.specimens]
+            lengths = [model.values[name] for name in cam.lengths]
             return scaled(variable, 0.0), scaled(variable, max([now, *lengths]))
         return scaled(variable, now / _RANGE), scaled(variable, now * _RANGE)

@@ -183,7 +183,7 @@ def design_problem(
 
 def contour_names(cam: CamNames) -> tuple[str, str]:
     """Return the two names by which the contour of a cam is called free."""
-    return f"{cam.name}.contour", f"{cam.name}.lever_arm"
+    return cam.contour, f"{cam.name}.lever_arm"
 
 
 def movable_numbers(model: FlatModel, cam: CamNames) -> dict[str, Variable]:
@@ -291,6 +291,7 @@ def _design(
         stiffnesses=ca.vertcat(*[column.stiffness for column in columns]),
         strains={path: strains[i, :].T for i, path in enumerate(law.specimens)},
         stresses={path: stresses[i, :].T for i, path in enumerate(law.specimens)},
+        coil_rows=ca.horzcat(*[column.coils for column in columns]),
         torque_errors=parameters[cam.elements] * shape.lever_arms * forces - wanted,
         parameters=parameters,
         element=element,

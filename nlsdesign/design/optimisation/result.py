@@ -166,6 +166,8 @@ class Alternative:
         Whether it meets the target.
     reason
         Why not.
+    rubber_volume
+        Volume of rubber or wire in m³; ``None`` where there is no design.
     """
 
     choice: str
@@ -173,6 +175,7 @@ class Alternative:
     rms: float | None
     met: bool
     reason: str
+    rubber_volume: float | None = None
 
 
 @dataclass(frozen=True)
@@ -400,7 +403,11 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         *((f"strain of {path}", f"up to {100 * row.max():.4g} %") for path, row in curves.strains.items()),
         *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
         ("energy from angle zero", f"{curves.energy:.4g} J, without that of the pretension"),
-        *([("rubber", f"{1e6 * design.rubber_volume:.4g} cm³")] if design.rubber_volume > 0.0 else []),
+        *(
+            [("wire" if design.cam.coils else "rubber", f"{1e6 * design.rubber_volume:.4g} cm³")]
+            if design.rubber_volume > 0.0
+            else []
+        ),
         ("radius of curvature", _curvature(design)),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
         ("lever arm", f"up to {1e3 * design.contour.lever_arms.max():.4g} mm"),
@@ -471,7 +478,10 @@ def _alternative(design: CamDesign, each: Alternative) -> str:
     if each.rms is None:
         return f"{each.choice}: no design, {each.reason}"
     share = 100.0 * each.rms / design.target.largest
-    return f"{each.choice}: {share:.2g} % rms, cost {each.cost:.4g}" + ("" if each.met else ", a miss")
+    volume = f", {1e6 * each.rubber_volume:.3g} cm³" if each.rubber_volume else ""
+    return f"{each.choice}: {share:.2g} % rms, cost {each.cost:.4g}{volume}" + (
+        "" if each.met else ", a miss"
+    )
 
 
 def _read(torque: float) -> str:

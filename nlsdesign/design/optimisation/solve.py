@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
@@ -13,14 +16,14 @@ from ...model.origin import derived
 from ...model.roles import series_cam
 from ..curves.target import Target
 from ..statics.declared_cam import with_contour
-from ..statics.equilibrium import with_smooth_cables
+from ..statics.equilibrium import elastic_law, with_smooth_cables
+from .coil_limits import MaximumTravel
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
 from .design_search import Question
 from .finish import SolvedSearch, finished, narrowed
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Limit
-from .problem import contour_names
 from .result import Alternative, CamDesign
 from .settings import DesignSettings, no_progress
 from .several_starts import SeveralStarts
@@ -28,6 +31,8 @@ from .stock import StockChoice, combinations, require_once
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 """Torque error; the other two only choose between designs of equal torque."""
+_SAMPLES = 201
+"""Extensions at which the force of a coil is summed up."""
 USUAL = DesignSettings()
 """Eight starts, 1 % of the largest torque as the largest error, limits of the declared cable and rubber."""
 
@@ -59,8 +64,8 @@ def design_cam(
         Full names of what may change: the contour ``<cam>.contour`` (or ``<cam>.lever_arm``, which is the
         same), pretension, area and rest length of the rubber, distance of the anchor, or any other single
         number behind the cam, for instance ``spring.cam.contour`` and ``spring.rubber.area``. The contour
-        alone by default. A :class:`Stock` or :class:`RubberStock` among them is chosen from: every
-        combination is designed, and all are listed in ``alternatives``.
+        alone by default. A :class:`Stock`, :class:`RubberStock` or :class:`CoilStock` among them is chosen
+        from: every combination is designed, and all are listed in ``alternatives``.
     keep
         Limits, besides those of the settings.
     spring
@@ -146,7 +151,7 @@ class Wanted:
             goals=self.goals,
             settings=settings,
         )
-        return question, contour_names(names)[:1] if self.free is None else self.free
+        return question, (names.contour,) if self.free is None else self.free
 
     def designed(self, actuator: Assembly, settings: DesignSettings) -> CamDesign:
         """Return the design of one assembly."""
@@ -167,22 +172,39 @@ class Wanted:
         taken = min(solved, key=lambda i: outcomes[i].cost)
         return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
+    def least_work(self, error: float) -> float:
+        """Return the work in J that a spring must do up to the last angle, or miss by more than an error.
+
+        ``error``: rms, relative to the largest torque; it takes at most its product with the angle.
+        """
+        end = self.target.last_angle
+        return float(self.target.energy(end)) - error * self.target.largest * end
+
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
         """Return the best design over all combinations of a stock, with what became of the others."""
         hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
         hasty = replace(hasty, progress=no_progress)
 
+        work = self.least_work(settings.largest_error)
+        held = settings.defaults is None and not any(isinstance(each, MaximumTravel) for each in self.keep)
+
         def one(number: int) -> tuple[Alternative, NlsError | None]:
             label, assembly = options[number]
+            stored = _stored_at_most(assembly, self.spring, self.free or ()) if held else math.inf
             try:
+                if stored < work:
+                    raise InfeasibleError(
+                        f"coil that stores {stored:.3g} J over its whole travel",
+                        f"the torque needs {work:.3g} J",
+                        next_step="take one that stores more, or more elements",
+                    )
                 design = self.designed(assembly, hasty)
             except (InfeasibleError, ConvergenceError) as error:
                 # One thickness that does not do is a line of the table; only if none does is it an error.
                 return Alternative(label, None, None, False, str(error)), error
             cost = design.starts[design.taken].cost
-            return Alternative(
-                label, cost, design.rms, design.met, "" if design.met else str(design.miss)
-            ), None
+            reason = "" if design.met else str(design.miss)
+            return Alternative(label, cost, design.rms, design.met, reason, design.rubber_volume), None
 
         table: list[Alternative] = []
         errors: list[NlsError] = []
@@ -196,3 +218,18 @@ class Wanted:
             raise errors[0].at(place)
         best = min(costs, key=lambda i: (not table[i].met, costs[i]))
         return replace(self.designed(options[best][1], settings), alternatives=tuple(table))
+
+
+def _stored_at_most(actuator: Assembly, spring: str | None, free: Sequence[str]) -> float:
+    """Return the work in J that coils behind a cam store over their whole travel.
+
+    ``free``: infinite where it holds a number of the coil or the number of elements, and without a coil.
+    """
+    model = flatten(with_smooth_cables(actuator))
+    law = elastic_law(model, spring)
+    coil = next((coil for coil in law.cam.coils if coil.name == law.cam.element), None)
+    if coil is None or {*law.cam.numbers} & {*free} - {law.cam.pretension}:
+        return math.inf
+    travel = np.linspace(0.0, model.variable(coil.extension).maximum, _SAMPLES)
+    forces = np.array(law.function(travel.reshape(1, -1), law.numbers)[0]).ravel()
+    return model.values[law.cam.elements] * float(np.trapezoid(forces, travel))

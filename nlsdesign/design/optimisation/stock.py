@@ -6,15 +6,20 @@ import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from ...components.assembly.library_rubber import with_rubber
 from ...components.assembly.named_parts import Assembly
-from ...foundation.errors import ValueRangeError, unknown_name
+from ...components.assembly.stocked_coil import placed_coil
+from ...foundation.errors import NlsError, ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity
 from ...foundation.rubber_library import material
 from ..curves.numbers import plain
+from ..curves.target_files import read_columns
 
 _MOST = 1000
+_NUMBER = "number"
+"""Column of a catalogue that holds the maker's number of a coil."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +140,59 @@ class RubberStock(StockChoice):
         """Yield the assembly with each rubber."""
         for name in self.materials:
             yield f"{self.chosen} of {name}", with_rubber(actuator, material(name), piece=self.piece)
+
+
+@dataclass(frozen=True)
+class CoilStock(StockChoice):
+    """Coils of a catalogue: a CSV file with a row for each and a column for each number that it states.
+
+    Heads are names of numbers of the coil with units, such as ``rate [N/mm]`` or ``wire_diameter [mm]``; a
+    column ``number`` is the maker's. What the file does not state stays as declared, spreads among it.
+
+    Parameters
+    ----------
+    file
+        Path of the file.
+    coil
+        Path of the coil in the assembly; not needed where there is but one.
+
+    Examples
+    --------
+    >>> CoilStock("coils.csv").chosen
+    'coil'
+    """
+
+    file: Path | str
+    coil: str | None = None
+
+    @property
+    def chosen(self) -> str:
+        """The path of the coil, or that it is the only one."""
+        return self.coil or "coil"
+
+    def options(self, actuator: Assembly) -> Iterator[tuple[str, Assembly]]:
+        """Yield the assembly with each coil.
+
+        Raises
+        ------
+        NlsError
+            If the file cannot be read, or a row is no coil that can be.
+        """
+        placed = placed_coil(actuator, self.coil)
+        units = placed.units
+        table = read_columns(self.file, {_NUMBER: ("1",)} | {n: (u,) for n, u in units.items()}, least_rows=1)
+        for row, line in enumerate(table.lines):
+            source = f"{table.file}, line {line}"
+            numbers = {
+                name: placed.number(name, Quantity(float(column[row]), table.units[name], source))
+                for name, column in table.values.items()
+                if name != _NUMBER
+            }
+            own = f"no. {table.values[_NUMBER][row]:g} of {source}" if _NUMBER in table.values else source
+            try:
+                yield f"{placed.path} = {own}", placed.exchanged(numbers)
+            except NlsError as error:
+                raise error.at(source) from None
 
 
 def require_once(names: Sequence[str], choices: Sequence[StockChoice]) -> None:

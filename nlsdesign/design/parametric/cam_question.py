@@ -85,12 +85,9 @@ class ChosenMachine:
 
     @cached_property
     def sizes(self) -> tuple[str, ...]:
-        """Names of the single numbers that may be given or freed: pretension, rubber, anchor."""
-        cam = self.cam
-        rubber = [name for piece in cam.specimens for name in (*piece.section, piece.rest_length)]
-        names = [cam.pretension, *rubber, *([] if cam.anchor_distance is None else [cam.anchor_distance])]
+        """Names of the single numbers that may be given or freed: pretension, rubber or coil, anchor."""
         known = self.assembly.quantities()
-        return tuple(name for name in dict.fromkeys(names) if name in known)
+        return tuple(name for name in self.cam.sizes if name in known)
 
     @cached_property
     def strain_ends(self) -> dict[str, StrainEnd]:
@@ -149,7 +146,7 @@ class CamQuestion:
     @property
     def contour(self) -> str:
         """Name by which the contour is free."""
-        return f"{self.cam.name}.contour"
+        return self.cam.contour
 
     @cached_property
     def target(self) -> TabulatedTorque:

@@ -149,7 +149,8 @@ class ParametricDesign:
         """What cam and rubber do at the nodes of the contour."""
         rows = self._numbers
         pieces = list(self.program.rows.problem.design.strains)
-        strains, stresses = (rows[key].reshape(len(pieces), -1) for key in ("strains", "stresses"))
+        size = (len(pieces), len(rows["angle"]))
+        strains, stresses = (rows[key].reshape(size) for key in ("strains", "stresses"))
         return DesignCurves(
             angles=rows["angle"], lever_arms=rows["lever_arm"], radii=rows["radius"],
             radii_of_curvature=rows["radius_of_curvature"], torques=rows["torque"],

@@ -90,8 +90,9 @@ class ElasticLaw:
     parameters
         All parameters of the flat model, in its order.
     function
-        ``casadi.Function`` (extension, parameters) -> (force, stiffness, strains, stresses); one strain and
-        one nominal stress for each specimen.
+        ``casadi.Function`` (extension, parameters) -> (force, stiffness, strains, stresses, coils); one
+        strain and one nominal stress for each specimen; extension, shear stress, tensile strength and volume
+        of wire of each coil, zero where they are not known.
     """
 
     cam: CamNames
@@ -189,7 +190,13 @@ def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
     sections = [[parameters[place[name]] for name in piece.section] for piece in cam.specimens]
     pieces = zip(cam.specimens, sections, strict=True)
     stresses = [cut(piece.force) / math.prod(section) for piece, section in pieces]
-    results = [force, ca.jacobian(force, extension), ca.vertcat(*strains), ca.vertcat(*stresses)]
+    coils = [
+        ca.SX(0) if name is None else cut(name)
+        for coil in cam.coils
+        for name in (coil.extension, coil.shear_stress, coil.tensile_strength, coil.wire_volume)
+    ]
+    columns = [ca.vertcat(*each) for each in (strains, stresses, coils)]
+    results = [force, ca.jacobian(force, extension), *columns]
     function = ca.Function("law", [extension, parameters], [ca.SX(e) for e in results])
     if not np.isfinite(float(function(1e-3, model.start(model.parameters))[0])):
         raise ConvergenceError(

@@ -259,6 +259,8 @@ def _not_of_the_torque(cam: CamNames) -> Iterator[str]:
     """Yield the numbers of strength and cable, of which only the diameter does anything to the torque."""
     for piece in cam.specimens:
         yield from (name for name in (piece.tensile_strength, piece.elongation_at_break) if name is not None)
+    for coil in cam.coils:
+        yield from coil.idle
     if cam.cable is not None:
         yield from (cam.cable.diameter, cam.cable.breaking_force, cam.cable.bend_ratio)
 

@@ -198,7 +198,7 @@ def cam_motion_of(
         If the structure does not say which spring is meant.
     """
     law, values = elastic_law(model, spring), model.values
-    lengths = [values[piece.rest_length] for piece in law.cam.specimens]
+    lengths = [values[name] for name in law.cam.lengths]
     return cam_motion(
         contour,
         law.force,

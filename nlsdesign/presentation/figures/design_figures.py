@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -41,8 +42,10 @@ def design_picture(design: CamDesign) -> Figure:
     """Draw cam, cable and rubber to scale, at angle zero and at the last angle, with dimensions."""
     last = float(design.contour.angles[-1])
     reach = float(design.contour.radii.max())
-    length, _ = next(iter(_pieces(design)), (0.0, 0.0))
-    wide = _end_of_cable(design.contour, reach)[0] + length + float(design.curves.extensions.max()) + 8e-3
+    piece = _piece(design)
+    wide = (
+        _end_of_cable(design.contour, reach)[0] + piece.length + float(design.curves.extensions.max()) + 8e-3
+    )
     left = -wide if np.isfinite(design.contour.anchor_distance) else -1.3 * reach
     figure, axes = panels(2, 1, height=4.0, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
@@ -55,13 +58,12 @@ def design_picture(design: CamDesign) -> Figure:
         panel.set_ylim(low, high + 2.0)
     figure.set_figheight(2.0 * (WIDTH - 0.8) * (high + 2.0 - low) / ((wide - left) * MM) + 1.2)
     _dimension_radius(axes[0], design, low + 0.02 * (wide - left) * MM)
-    axes[1].set_xlabel(f"distance from the centre in mm{_rubber_note(design)}")
+    axes[1].set_xlabel(f"distance from the centre in mm{piece.note}")
     radius = float(design.contour.radii.max()) * MM
     return described(
         figure,
         f"The designed cam at 0° and {np.degrees(last):.0f}°, to scale: radius {radius:.1f} mm, lever arm up "
-        f"to {MM * float(design.contour.lever_arms.max()):.1f} mm; the rubber is "
-        f"{_rubber_words(design)}.",
+        f"to {MM * float(design.contour.lever_arms.max()):.1f} mm; {piece.words}.",
     )
 
 
@@ -154,13 +156,12 @@ def _halves(contour: Contour, parallel: bool) -> list[Array]:
 
 
 def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: float) -> None:
-    """Draw one element behind the end of the cable: as long as it is, as high as a square of its section."""
-    pieces = _pieces(design)
-    if not pieces:
+    """Draw one element behind the end of the cable: as long as it is, rubber as high as a square section."""
+    piece = _piece(design)
+    if not piece.length:
         return
-    length, area = pieces[0]
-    stretched = length + float(np.interp(angle, design.curves.angles, design.curves.extensions))
-    height, start = float(np.sqrt(area)) * MM, 4.0
+    stretched = piece.length + float(np.interp(angle, design.curves.angles, design.curves.extensions))
+    height, start = piece.height * MM, 4.0
     x = side * (np.array([0.0, stretched * MM, stretched * MM, 0.0]) + start) + place[0]
     y = place[1] + np.array([-0.5, -0.5, 0.5, 0.5]) * height
     axes.fill(x, y, facecolor=ORANGE.light, alpha=0.85)
@@ -172,33 +173,37 @@ def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: flo
         )  # fmt: skip
 
 
-def _pieces(design: CamDesign) -> list[tuple[float, float]]:
-    """Return rest length and section of each piece of rubber in the finished assembly."""
+class _Piece(NamedTuple):
+    """What is stretched behind the cam: length without load and drawn height in m, and both in words."""
+
+    length: float = 0.0
+    height: float = 0.0
+    note: str = ""
+    words: str = "the rubber is not a declared piece"
+
+
+def _piece(design: CamDesign) -> _Piece:
+    """Return the first piece of rubber, or coil of declared wire, in the finished assembly."""
     from ...model import flatten
     from ...model.roles import series_cam
 
     model = flatten(design.actuator)
     cam, values = series_cam(model, design.drive), model.values
-    return [
-        (values[piece.rest_length], float(np.prod([values[name] for name in piece.section])))
-        for piece in cam.specimens
-    ]
-
-
-def _rubber_note(design: CamDesign) -> str:
-    pieces = _pieces(design)
-    if not pieces:
-        return ""
-    length, area = pieces[0]
-    return f"; rubber unstretched {length * MM:.1f} mm, {area * MM**2:.1f} mm² (drawn square)"
-
-
-def _rubber_words(design: CamDesign) -> str:
-    pieces = _pieces(design)
-    if not pieces:
-        return "not a declared piece"
-    length, area = pieces[0]
-    return f"{length * MM:.1f} mm long with a section of {area * MM**2:.0f} mm²"
+    for piece in cam.specimens:
+        length, area = values[piece.rest_length], float(np.prod([values[name] for name in piece.section]))
+        long = f"{length * MM:.1f} mm"
+        return _Piece(
+            length,
+            float(np.sqrt(area)),
+            f"; rubber unstretched {long}, {area * MM**2:.1f} mm² (drawn square)",
+            f"the rubber is {long} long with a section of {area * MM**2:.0f} mm²",
+        )
+    for coil in (each for each in cam.coils if each.winding):
+        wire, mean = (values[name] for name in coil.winding[:2])
+        length, outside = values[coil.free_length], mean + wire
+        size = f"{length * MM:.1f} mm long without load, {outside * MM:.1f} mm outside"
+        return _Piece(length, outside, f"; coil {size}", f"the coil is {size}")
+    return _Piece()
 
 
 def _dimension_radius(axes: Axes, design: CamDesign, y: float) -> None:

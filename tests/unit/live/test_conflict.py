@@ -6,22 +6,33 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
+import pytest
 
 from nlsdesign.design.optimisation.limits import limit_kinds
 from nlsdesign.design.parametric.parametric_program import ProgramRows, SoftenedProgram
 from nlsdesign.live.gallery import gallery_question
+from nlsdesign.live.question import LiveQuestion
+
+MACHINES = ("cam-actuator", "coil_cable_drive")
 
 
-def test_a_slack_widens_its_limit_and_no_other() -> None:
-    """Of all kinds, by differences: the distance to what the limit allows grows by the slack."""
-    question = gallery_question("cam-actuator")
-    question = replace(question, limits={n: each.value for n, each in question.limit_values.items()})
-    question = replace(
-        question, limits={"MaximumCamRadius": 0.03, "PositiveStiffness": 0.1, **question.limits}
-    )
-    assert set(question.limits) == {
+def with_limits(machine: str) -> LiveQuestion:
+    """The question of a machine with every limit that follows from it, and two that do not."""
+    question = gallery_question(machine)
+    limits = {n: each.value for n, each in question.limit_values.items()}
+    return replace(question, limits={"MaximumCamRadius": 0.03, "PositiveStiffness": 0.1, **limits})
+
+
+def test_every_limit_of_the_package_is_tried() -> None:
+    assert {name for machine in MACHINES for name in with_limits(machine).limits} == {
         name for name, kind in limit_kinds().items() if kind.kind.__module__.startswith("nlsdesign.design.")
     }
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_a_slack_widens_its_limit_and_no_other(machine: str) -> None:
+    """Of all kinds, by differences: the distance to what the limit allows grows by the slack."""
+    question = with_limits(machine)
     rows = ProgramRows(question)
     program = SoftenedProgram(rows).program
     count, values = len(rows.bounds), rows.numbers_of(question)
