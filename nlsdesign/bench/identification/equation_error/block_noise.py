@@ -400,25 +400,34 @@ def output_slopes(block: Block, inputs: Array, stride: int) -> Array:
 
     ``inputs``: shape (inputs, n).
     """
-    model, some = block.model, inputs[:, ::stride]
-    start, values = model.start(model.states), model.start(model.parameters)
-    return _functions(block).slopes(some.shape[1], [start, some, values])
+    return _functions(block).slopes(inputs[:, ::stride])
 
 
-class _BlockFunctions(NamedTuple):
-    """The output of a block and its derivatives with respect to the inputs."""
+@dataclass(frozen=True)
+class _BlockFunctions:
+    """The output of a block and its derivatives over its inputs, at the starts of states and parameters."""
 
-    output: ColumnFunction
-    slopes: ColumnFunction
+    rest: tuple[Array, Array]
+    output_function: ColumnFunction
+    slopes_function: ColumnFunction
+
+    def output(self, inputs: Array) -> Array:
+        """Return the output, shape (1, rows)."""
+        return self.output_function(inputs.shape[1], [self.rest[0], inputs, self.rest[1]])
+
+    def slopes(self, inputs: Array) -> Array:
+        """Return the derivatives, shape (inputs, rows)."""
+        return self.slopes_function(inputs.shape[1], [self.rest[0], inputs, self.rest[1]])
 
 
 @lru_cache(maxsize=16)
 def _functions(block: Block) -> _BlockFunctions:
-    """Return both, of states, inputs and parameters; they are asked for on every record."""
-    s = block.model.symbols()
-    slopes = ca.densify(ca.jacobian(s.output, s.input)).T
-    made = (ca.Function("of", [s.state, s.input, s.parameter], [each]) for each in (s.output, slopes))
-    return _BlockFunctions(*map(ColumnFunction, made))
+    """Return the functions of a block, which is asked for them on every record."""
+    model, s = block.model, block.model.symbols()
+    states, parameters = (np.array([v.start for v in group]) for group in (model.states, model.parameters))
+    results = (s.output, ca.jacobian(s.output, s.input).T)
+    made = (ca.Function("of", [s.state, s.input, s.parameter], [ca.densify(each)]) for each in results)
+    return _BlockFunctions((states, parameters), *map(ColumnFunction, made))
 
 
 def measured_inputs(block: Block, record: Record, span: float) -> Array:
@@ -440,14 +449,9 @@ def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[s
     that of a lossy gear where the power turns over, noise is rectified: half the sum of what it causes
     upwards and downwards stays. Rates are smooth already, and so is a motion.
     """
-    model, output = block.model, _functions(block).output
+    model, functions = block.model, _functions(block)
     inputs = measured_inputs(block, record, span)[:, :: max(1, len(record.trace) // _PROBES)]
-    start, values = model.start(model.states), model.start(model.parameters)
     motions = {d.signal for d in block.drives.values() if d.order > 0}
-
-    def at(shifted: Array) -> Array:
-        return output(shifted.shape[1], [start, shifted, values])[0]
-
     shifts = {}
     for i, variable in enumerate(model.inputs):
         drive = block.drives.get(variable.name)
@@ -455,7 +459,8 @@ def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[s
             continue
         step = np.zeros((len(model.inputs), 1))
         step[i] = noise.behind(drive.signal, record.step, order=drive.order, span=span)
-        rest = 0.5 * (at(inputs + step) + at(inputs - step)) - at(inputs)
+        around = [functions.output(inputs + shift) for shift in (step, -step, 0.0 * step)]
+        rest = 0.5 * (around[0] + around[1]) - around[2]
         shifts[variable.name] = float(np.sqrt(np.nanmean(rest**2)))
     return shifts
 

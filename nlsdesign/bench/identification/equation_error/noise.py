@@ -435,7 +435,7 @@ def _misses(counts: Array, lag: int, first: int) -> float:
 def _comes_again(counts: Array, lag: int, first: int, thin: int) -> bool:
     """Tell whether a motion comes again after a lag, and was elsewhere in between."""
     near = _STILL + (float(np.max(np.abs(np.diff(counts)))) if thin > 1 else 1.0)
-    close = np.count_nonzero(np.abs(counts[first + lag :] - counts[first:-lag]) <= near)
+    close = int(np.count_nonzero(np.abs(counts[first + lag :] - counts[first:-lag]) <= near))
     # Most lags have too few samples that are close: counting them is quicker than sorting all.
     return close > int(_NEARLY_ALL * (len(counts) - first - lag - 1)) and (
         _misses(counts, lag, first) <= near and _misses(counts, max(1, lag // 2), first) > _ELSEWHERE * near
