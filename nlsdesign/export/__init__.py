@@ -1,4 +1,4 @@
-"""C code for the controller; FMUs, Modelica text and models of MuJoCo for everybody else; co-simulation of FMUs.
+"""C code for the controller; FMUs, Modelica and MuJoCo models for everybody else; co-simulation of FMUs.
 
 Presentation and commands may import it; it reads models, and designs nothing.
 """
@@ -23,8 +23,7 @@ from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
 from .fmi.reference_results import write_reference
 from .modelica.modelica_model import export_modelica
-from .mujoco.actuator_model import MujocoModel, export_mujoco
-from .mujoco.actuator_model import mujoco_names as mujoco_names
+from .mujoco.actuator_model import export_mujoco
 
 __all__ = [
     "ALL_PLATFORMS",
@@ -40,7 +39,6 @@ __all__ = [
     "Held",
     "Iterated",
     "Late",
-    "MujocoModel",
     "Processor",
     "SamplesOf",
     "Stepping",

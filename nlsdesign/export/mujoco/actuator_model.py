@@ -1,12 +1,12 @@
 """A continuous flat model as a model of MuJoCo: MJCF, and the laws that MuJoCo lacks as C.
 
 Bodies become joints, inner states become activations, and MuJoCo integrates both. Inertias and drives are
-MuJoCo's own elements. All other efforts come from the equations of the flat model, so every law is the deck's.
+MuJoCo's own elements. All other efforts come from the equations of the flat model: each law is the deck's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,7 +33,7 @@ _BODY_SHARE = 1.0e-6
 """Of a motor's inertia in the body, which MuJoCo wants positive; the rest is armature."""
 
 
-class Drive(NamedTuple):
+class _Drive(NamedTuple):
     """An input as an actuator: the joint it acts on, and what MuJoCo does itself with it."""
 
     input: Variable
@@ -77,13 +77,6 @@ class MujocoModel:
         return (self.scene, self.plugin_scene, *self.sources, self.module, *self.others)
 
 
-def mujoco_names(name: str) -> tuple[str, ...]:
-    """Return the names of the files of a model of that name, in the order of ``MujocoModel.files``."""
-    stem = identifier(name)
-    endings = (".xml", "_plugin.xml", ".h", ".c", "_plugin.c", ".py")
-    return (*(f"{stem}{ending}" for ending in endings), "CMakeLists.txt", "README.md")
-
-
 def export_mujoco(model: FlatModel, folder: str | Path) -> MujocoModel:
     """Write a plant as MJCF, with an engine plug-in in C and a Python module that carry its laws.
 
@@ -110,12 +103,11 @@ def export_mujoco(model: FlatModel, folder: str | Path) -> MujocoModel:
     """
     _refuse(model)
     writer = _Writer(model)
-    paths = tuple(Path(folder) / name for name in mujoco_names(model.name))
-    texts = (
-        writer.scene(), writer.plugin_scene(), writer.from_template("mujoco_law.h"),
-        writer.from_template("mujoco_law.c"), writer.from_template("mujoco_plugin.c"),
-        writer.from_template("mujoco_try.txt"), writer.from_template("mujoco_CMakeLists.txt"), writer.from_template("mujoco_readme.md"),
-    )  # fmt: skip
+    stems = [f"{writer.name}{each}" for each in (".xml", "_plugin.xml", ".h", ".c", "_plugin.c", ".py")]
+    paths = [Path(folder) / name for name in (*stems, "CMakeLists.txt", "README.md")]
+    templates = ("law.h", "law.c", "plugin.c", "try.txt", "CMakeLists.txt", "readme.md")
+    generated = [filled(f"mujoco_{each}", writer.values) for each in templates]
+    texts = (writer.scene(), writer.plugin_scene(), *generated)
     write_all(
         {
             path: stamped(text, model) if path.suffix in (".c", ".h") else text
@@ -138,8 +130,8 @@ def _refuse(model: FlatModel) -> None:
         raise ExportError(
             f"{where}: '{model.switching.jumps[0]}'",
             "is sharp, and MuJoCo, which locates no events, cannot carry it",
-            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as FMU, "
-            "which holds the sharp form",
+            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as "
+            "FMU, which holds the sharp form",
         )
     held = [body for body in model.bodies if body.prescribed]
     if held:
@@ -175,25 +167,30 @@ class _Writer:
         return model.values | model.evaluate(list(model.start(model.states)))
 
     @cached_property
-    def drives(self) -> list[Drive]:
+    def drives(self) -> list[_Drive]:
         """One for each input."""
         return [self._drive(v) for v in self.model.inputs]
 
-    def _drive(self, given: Variable) -> Drive:
+    def _drive(self, given: Variable) -> _Drive:
         body = next((b for b in self.model.bodies if given.name in b.drives), self.model.bodies[0])
         motor = body.motor
         if motor is not None and given.name == motor.command and same_dimension(given.unit, "A"):
             gear = self.numbers[motor.gear_ratio] if motor.gear_ratio else 1.0
             limit = self.numbers[motor.current_limit]
-            return Drive(given, body.name, gear, self.numbers[motor.torque_constant], limit)
+            return _Drive(given, body.name, gear, self.numbers[motor.torque_constant], limit)
         direct = given.name in body.drives and same_dimension(given.unit, body.domain.effort_unit)
         # A voltage or a goal makes an effort by a law, which the plug-in carries.
-        return Drive(given, body.name, 1.0, 1.0 if direct else 0.0, None)
+        return _Drive(given, body.name, 1.0, 1.0 if direct else 0.0, None)
 
     def scene(self) -> str:
         """Return the MJCF."""
         model, states = self.model, {v.name: v.start for v in self.model.states}
-        actuators = [_actuator(drive) for drive in self.drives]
+        actuators = [
+            f"<general name={quoteattr(d.input.name)} joint={quoteattr(d.joint)} "
+            f'gear="{d.gear!r}" gainprm="{d.gain!r}"'
+            + ("/>" if d.limit is None else f' ctrlrange="{-d.limit!r} {d.limit!r}"/>')
+            for d in self.drives
+        ]
         if self.inner:
             about = ", ".join(v.name for v in self.inner)
             actuators += [
@@ -206,7 +203,7 @@ class _Writer:
             "qvel": [states[b.rate] for b in model.bodies],
             "act": [v.start for v in self.inner],
         }
-        key = " ".join(f'{name}="{_row(row)}"' for name, row in start.items() if row)
+        key = " ".join(f'{name}="{" ".join(map(repr, row))}"' for name, row in start.items() if row)
         lines = [
             f"<mujoco model={quoteattr(model.name)}>",
             '  <compiler angle="radian" autolimits="true"/>',
@@ -256,12 +253,9 @@ class _Writer:
         about = "\n".join(_xml_comment(line) for line in head)
         return "\n".join([f"<!-- {about} -->", *lines]) + "\n"
 
-    def from_template(self, name: str) -> str:
-        """Return one of the texts that are filled in."""
-        return filled(name, self._values)
-
     @cached_property
-    def _values(self) -> dict[str, str | list[str]]:
+    def values(self) -> dict[str, str | list[str]]:
+        """What fills the templates."""
         model, joints = self.model, [b.name for b in self.model.bodies]
         inputs, inner = [v.name for v in model.inputs], [v.name for v in self.inner]
         parameters, outputs = [v.name for v in model.parameters], [v.name for v in model.outputs]
@@ -292,8 +286,8 @@ class _Writer:
         by_law = [d.input.name for d in self.drives if not d.gain]
         rows = ["- MuJoCo itself: inertias" + "".join(f", the effort of `{d.input.name}`" for d in native)]
         rows.append(
-            "- Plug-in or callback: every other effort of the deck (springs, cams, dashpots, friction, backlash, "
-            "stops)" + "".join(f", the effort of `{name}`" for name in by_law)
+            "- Plug-in or callback: every other effort of the deck (springs, cams, dashpots, friction, "
+            "backlash, stops)" + "".join(f", the effort of `{name}`" for name in by_law)
         )
         if self.inner:
             states = ", ".join(f"`{v.name}`" for v in self.inner)
@@ -319,18 +313,6 @@ class _Writer:
         ]  # fmt: skip
         targets = [_cells("effort", len(efforts)), _cells("rate", len(rates)), _cells("y", s.output.numel())]
         return print_statements(function, texts, targets, real=Real.DOUBLE)
-
-
-def _actuator(drive: Drive) -> str:
-    limit = "" if drive.limit is None else f' ctrlrange="{-drive.limit!r} {drive.limit!r}"'
-    return (
-        f"<general name={quoteattr(drive.input.name)} joint={quoteattr(drive.joint)} "
-        f'gear="{drive.gear!r}" gainprm="{drive.gain!r}"{limit}/>'
-    )
-
-
-def _row(values: Iterable[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
 
 
 def _cells(name: str, count: int) -> list[str]:
