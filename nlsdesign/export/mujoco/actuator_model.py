@@ -19,7 +19,6 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...foundation.quantity import same_dimension
 from ...model.flat import FlatModel, Variable
-from ...model.structure import MovingBody
 from ..c.c_text import Real, comment, identifier, string
 from ..c.instructions import print_statements
 from ..c.provenance import number_lines, origin_lines, origin_macros, stamped
@@ -45,23 +44,7 @@ class _Drive(NamedTuple):
 
 @dataclass(frozen=True)
 class MujocoModel:
-    """Files of an actuator for MuJoCo.
-
-    Parameters
-    ----------
-    name
-        Prefix of all files and C names; the plug-in is ``nlsdesign.NAME``.
-    model
-        The model they compute.
-    scene, plugin_scene
-        MJCF without and with the plug-in.
-    sources
-        C files: interface, laws, plug-in.
-    module
-        Python module that compiles them, loads the plug-in, or sets callbacks.
-    others
-        Build file and description of the folder.
-    """
+    """Files of an actuator: MJCF without and with the plug-in, C, Python module, build file, README."""
 
     name: str
     model: FlatModel
@@ -101,25 +84,6 @@ def export_mujoco(model: FlatModel, folder: str | Path) -> MujocoModel:
     ...     print([file.name for file in nls.export.export_mujoco(model, place).files][:2])
     ['dfki_pendulum.xml', 'dfki_pendulum_plugin.xml']
     """
-    _refuse(model)
-    writer = _Writer(model)
-    stems = [f"{writer.name}{each}" for each in (".xml", "_plugin.xml", ".h", ".c", "_plugin.c", ".py")]
-    paths = [Path(folder) / name for name in (*stems, "CMakeLists.txt", "README.md")]
-    templates = ("law.h", "law.c", "plugin.c", "try.txt", "CMakeLists.txt", "readme.md")
-    generated = [filled(f"mujoco_{each}", writer.values) for each in templates]
-    texts = (writer.scene(), writer.plugin_scene(), *generated)
-    write_all(
-        {
-            path: stamped(text, model) if path.suffix in (".c", ".h") else text
-            for path, text in zip(paths, texts, strict=True)
-        }
-    )
-    return MujocoModel(
-        writer.name, model, paths[0], paths[1], (paths[2], paths[3], paths[4]), paths[5], (paths[6], paths[7])
-    )
-
-
-def _refuse(model: FlatModel) -> None:
     where = f"model '{model.name}'"
     if model.sample_time is not None or model.tables:
         raise ExportError(
@@ -141,6 +105,21 @@ def _refuse(model: FlatModel) -> None:
         )  # fmt: skip
     if not model.bodies:
         raise ExportError(where, "has no body that moves freely", next_step="declare one in the deck")
+    writer = _Writer(model)
+    stems = [f"{writer.name}{each}" for each in (".xml", "_plugin.xml", ".h", ".c", "_plugin.c", ".py")]
+    paths = [Path(folder) / name for name in (*stems, "CMakeLists.txt", "README.md")]
+    templates = ("law.h", "law.c", "plugin.c", "try.txt", "CMakeLists.txt", "readme.md")
+    generated = [filled(f"mujoco_{each}", writer.values) for each in templates]
+    texts = (writer.scene(), writer.plugin_scene(), *generated)
+    write_all(
+        {
+            path: stamped(text, model) if path.suffix in (".c", ".h") else text
+            for path, text in zip(paths, texts, strict=True)
+        }
+    )
+    return MujocoModel(
+        writer.name, model, paths[0], paths[1], (paths[2], paths[3], paths[4]), paths[5], (paths[6], paths[7])
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,18 +148,19 @@ class _Writer:
     @cached_property
     def drives(self) -> list[_Drive]:
         """One for each input."""
-        return [self._drive(v) for v in self.model.inputs]
-
-    def _drive(self, given: Variable) -> _Drive:
-        body = next((b for b in self.model.bodies if given.name in b.drives), self.model.bodies[0])
-        motor = body.motor
-        if motor is not None and given.name == motor.command and same_dimension(given.unit, "A"):
-            gear = self.numbers[motor.gear_ratio] if motor.gear_ratio else 1.0
-            limit = self.numbers[motor.current_limit]
-            return _Drive(given, body.name, gear, self.numbers[motor.torque_constant], limit)
-        direct = given.name in body.drives and same_dimension(given.unit, body.domain.effort_unit)
-        # A voltage or a goal makes an effort by a law, which the plug-in carries.
-        return _Drive(given, body.name, 1.0, 1.0 if direct else 0.0, None)
+        drives = []
+        for v in self.model.inputs:
+            body = next((b for b in self.model.bodies if v.name in b.drives), self.model.bodies[0])
+            motor, known = body.motor, self.numbers
+            if motor is not None and v.name == motor.command and same_dimension(v.unit, "A"):
+                gear = known[motor.gear_ratio] if motor.gear_ratio else 1.0
+                gain, limit = known[motor.torque_constant], known[motor.current_limit]
+                drives.append(_Drive(v, body.name, gear, gain, limit))
+            else:
+                # A voltage or a goal makes an effort by a law, which the plug-in carries.
+                direct = v.name in body.drives and same_dimension(v.unit, body.domain.effort_unit)
+                drives.append(_Drive(v, body.name, 1.0, 1.0 if direct else 0.0, None))
+        return drives
 
     def scene(self) -> str:
         """Return the MJCF."""
@@ -198,6 +178,19 @@ class _Writer:
                 f'<general name="{HOLDER}" joint={quoteattr(model.bodies[0].name)} dyntype="user" '
                 f'actdim="{len(self.inner)}" gainprm="0"/>',
             ]
+        bodies = list[str]()
+        for body in model.bodies:
+            inertia, turning = self.numbers[str(body.inertia)], same_dimension(body.domain.effort_unit, "N*m")
+            kind, axis = ("hinge", "0 0 1") if turning else ("slide", "1 0 0")
+            own = inertia * _BODY_SHARE if body.motor and turning else inertia
+            armature = f' armature="{inertia - own!r}"' if own != inertia else ""
+            bodies += [
+                f"<body name={quoteattr(body.name)}>",
+                f'  <joint name={quoteattr(body.name)} type="{kind}" axis="{axis}"{armature}/>',
+                # The centre of mass lies on the axis, so the mass of what turns has no effect.
+                f'  <inertial pos="0 0 0" mass="{own!r}" diaginertia="{own!r} {own!r} {own!r}"/>',
+                "</body>",
+            ]
         start = {
             "qpos": [states[b.motion] for b in model.bodies],
             "qvel": [states[b.rate] for b in model.bodies],
@@ -209,7 +202,7 @@ class _Writer:
             '  <compiler angle="radian" autolimits="true"/>',
             f'  <option timestep="{STEP}" integrator="RK4"/>',
             "  <worldbody>",
-            *(f"    {line}" for body in model.bodies for line in self._body(body)),
+            *(f"    {line}" for line in bodies),
             "  </worldbody>",
             "  <actuator>",
             *(f"    {line}" for line in actuators),
@@ -218,21 +211,6 @@ class _Writer:
             "</mujoco>",
         ]
         return self._xml(lines)
-
-    def _body(self, body: MovingBody) -> list[str]:
-        inertia = self.numbers[str(body.inertia)]
-        turning = same_dimension(body.domain.effort_unit, "N*m")
-        kind, axis = ("hinge", "0 0 1") if turning else ("slide", "1 0 0")
-        own = inertia * _BODY_SHARE if body.motor and turning else inertia
-        armature = f' armature="{inertia - own!r}"' if own != inertia else ""
-        name = quoteattr(body.name)
-        return [
-            f"<body name={name}>",
-            f'  <joint name={name} type="{kind}" axis="{axis}"{armature}/>',
-            # The centre of mass lies on the axis, so the mass of what turns has no effect.
-            f'  <inertial pos="0 0 0" mass="{own!r}" diaginertia="{own!r} {own!r} {own!r}"/>',
-            "</body>",
-        ]
 
     def plugin_scene(self) -> str:
         """Return the MJCF that takes the other one and adds the plug-in."""
@@ -271,17 +249,18 @@ class _Writer:
             "origin": [_plain(line) for line in origin_lines(model)],
             "macros": origin_macros(model, self.name),
             "values": [f"{Real.DOUBLE.literal(v.start)}, /* {comment(v.name)} */" for v in model.parameters],
-            "statements": self._statements(),
+            "statements": self.statements,
             "numbers": number_lines(model),
             "attributes": [f"{string(name)}," for name in parameters],
             "joint_rows": [f"{string(name)}," for name in joints],
             "actuator_rows": [f"{string(name)}," for name in inputs],
             "parameter_rows": [f"{name!r}," for name in parameters],
-            "carried": self._carried(),
+            "carried": self.carried,
         }  # fmt: skip
 
-    def _carried(self) -> list[str]:
-        """Return what MuJoCo does itself and what the equations of the deck do, as rows of a list."""
+    @cached_property
+    def carried(self) -> list[str]:
+        """What MuJoCo does itself and what the equations of the deck do, as rows of a list."""
         native = [d for d in self.drives if d.gain]
         by_law = [d.input.name for d in self.drives if not d.gain]
         rows = ["- MuJoCo itself: inertias" + "".join(f", the effort of `{d.input.name}`" for d in native)]
@@ -294,8 +273,9 @@ class _Writer:
             rows.append(f"- Inner states, integrated by MuJoCo as activations of `{HOLDER}`: {states}")
         return [*rows, ""]
 
-    def _statements(self) -> list[str]:
-        """Return the body of the C function that gives efforts, rates of inner states, and outputs."""
+    @cached_property
+    def statements(self) -> list[str]:
+        """The body of the C function that gives efforts, rates of inner states, and outputs."""
         model, s = self.model, self.model.symbols()
         place = {v.name: i for i, v in enumerate(model.states)}
         signal = {v.name: s.signal[i] for i, v in enumerate(model.signals)}
