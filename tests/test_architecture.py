@@ -86,7 +86,9 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"parametric"}, {"jobs"}),
     "feedback.observer": ({"scheduling"}, {"adaptive"}, {"certificates"}, {"spread"}),
     "feedback.control": ({"laws"}, {"closed_loop"}, {"evaluation"}, {"tuning"}),
-    "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "modelica"}, {"exported_files"}),
+    "export": (
+        {"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "modelica", "mujoco"}, {"exported_files"},
+    ),
 }  # fmt: skip
 
 # library: the only places that may know it

@@ -1,4 +1,4 @@
-"""``nlsdesign export``: C code and Modelica text, and whether exported files belong together."""
+"""``nlsdesign export``: C code, Modelica text, MuJoCo models; and whether files belong together."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 
 @click.group()
 def export() -> None:
-    """Write C code, FMUs or Modelica text."""
+    """Write C code, FMUs, Modelica text or MuJoCo models."""
 
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
@@ -200,6 +200,29 @@ def export_modelica_text(
     assembly = declare(load_deck(deck_name))
     model = flatten(smoothed(assembly) if smooth else assembly, outputs=list(outputs) or None)
     show_written(as_json, (), [export_modelica(model, out)])
+
+
+@export.command(
+    "mujoco",
+    epilog=examples(
+        "nlsdesign export mujoco --deck austin2015_figure_consistent",
+        "nlsdesign export mujoco --deck my.toml --smooth --out out/joint",
+    ),
+)
+@deck_option
+@click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
+@out_option("out/mujoco")
+@json_option
+def export_for_mujoco(deck_name: str, smooth: bool, out: Path, as_json: bool) -> None:
+    """Write the plant as MJCF with a plug-in for its laws. A Python module tries both out."""
+    from ..components import declare, smoothed
+    from ..export import export_mujoco
+    from ..foundation.deck import load_deck
+    from ..model import flatten
+
+    assembly = declare(load_deck(deck_name))
+    written = export_mujoco(flatten(smoothed(assembly) if smooth else assembly), out)
+    show_written(as_json, (f"next: python {written.module}",), written.files)
 
 
 TOGETHER, APART, UNREADABLE = 0, 1, 2

@@ -1,4 +1,4 @@
-"""C code for the controller, FMUs and Modelica text for everybody else, and co-simulation of FMUs.
+"""C code for the controller; FMUs, Modelica and MuJoCo models for everybody else; co-simulation of FMUs.
 
 Presentation and commands may import it; it reads models, and designs nothing.
 """
@@ -23,6 +23,7 @@ from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
 from .fmi.reference_results import write_reference
 from .modelica.modelica_model import export_modelica
+from .mujoco.actuator_model import export_mujoco
 
 __all__ = [
     "ALL_PLATFORMS",
@@ -47,6 +48,7 @@ __all__ = [
     "export_c",
     "export_fmu",
     "export_modelica",
+    "export_mujoco",
     "measure_on_target",
     "natively",
     "quickest",

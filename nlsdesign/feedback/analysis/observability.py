@@ -112,7 +112,8 @@ class Observability(View):
         self._check(points.model)
         a, c = self.scaled(points)
         _, singular, directions = np.linalg.svd(observability_matrices(a, c), full_matrices=True)
-        singular = _padded(singular, a.shape[-1])
+        # Directions that no row can see have the singular value zero.
+        singular = np.pad(singular, ((0, 0), (0, a.shape[-1] - singular.shape[-1])))
         seen = singular > self.tolerance * singular[:, :1]
         _, gramians = exponential_and_gramian(a / self.time_scale, transposed(c) @ c, self.horizon)
         gramian = np.asarray(np.linalg.eigvalsh(gramians), dtype=float)
@@ -208,12 +209,6 @@ def in_words(direction: Array, names: tuple[str, ...]) -> str:
     if len(large) == 1:
         return names[int(large[0])]
     return " ".join(f"{sign * direction[i]:+.2f} {names[i]}" for i in large)
-
-
-def _padded(singular: Array, count: int) -> Array:
-    """Return the singular values with zeros for directions that no row can see."""
-    missing = count - singular.shape[-1]
-    return np.pad(singular, ((0, 0), (0, missing))) if missing else singular
 
 
 def _ratio(largest: Array, smallest: Array, tolerance: float) -> Array:

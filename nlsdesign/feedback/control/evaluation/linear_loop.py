@@ -336,11 +336,12 @@ class _Assembler:
     def _pass(self, values: dict[str, Array], rows: dict[str, Array]) -> dict[str, tuple[Array, Array]]:
         following = {}
         for b, model in self.system.blocks.items():
-            sources = [self._source(f"{b}.{v.name}") for v in model.inputs]
+            names = [f"{b}.{v.name}" for v in model.inputs]
+            sources = [name if name in self.cut else self.system.sources[name] for name in names]
             # A cut loop rests where the closed one does.
-            resting = [values[self.system.sources[f"{b}.{v.name}"]] for v in model.inputs]
+            resting = [values[self.system.sources[name]] for name in names]
             point = self.blocks[b].at(self.state[b], np.stack(resting, axis=1))
-            given = np.stack([rows[name] for name in sources], axis=1)
+            given = np.stack([rows[source] for source in sources], axis=1)
             first, count = self.first[b], len(model.states)
             after, out = point.b @ given, point.d @ given
             after[:, :, first : first + count] += point.a
@@ -349,9 +350,6 @@ class _Assembler:
                 values[f"{b}.{v.name}"], rows[f"{b}.{v.name}"] = point.output[:, i], out[:, i]
             following[b] = (point.following, after)
         return following
-
-    def _source(self, name: str) -> str:
-        return name if name in self.cut else self.system.sources[name]
 
     def loop(self, angles: Array, mode: LinearMode) -> LinearLoop:
         """Return the whole."""
