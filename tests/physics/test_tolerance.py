@@ -6,6 +6,7 @@ its spline. Nothing of the package's geometry, law or statistics is used on the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -379,7 +380,8 @@ def test_alone_and_measured_and_halved_are_those_of_other_spreads() -> None:
     """What a cause does alone, or less of it, is what an analysis with these spreads gives."""
     result = tolerance_analysis(actuator(), target=TARGET, draws=1000, seed=5)
     effect = next(each for each in result.causes if each.cause.name == "spring.element.moduli")
-    halved = SpreadRules(given={"spring.element.moduli": 0.075})
+    # A spread is one of the logarithm: half as large is half of ln 1.15.
+    halved = SpreadRules(given={"spring.element.moduli": math.sqrt(1.15) - 1.0})
     again = tolerance_analysis(actuator(), target=TARGET, draws=1000, seed=5, rules=halved)
     assert effect.halved == pytest.approx(again.quantiles[-1].value, rel=1e-9)
     assert effect.halved_after_trim == pytest.approx(again.trims[0].quantiles[-1].value, rel=5e-3)

@@ -35,6 +35,8 @@ _LINK = "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d+\.\d+")
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 _REFERENCE = re.compile(r"#([\w-]+)")
+_HASHED = re.compile(r'(?<=id=")([A-Za-z])[0-9a-f]{10}(?=")|(?<=#)([A-Za-z])[0-9a-f]{10}\b')
+"""Identifiers that matplotlib makes of coordinates, whose last digits differ from processor to processor."""
 _MARKS = (f"{_SVG}use", f"{_SVG}path")
 _GEOMETRY = ("d", "x", "y", "points", "width", "height")
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -44,11 +46,18 @@ _VARIABLES = {tone.light: f"var(--{tone.name})" for tone in TONES}
 
 def svg_text(figure: Figure) -> str:
     """Return a figure as a file of its own: light colours on white."""
-    stream = io.StringIO()
     with mpl.rc_context({**STYLE, "savefig.facecolor": "white"}), _any_letters():
-        metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}
-        figure.savefig(stream, format="svg", metadata=metadata)
-    return stream.getvalue()
+        return _saved(figure, {"Date": None, "Creator": None, "Description": alternative_text(figure)})
+
+
+def _saved(figure: Figure, metadata: dict[str, str | None]) -> str:
+    """Return what matplotlib writes, with identifiers that are numbered in their order."""
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", metadata=metadata)
+    numbers: dict[str, int] = {}
+    return _HASHED.sub(
+        lambda match: f"{match[1] or match[2]}{numbers.setdefault(match[0], len(numbers))}", stream.getvalue()
+    )
 
 
 def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
@@ -66,10 +75,8 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
     alternative
         Alternative text; by default the one attached to the figure.
     """
-    stream = io.StringIO()
     with mpl.rc_context(STYLE), _any_letters():
-        figure.savefig(stream, format="svg", metadata={"Date": None})
-    root = ET.fromstring(stream.getvalue())
+        root = ET.fromstring(_saved(figure, {"Date": None}))
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
