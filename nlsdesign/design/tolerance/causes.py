@@ -201,7 +201,7 @@ class SpreadRules:
         How the moduli of one piece deviate.
     given
         Spreads that replace declared and assumed ones, by name of the cause: a :class:`Spread`, or one
-        standard deviation in the unit of the number, relative for rows and moduli; zero for none.
+        standard deviation in the unit of the number, for rows and moduli relative as in a deck; zero for none.
     """
 
     material: MaterialScatter = field(default_factory=OneBatch)
@@ -273,6 +273,8 @@ def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: Sprea
     alone = len(rows) == 1 and name == first.name and not name.endswith("]")
     if given is not None:
         spread = _given_spread(name, given, first.unit if alone else "1")
+        if not alone and isinstance(spread, NormalSpread) and not isinstance(given, Spread):
+            spread = RelativeSpread(spread.size)  # of the logarithm, as a declared one
         size = spread.standard_error(first.start if alone else 1.0)
         share = size / (abs(first.start) or 1.0) if alone else size
         amounts, source, relative = [size] if alone else [share * v.start for v in rows], "given", not alone
