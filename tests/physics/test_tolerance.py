@@ -227,7 +227,8 @@ def test_another_size_of_an_anchored_cam_is_another_support_function() -> None:
     row = control_values(phi, np.array([support(at) for at in phi]), count=64)
     cam = AnchoredCam(support=row, last_direction=2.0, anchor_distance=ANCHOR, elements=2.0, changeover=1e-6)
     spring = made(actuator(cam), rules=SpreadRules(given={"spring.cam.support": 0.01}))
-    larger = actuator(replace(cam, support=tuple(1.02 * each for each in row)))
+    factor = 1.0 + 2.0 * np.log1p(0.01)  # two standard deviations of a relative spread
+    larger = actuator(replace(cam, support=tuple(factor * each for each in row)))
     expected = equilibrium_torque(flatten(larger), None, spring.angles)
     change = np.max(np.abs(expected - spring.nominal))
     assert change > 0.01 * TARGET.largest
@@ -380,7 +381,7 @@ def test_alone_and_measured_and_halved_are_those_of_other_spreads() -> None:
     """What a cause does alone, or less of it, is what an analysis with these spreads gives."""
     result = tolerance_analysis(actuator(), target=TARGET, draws=1000, seed=5)
     effect = next(each for each in result.causes if each.cause.name == "spring.element.moduli")
-    # A spread is one of the logarithm. Half of what each draw deviates and a spread of half the logarithm agree
+    # A spread is one of the logarithm. Half of what each draw deviates and a spread of half of it agree
     # to second order: they differ by (s z)²/8 of the deviation.
     second = math.log1p(0.15) ** 2 / 8.0
     halved = SpreadRules(given={"spring.element.moduli": math.sqrt(1.15) - 1.0})

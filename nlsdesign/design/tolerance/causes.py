@@ -201,7 +201,7 @@ class SpreadRules:
         How the moduli of one piece deviate.
     given
         Spreads that replace declared and assumed ones, by name of the cause: a :class:`Spread`, or one
-        standard deviation in the unit of the number, for rows and moduli relative as in a deck; zero for none.
+        standard deviation in the unit of the number, of rows and moduli relative as in a deck; zero for none.
     """
 
     material: MaterialScatter = field(default_factory=OneBatch)
