@@ -11,12 +11,13 @@ from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.components import Assembly, InextensibleCable
 from nlsdesign.model import flatten
 from tests.rig import ACTUATORS, make_records, write_set
+from tests.rig.records import RECORDS
 
 declared_rig = test_rig_deck
 
 
 def rig_set(
-    folder: Path, actuator: str, effects: Mapping[str, float], seed: int, *, only: Sequence[str] | None = None
+    folder: Path, actuator: str, effects: Mapping[str, float], seed: int, *, only: Sequence[str] = RECORDS
 ) -> tuple[Assembly, RecordSet]:
     """Write a set, or only some of its records, as a bench leaves it, and read it back as a user would."""
     write_set(folder, ACTUATORS[actuator], make_records(ACTUATORS[actuator], effects, seed, only=only))
