@@ -47,7 +47,7 @@ _PLAINLY_ONE = 4.0
 its corner to count as seen: it is then seven times as probable."""
 _PLAIN = 1.5
 """Density at the lowest frequency over that of the white part, up to which noise counts as white."""
-_SCATTER = 3.0
+_SURELY = 3.0
 """Standard errors of a band by which a motion stands out of its counts to be seen: by chance, one band in a
 thousand does."""
 _STILL = 1.5
@@ -390,8 +390,8 @@ def _above_motion(record: Record, motions: Mapping[str, float], signal: str, whi
     """Return a signal above the frequency from which on no motion leaves the counts that it is between.
 
     A reading that flips between two counts has a variance of a quarter of their square, the most that it can
-    have. Nothing is returned if a change of the signal as large as its white noise could move a body there by
-    less than that: what a motion costs at least, per acceleration, follows from where it is seen.
+    have. What a signal may do there unseen follows from what a motion costs at least, per acceleration, where
+    it is seen. Nothing is returned if that stands out of the white noise of the signal.
     """
     highest, hidden = 0.0, 0.0
     spent = _bands([_periodogram(Stretch(record.trace[signal], record.step, 0))])
@@ -401,13 +401,19 @@ def _above_motion(record: Record, motions: Mapping[str, float], signal: str, whi
         costs = {
             frequency: own / (density * frequency**4)
             for (frequency, density, count), (_, own, _) in zip(moved, spent, strict=True)
-            # The logarithm of the median of n exponential numbers scatters by 1/(ln 2·√n).
-            if density > unseen * math.exp(_SCATTER / (math.log(2.0) * math.sqrt(count)))
+            if density > unseen * math.exp(_SURELY * _scatter(count))
         }
         if costs:
             highest = max(highest, _BAND * max(costs))
             hidden = max(hidden, unseen * min(costs.values()))
-    return [Stretch(record.trace[signal], record.step, 0, highest)] if hidden * highest**4 < white**2 else []
+    above = next((count for frequency, _, count in spent if frequency > highest), 0)
+    shown = above > 0 and hidden * highest**4 < _scatter(above) * white**2
+    return [Stretch(record.trace[signal], record.step, 0, highest)] if shown else []
+
+
+def _scatter(count: int) -> float:
+    """Return the standard error of the logarithm of the median of so many exponential numbers."""
+    return 1.0 / (math.log(2.0) * math.sqrt(count))
 
 
 def _length(stretches: Sequence[Stretch]) -> float:
