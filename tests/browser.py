@@ -31,6 +31,10 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
+class NavigatedError(Exception):
+    """The page was left while it was asked."""
+
+
 @dataclass
 class Tab:
     """One page of a browser.
@@ -76,6 +80,8 @@ class Tab:
         while True:
             answer = self._next()
             if answer.get("id") == number:
+                if "navigated" in answer.get("error", {}).get("message", ""):
+                    raise NavigatedError(method)
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 return dict(answer["result"])
 
@@ -117,10 +123,14 @@ class Tab:
     def until(self, expression: str, *, seconds: float = 30.0) -> Any:
         """Return the value of an expression once it is true."""
         last = time.monotonic() + seconds
-        while not (value := self.evaluate(expression)):
+        while True:
+            try:
+                if value := self.evaluate(expression):
+                    return value
+            except NavigatedError:
+                pass  # the next page is asked
             assert time.monotonic() < last, f"never came true: {expression}"
             time.sleep(0.02)
-        return value
 
     def accessible(self) -> list[tuple[str, str]]:
         """Return role and name of all that a screen reader is given."""

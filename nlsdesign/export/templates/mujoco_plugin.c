@@ -173,6 +173,11 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
 mjPLUGIN_LIB_INIT(@name@)
 {
     mjpPlugin plugin;
+    /* An error of MuJoCo within a constructor would leave the loader of the system locked. */
+    if (mjp_getPlugin("nlsdesign.@name@", NULL)) {
+        mju_warning("nlsdesign.@name@ is loaded already; the laws that were loaded first stay");
+        return;
+    }
     mjp_defaultPlugin(&plugin);
     plugin.name = "nlsdesign.@name@";
     plugin.capabilityflags = mjPLUGIN_PASSIVE | mjPLUGIN_ACTUATOR;

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import math
 import shutil
+import threading
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -39,7 +41,8 @@ CLOSE = 1e-3
 
 
 def plant(deck: str = DECK) -> FlatModel:
-    return flatten(smoothed(declare(load_deck(deck))))
+    # The code of the page in docs loads a plug-in of the deck's own name, maybe in this process.
+    return replace(flatten(smoothed(declare(load_deck(deck)))), name=f"{deck}_smooth")
 
 
 def module_of(written: MujocoModel) -> ModuleType:
@@ -59,6 +62,27 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[MujocoModel, Mod
     module = module_of(written)
     module.load_plugin()
     return written, module
+
+
+def test_a_second_plugin_of_a_name_is_refused_and_leaves_the_process_able_to_load(
+    exported: tuple[MujocoModel, ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of MuJoCo while a library is loaded leaves the loader locked: any other thread hangs then."""
+    written, _ = exported
+    again = module_of(export_mujoco(plant(), tmp_path / "same"))
+    again.load_plugin()
+    stiffer = plant().with_values({"bearing.damping": 2.0 * plant().values["bearing.damping"]})
+    other = export_mujoco(stiffer, tmp_path / "other")
+    assert other.name == written.name
+    with pytest.raises(RuntimeError, match="has loaded other laws under that name"):
+        module_of(other).load_plugin()
+    monkeypatch.chdir(tmp_path)  # where MuJoCo writes its log
+    library = shutil.copy(written.module.with_name(f"{written.name}_plugin.so"), tmp_path)
+    mujoco.mj_loadPluginLibrary(str(library))
+    loading = threading.Thread(target=ctypes.CDLL, args=(None,), daemon=True)
+    loading.start()
+    loading.join(20.0)
+    assert not loading.is_alive()
 
 
 def difference(angles: Array, own: Array) -> float:
