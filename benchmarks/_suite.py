@@ -116,15 +116,6 @@ SUITE = (
         modules=("ziglang",),
     ),
     Benchmark(
-        "mujoco_actuator", "A step of the actuator in MuJoCo",
-        "actuators, spring and friction that MuJoCo has, on the same bodies",
-        (
-            Promise("time of a step over that with a position servo", r"(?m)^position.* ([\d.]+)$", most=2),
-            Promise("time of a step over that with a motor", r"(?m)^motor.* ([\d.]+)$", most=2),
-        ),
-        modules=("mujoco",),
-    ),
-    Benchmark(
         "batches", "1,000 draws of the published loop in one batch",
         "one call of ours per draw; `solve_ivp` from sample to sample",
         (

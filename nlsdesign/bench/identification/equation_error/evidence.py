@@ -103,10 +103,7 @@ class Bench:
         self._blocks = tuple(blocks)
         self.records = in_canonical_order(with_sampling(records, sampling or {}))
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
-        drives = [drive for block in blocks for drive in block.drives.values()]
-        inputs = {d.signal for d in drives} - {d.signal for d in drives if d.order > 0}
-        targets = {b.target for b in blocks if b.target}
-        self.noise = noise or estimate_noise(self.records, targets, sorted(inputs))
+        self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
         self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
         self._scales = {block.name: block.effort_per_drive for block in blocks}
         self._as_measured, self._floors_as_measured = self.records, dict(self.floors)

@@ -47,9 +47,6 @@ _PLAINLY_ONE = 4.0
 its corner to count as seen: it is then seven times as probable."""
 _PLAIN = 1.5
 """Density at the lowest frequency over that of the white part, up to which noise counts as white."""
-_SURELY = 3.0
-"""Standard errors of a band by which a motion stands out of its counts to be seen: by chance, one band in a
-thousand does."""
 _STILL = 1.5
 """Counts within which a motion is at rest, or comes again."""
 _ELSEWHERE = 10.0
@@ -72,14 +69,11 @@ class Stretch(NamedTuple):
         Time between them in s.
     lag
         Samples after which it was subtracted from itself, divided by √2; zero where it was not.
-    above
-        Frequency in Hz above which alone it shows its noise.
     """
 
     samples: Array
     step: float
     lag: int
-    above: float = 0.0
 
 
 class NoisePart(NamedTuple):
@@ -235,7 +229,7 @@ def _periodogram(stretch: Stretch) -> tuple[Array, Array]:
     window = np.hanning(n)
     power: Array = np.abs(np.fft.rfft((stretch.samples - smooth) * window)) ** 2 / np.sum(window**2)
     frequency = np.asarray(np.fft.rfftfreq(n, stretch.step), dtype=np.float64)
-    seen = frequency > max(_LOWEST / (n * stretch.step), stretch.above)
+    seen = frequency > _LOWEST / (n * stretch.step)
     seen[-1] = False
     gain = np.ones_like(frequency)
     if stretch.lag:
@@ -271,7 +265,7 @@ def _bands(given: Sequence[tuple[Array, Array]]) -> list[tuple[float, float, int
     return result
 
 
-Evidence: TypeAlias = Literal["rest", "repetition", "above motion", "white only"]
+Evidence: TypeAlias = Literal["rest", "repetition", "white only"]
 """Where the colour of a noise is known from; ``white only`` where nothing shows it."""
 
 
@@ -336,15 +330,13 @@ class Noise:
         return weights if taps is None else np.convolve(weights, taps)
 
 
-def estimate_noise(records: RecordSet, targets: Collection[str] = (), inputs: Collection[str] = ()) -> Noise:
+def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     """Estimate the noise of every channel from the records themselves.
 
     ``records``: those held out are not looked at, unless there are no others; the median over the records is
     taken. ``targets``: signals that blocks predict, whose noise may have a colour: it is told where all
     motions are at rest, and from what is left of a motion that repeats when it is subtracted from itself one
-    period later. What drives a block varies at rest for other reasons than noise. ``inputs``: signals that
-    drive blocks and are no motions. Their colour is told above the frequency from which on no motion is seen:
-    what is real in them moves something, so the rest is noise. Below, it is taken to be flat or to rise on.
+    period later. What drives a block varies at rest for other reasons than noise.
     """
     seen = records.deciding
     level, rounded, quanta = {}, {}, {}
@@ -364,56 +356,20 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = (), inputs: Co
     lengths: dict[str, tuple[float, ...]] = {}
     evidence: dict[str, Evidence] = dict.fromkeys(level, "white only")
     quiet = [(r, *_quiet(r, motions)) for r in seen] if motions else []
-    for signal in dict.fromkeys((*targets, *inputs)):
+    for signal in targets:
         if signal not in level or rounded[signal]:
             continue
-        if signal in targets:
-            at_rest = [Stretch(r.trace[signal][s], r.step, 0) for r, rest, _ in quiet for s in rest]
-            repeated = [_difference(r, signal, *pair) for r, _, repeats in quiet for pair in repeats]
-            kind: Evidence = "rest" if _length(at_rest) >= _length(repeated) else "repetition"
-            shown = at_rest + repeated
-        else:
-            kind = "above motion"
-            shown = [s for r in seen if motions for s in _above_motion(r, motions, signal, level[signal])]
-        colour = colour_of(shown, max(r.step * len(r.trace) for r in seen))
+        at_rest = [Stretch(r.trace[signal][s], r.step, 0) for r, rest, _ in quiet for s in rest]
+        repeated = [_difference(r, signal, *pair) for r, _, repeats in quiet for pair in repeats]
+        colour = colour_of(at_rest + repeated, max(r.step * len(r.trace) for r in seen))
         if colour is None:
             continue
-        evidence[signal] = kind
+        evidence[signal] = "rest" if _length(at_rest) >= _length(repeated) else "repetition"
         if colour.parts:
             least = quanta[signal] / math.sqrt(12.0)
             level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
-            lengths[signal] = tuple(s.step * len(s.samples) for s in shown)
+            lengths[signal] = tuple(s.step * len(s.samples) for s in at_rest + repeated)
     return Noise(level, rounded, parts, evidence, lengths).read_as(records)
-
-
-def _above_motion(record: Record, motions: Mapping[str, float], signal: str, white: float) -> list[Stretch]:
-    """Return a signal above the frequency from which on no motion leaves the counts that it is between.
-
-    A reading that flips between two counts has a variance of a quarter of their square, the most that it can
-    have. What a signal may do there unseen follows from what a motion costs at least, per acceleration, where
-    it is seen. Nothing is returned if that stands out of the white noise of the signal.
-    """
-    highest, hidden = 0.0, 0.0
-    spent = _bands([_periodogram(Stretch(record.trace[signal], record.step, 0))])
-    for name, quantum in motions.items():
-        unseen = quantum**2 / 4.0
-        moved = _bands([_periodogram(Stretch(record.trace[name], record.step, 0))])
-        costs = {
-            frequency: own / (density * frequency**4)
-            for (frequency, density, count), (_, own, _) in zip(moved, spent, strict=True)
-            if density > unseen * math.exp(_SURELY * _scatter(count))
-        }
-        if costs:
-            highest = max(highest, _BAND * max(costs))
-            hidden = max(hidden, unseen * min(costs.values()))
-    above = next((count for frequency, _, count in spent if frequency > highest), 0)
-    shown = above > 0 and hidden * highest**4 < _scatter(above) * white**2
-    return [Stretch(record.trace[signal], record.step, 0, highest)] if shown else []
-
-
-def _scatter(count: int) -> float:
-    """Return the standard error of the logarithm of the median of so many exponential numbers."""
-    return 1.0 / (math.log(2.0) * math.sqrt(count))
 
 
 def _length(stretches: Sequence[Stretch]) -> float:
