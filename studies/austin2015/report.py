@@ -82,9 +82,9 @@ def write_page(results: Results, out: Path) -> None:
 def diagnosis_sections(results: Results) -> list[Section]:
     """Show the verdict; its tables and figures are folded."""
     chapter, card = verdict_sections(results.verdict)
-    evidence = card.parts if isinstance(card, VerdictSection) else ()
-    shown = replace(card, parts=()) if isinstance(card, VerdictSection) else card
-    return [chapter, shown, FoldedSection("Evidence", (*evidence, TextSection("The records", RECORDS)))]
+    assert isinstance(card, VerdictSection)
+    evidence = FoldedSection("Evidence", (*card.parts, TextSection("The records", RECORDS)))
+    return [chapter, replace(card, parts=()), evidence]
 
 
 def answers(results: Results) -> TableSection:

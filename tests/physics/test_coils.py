@@ -204,6 +204,28 @@ def test_limits_follow_from_what_a_coil_declares() -> None:
     assert stated == (MaximumTravel(0.04),)
 
 
+@pytest.mark.parametrize(
+    ("coil", "words"),
+    [
+        (replace(PULLED, **STATED), "nothing limits what the wire bears"),  # type: ignore[arg-type]
+        (replace(PULLED, free_length=0.02), "long when they touch, more than 0.02 m"),
+    ],
+)
+def test_a_design_says_what_is_not_known_or_does_not_fit(coil: Coil, words: str) -> None:
+    settings = DesignSettings(draws=0, look_for_size_ranges=False, look_for_remedies=False, starts=1)
+    design = nls.design_cam(machine(coil), target=TARGET, free=["spring.cam.contour"], settings=settings)
+    assert [remark for remark in design.remarks if words in remark]
+    plain = nls.design_cam(machine(PULLED), target=TARGET, free=["spring.cam.contour"], settings=settings)
+    assert not [remark for remark in plain.remarks if words in remark]
+
+
+def test_an_outside_diameter_is_larger_by_one_wire(tmp_path: Path) -> None:
+    text = HEADS.replace("mean_diameter", "outer_diameter") + SMALL
+    (tmp_path / "coils.csv").write_text(text, encoding="utf-8")
+    ((_, drive),) = CoilStock(tmp_path / "coils.csv").options(machine(PULLED))
+    assert drive.quantities()["spring.coil.mean_diameter"].number == pytest.approx(19.6e-3 - 2.8e-3)
+
+
 HEADS = (
     "number,wire_diameter [mm],mean_diameter [mm],active_coils,initial_tension [N],largest_extension [mm]\n"
 )
@@ -247,6 +269,8 @@ def test_the_smallest_coil_of_a_catalogue_that_holds_is_taken(tmp_path: Path) ->
     [
         (HEADS + SMALL.replace("19.6", "9.6"), r"coils.csv, line 2: .*spring index 3.43 must lie in"),
         ("number,mean_diametre [mm]\n1,20\n", r"mean_diametre.*did you mean 'mean_diameter'"),
+        (HEADS + SMALL + LARGE + SMALL, "coils.csv, line 4: has the number of line 2"),
+        (f"rate [N/mm],{HEADS}" + f"20,{SMALL}", "rate and wire_diameter: say the same twice"),
         ("number,mass [g],strength_at_1_mm [MPa]\n1,20,1800\n", "says nothing without strength_exponent"),
     ],
 )

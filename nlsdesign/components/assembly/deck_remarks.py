@@ -8,7 +8,6 @@ from ...foundation.quantity import Quantity
 from ...foundation.spread import RelativeSpread
 from ..core.element import Tie
 from ..mechanics.bodies import Body, GearedMotor
-from ..mechanics.coils import Coil
 from ..mechanics.gear import Gear, Transmission
 from ..mechanics.motor import ElectricMotor
 from .named_parts import Assembly
@@ -37,7 +36,7 @@ def deck_remarks(machine: Assembly) -> list[str]:
         *_ends(machine),
         *_ratios(machine),
         *_inertias(machine),
-        *(f"{at}.{text}" for at, part in machine.walk() if isinstance(part, Coil) for text in part.remarks()),
+        *(f"{at}.{text}" for at, part in machine.walk() for text in part.remarks()),
     ]
 
 

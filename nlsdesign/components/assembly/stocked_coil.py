@@ -33,12 +33,20 @@ class PlacedCoil(NamedTuple):
     def exchanged(self, numbers: Mapping[str, Quantity]) -> Assembly:
         """Return the assembly with another coil; what is not given stays as declared.
 
-        ``numbers``: by name; those of a wire take the place of a stated rate, and a rate that of a wire.
+        ``numbers``: by name; those of a wire take the place of a stated rate, and a rate that of a wire;
+        both at once are refused.
         """
         kind = type(self.coil)
         changes: dict[str, Any] = {name: numbers[name] for name in templates(kind) if name in numbers}
         for field, choices in readings(kind).items():
             now = getattr(self.coil, field)
+            stated = [[name for name in templates(choice) if name in numbers] for choice in choices]
+            if sum(map(bool, stated)) > 1:
+                one, other = (names[0] for names in stated if names)
+                raise ArrangementError(
+                    f"{one} and {other}", "say the same twice",
+                    next_step=f"leave out the column {one}, or those of the wire",
+                )  # fmt: skip
             for choice in choices:
                 given = {name: numbers[name] for name in templates(choice) if name in numbers}
                 if given and isinstance(now, choice):

@@ -67,6 +67,10 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
         """Return unit, description and range of each number that this part has, in its own domain."""
         return {name: template.within(_domain(self)) for name, template in _templates(self).items()}
 
+    def remarks(self) -> Iterator[str]:
+        """Yield what is lawful and likely to be a slip, each with the least change that mends it."""
+        yield from ()
+
     def parameters(self) -> dict[str, Quantity]:
         """Return the numbers of this part alone by field name, those of its readings among them."""
         holders = [self, *(getattr(self, name) for name in readings(type(self)))]

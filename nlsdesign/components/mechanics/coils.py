@@ -246,7 +246,7 @@ class Coil(Elastic):
         return force
 
     def remarks(self) -> Iterator[str]:
-        """Yield what is lawful and likely to be a slip, each with the least change that mends it."""
+        """Yield what initial tension, free length and travel of such wire cannot be."""
         wound, travel = self.winding, self.valid[1]
         if not isinstance(wound, Winding):
             return

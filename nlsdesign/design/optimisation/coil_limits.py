@@ -148,7 +148,7 @@ class GoodmanSafety(Limit):
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound for each coil whose wire is declared with its strength."""
-        strong = {coil.name for coil in design.cam.coils if coil.tensile_strength}
+        strong = [coil.name for coil in design.cam.coils if coil.tensile_strength]
         step = "declare its Winding and WireStrength, or leave this limit out"
         _require(design, bool(strong), "coil of a wire with a strength", step)
         for path in strong:

@@ -183,6 +183,9 @@ def finished(solved: SolvedSearch) -> CamDesign:
         sentences.append(
             "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
         )
+    if cam.coils and "GoodmanSafety" not in kinds:
+        sentences.append("wire and strength of the coil are not declared: nothing limits what the wire bears")
+    sentences += [f"{at}.{text}" for at, part in solved.changed.walk() for text in part.remarks()]
     return CamDesign(
         target=design.target,
         changes=tuple(solved.changes.items()),

@@ -11,15 +11,15 @@ from pathlib import Path
 from ...components.assembly.library_rubber import with_rubber
 from ...components.assembly.named_parts import Assembly
 from ...components.assembly.stocked_coil import placed_coil
-from ...foundation.errors import NlsError, ValueRangeError, unknown_name
+from ...foundation.errors import ArrangementError, NlsError, ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity
 from ...foundation.rubber_library import material
 from ..curves.numbers import plain
 from ..curves.target_files import read_columns
 
 _MOST = 1000
-_NUMBER = "number"
-"""Column of a catalogue that holds the maker's number of a coil."""
+_NUMBER, _OUTER = "number", "outer_diameter"
+"""Columns of a catalogue that hold the maker's number of a coil, and its mean diameter and one wire."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,8 @@ class CoilStock(StockChoice):
     """Coils of a catalogue: a CSV file with a row for each and a column for each number that it states.
 
     Heads are names of numbers of the coil with units, such as ``rate [N/mm]`` or ``wire_diameter [mm]``; a
-    column ``number`` is the maker's. What the file does not state stays as declared, spreads among it.
+    column ``number`` is the maker's, and ``outer_diameter`` may stand for the mean one. What the file does
+    not state stays as declared, spreads among it.
 
     Parameters
     ----------
@@ -175,19 +176,41 @@ class CoilStock(StockChoice):
 
         Raises
         ------
+        ArrangementError
+            If an outside diameter stands without its wire.
+        ValueRangeError
+            If two rows have one number.
         NlsError
             If the file cannot be read, or a row is no coil that can be.
         """
         placed = placed_coil(actuator, self.coil)
         units = placed.units
-        table = read_columns(self.file, {_NUMBER: ("1",)} | {n: (u,) for n, u in units.items()}, least_rows=1)
+        known = {_NUMBER: ("1",), _OUTER: ("m",)} | {name: (unit,) for name, unit in units.items()}
+        table = read_columns(self.file, known, least_rows=1)
+        own_numbers = list(table.values.get(_NUMBER, ()))
         for row, line in enumerate(table.lines):
+            if own_numbers and own_numbers.index(own_numbers[row]) < row:
+                first = table.lines[own_numbers.index(own_numbers[row])]
+                raise ValueRangeError(
+                    f"{table.file}, line {line}", f"has the number of line {first}",
+                    next_step="write another number, or leave one of the two out",
+                )  # fmt: skip
             source = f"{table.file}, line {line}"
             numbers = {
                 name: placed.number(name, Quantity(float(column[row]), table.units[name], source))
                 for name, column in table.values.items()
                 if name != _NUMBER
             }
+            if _OUTER in numbers:
+                outer, wire = numbers.pop(_OUTER), numbers.get("wire_diameter")
+                if wire is None or "mean_diameter" in numbers:
+                    raise ArrangementError(
+                        f"{table.file}: {_OUTER}",
+                        "stands beside wire_diameter and in the place of mean_diameter",
+                        next_step="add or leave out the other column",
+                    )  # fmt: skip
+                mean = Quantity(outer.number - wire.number, "m", source)
+                numbers["mean_diameter"] = placed.number("mean_diameter", mean)
             own = f"no. {table.values[_NUMBER][row]:g} of {source}" if _NUMBER in table.values else source
             try:
                 yield f"{placed.path} = {own}", placed.exchanged(numbers)

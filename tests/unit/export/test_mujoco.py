@@ -54,6 +54,12 @@ def module_of(written: MujocoModel) -> ModuleType:
     return module
 
 
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo writes its warnings into a file of the present folder."""
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[MujocoModel, ModuleType]:
     if not shutil.which("cc"):
@@ -65,7 +71,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[MujocoModel, Mod
 
 
 def test_a_second_plugin_of_a_name_is_refused_and_leaves_the_process_able_to_load(
-    exported: tuple[MujocoModel, ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    exported: tuple[MujocoModel, ModuleType], tmp_path: Path
 ) -> None:
     """An error of MuJoCo while a library is loaded leaves the loader locked: any other thread hangs then."""
     written, _ = exported
@@ -76,7 +82,6 @@ def test_a_second_plugin_of_a_name_is_refused_and_leaves_the_process_able_to_loa
     assert other.name == written.name
     with pytest.raises(RuntimeError, match="has loaded other laws under that name"):
         module_of(other).load_plugin()
-    monkeypatch.chdir(tmp_path)  # where MuJoCo writes its log
     library = shutil.copy(written.module.with_name(f"{written.name}_plugin.so"), tmp_path)
     mujoco.mj_loadPluginLibrary(str(library))
     loading = threading.Thread(target=ctypes.CDLL, args=(None,), daemon=True)
