@@ -81,13 +81,18 @@ def use_one_thread() -> None:
         os.environ.update(dict.fromkeys(THREADS_OF_LINEAR_ALGEBRA, "1"))
 
 
-def ready_as_helper(at_death_of_parent: signal.Signals = signal.SIGTERM) -> None:
-    """Let the parent handle interruptions, and end at once when it asks for it or ends itself."""
+def ready_as_helper(parent: int, at_death_of_parent: signal.Signals = signal.SIGTERM) -> None:
+    """Let the parent handle interruptions, and end at once when it asks for it or ends itself.
+
+    ``parent``: number of its process; it may have ended since this one began.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, at_death_of_parent)
+        if os.getppid() != parent:
+            os.kill(os.getpid(), at_death_of_parent)
 
 
 _PATIENCE = 1.0

@@ -162,10 +162,10 @@ class IsolatedWork:
     def _started(self, array: Array) -> tuple[int, _Child]:
         """Start the process; return where it tells how it went, and the process."""
         ours, theirs = os.pipe()
-        process = os.fork()
+        owner, process = os.getpid(), os.fork()
         if process == 0:
             os.close(ours)
-            self._work_and_end(array, theirs)
+            self._work_and_end(array, theirs, owner)
         os.close(theirs)
         with contextlib.suppress(OSError):  # it did so itself, or has ended
             os.setpgid(process, process)
@@ -229,11 +229,11 @@ class IsolatedWork:
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
         return f"; it printed: {fit_to_show(last)}" if last else ""
 
-    def _work_and_end(self, array: Array, pipe: int) -> NoReturn:
+    def _work_and_end(self, array: Array, pipe: int, owner: int) -> NoReturn:
         """Work in the new process, say at the end how it went, and never return."""
         answer: dict[str, Any] | None
         try:
-            _made_ready(self.folder)
+            _made_ready(self.folder, owner)
             self.work(array)
             answer = None
         except NlsError as error:
@@ -282,11 +282,11 @@ class _Child:
             self._ended = True
 
 
-def _made_ready(folder: Path) -> None:
+def _made_ready(folder: Path, owner: int) -> None:
     """Make the new process one that can crash quietly and leaves interruptions to its owner."""
     with contextlib.suppress(OSError):  # its owner did so already
         os.setpgid(0, 0)
-    ready_as_helper(signal.SIGKILL)
+    ready_as_helper(owner, signal.SIGKILL)
     faulthandler.disable()
     import resource
 

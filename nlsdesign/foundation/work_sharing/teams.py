@@ -146,7 +146,8 @@ class _Worker:
         with signals_held():
             self.connection, theirs = context.Pipe()
             inherited = [each.connection for each in (*others, self)] if forks else []
-            self.process = context.Process(target=_serve, args=(theirs, work, inherited), daemon=True)  # type: ignore[attr-defined]
+            given = (theirs, work, inherited, os.getpid())
+            self.process = context.Process(target=_serve, args=given, daemon=True)  # type: ignore[attr-defined]
             self.process.start()
             theirs.close()
         self.chunk: Chunk | None = None
@@ -178,8 +179,10 @@ def _ending(status: int | None) -> str:
     return f"its worker process was ended by signal {-status} ({name}){why}"
 
 
-def _serve(connection: Connection, work: Callable[[Any], Any], inherited: list[Connection]) -> None:
-    ready_as_helper()
+def _serve(
+    connection: Connection, work: Callable[[Any], Any], inherited: list[Connection], parent: int
+) -> None:
+    ready_as_helper(parent)
     for each in inherited:
         each.close()
     with contextlib.suppress(EOFError, OSError), alone():

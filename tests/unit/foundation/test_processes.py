@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -56,10 +55,38 @@ def test_helpers_end_with_the_process_that_waits(ending: signal.Signals) -> None
     process.send_signal(ending)
     process.wait(timeout=30)
     waited = 0
-    while any(os.path.exists(f"/proc/{pid}/fd") and _running(pid) for pid in helpers) and waited < 100:
+    while any(map(_running, helpers)) and waited < 100:
         time.sleep(0.1)
         waited += 1
     assert not [pid for pid in helpers if _running(pid)]
+
+
+LATE = """
+import os
+import sys
+import time
+from nlsdesign.foundation.processes import ready_as_helper
+
+parent = os.getpid()
+if os.fork() == 0:
+    while os.getppid() == parent:
+        time.sleep(0.01)
+    ready_as_helper(parent)
+    open(sys.argv[1], "w").close()
+    os._exit(0)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere no signal tells of the death of a parent")
+def test_a_helper_whose_parent_ended_before_it_was_ready_ends_too(tmp_path: Path) -> None:
+    # The pipe stays open as long as the helper lives.
+    subprocess.run(
+        [sys.executable, "-c", LATE, str(tmp_path / "went_on")],
+        stdout=subprocess.PIPE,
+        check=True,
+        timeout=60,
+    )
+    assert not (tmp_path / "went_on").exists()
 
 
 def _parent(process: Path) -> int:
