@@ -49,7 +49,7 @@ def design_picture(design: CamDesign) -> Figure:
     left = -wide if np.isfinite(design.contour.anchor_distance) else -1.3 * reach
     figure, axes = panels(2, 1, height=4.0, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
-        _draw(panel, design, angle)
+        draw_mechanism(panel, design, angle)
     high = max(float(panel.dataLim.y1) for panel in axes)
     low = min(float(panel.dataLim.y0) for panel in axes)
     low -= 0.08 * (wide - left) * MM  # room for the dimensions
@@ -109,7 +109,8 @@ def _words(state: LimitState) -> str:
     return f"{value} {sign} {with_unit(bound, state.unit)}"
 
 
-def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
+def draw_mechanism(axes: Axes, design: CamDesign, angle: float) -> None:
+    """Draw cam, cable and rubber at an angle in rad into axes, to scale, in mm."""
     contour = design.contour
     parallel = not np.isfinite(contour.anchor_distance)
     halves = list(contour.outlines())

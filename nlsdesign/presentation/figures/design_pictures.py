@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ...design import CamDesign, CamPart
 from .curves import torque_against_target
+from .data_sheet import data_sheet
 from .design_figures import design_picture, limit_margins, tolerance_bars
 from .svg import write_figures
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
@@ -40,7 +41,7 @@ class DesignPictures:
     inspected: int = 11
 
     def of_design(self, design: CamDesign, folder: Path) -> list[Path]:
-        """Write picture, torque, margins to the limits and, where there are spreads, what they do."""
+        """Write picture, torque, margins to the limits, what spreads do where there are any, data sheet."""
         curve = {"design": (design.check.angles, design.check.torques)}
         pictures: dict[str, Figure] = {
             "picture": design_picture(design),
@@ -50,7 +51,8 @@ class DesignPictures:
             pictures["margins"] = limit_margins(design)
         if design.tolerance is not None and design.tolerance.causes:
             pictures["tolerance"] = tolerance_bars(design.tolerance)
-        return write_figures(folder, pictures)
+        sheet = {"data_sheet": data_sheet(design, deck=self.deck)}
+        return [*write_figures(folder, pictures), *write_figures(folder, sheet, suffix=".pdf")]
 
     def of_part(self, design: CamDesign, part: CamPart, folder: Path) -> list[Path]:
         """Write the page for the workshop as SVG and PDF."""

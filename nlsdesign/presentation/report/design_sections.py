@@ -87,6 +87,7 @@ FILES = {
     "torque.svg": "torque against the target",
     "margins.svg": "use of each limit",
     "tolerance.svg": "torque error of made springs, by cause",
+    "data_sheet.pdf": "the spring on one page A4",
     "cam.dxf": "edges for the machine: lines and arcs, in millimetres",
     "cam.svg": "picture of the part at scale 1:1",
     "cam.csv": "lines and arcs as a table",

@@ -118,7 +118,7 @@ def test_a_design_file_is_followed_and_a_part_drawn(run: Run, tmp_path: Path) ->
     assert status == 0, err
     assert "meets its target" in out
     names = {path.name for path in (tmp_path / "o").iterdir()}
-    assert {"model.toml", "cam.dxf", "drawing.pdf", "picture.svg", "margins.svg", "design.json"} <= names
+    assert {"model.toml", "cam.dxf", "drawing.pdf", "picture.svg", "data_sheet.pdf", "design.json"} <= names
     page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
     assert all(part in page for part in ("Torque against the target", "Use of each limit", "drawing.pdf"))
     # Another design into the same folder: nothing of the first one stays beside it.

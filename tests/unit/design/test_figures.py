@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.container import BarContainer
 from matplotlib.patches import Polygon
 
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
+from nlsdesign.presentation.figures.data_sheet import data_sheet
 from nlsdesign.presentation.figures.design_figures import design_picture, limit_margins
 from nlsdesign.presentation.figures.style import alternative_text
 from tests.cam_cases import CONCAVE, KEEP, RUBBER, TARGET, actuator
@@ -50,3 +52,30 @@ def test_bars_are_as_long_as_the_limits_are_used(design: CamDesign) -> None:
         assert (bar.get_hatch() == "///") == state.active
     # No text lies on the line of the limit: all begin to the right of it.
     assert all(text.xy[0] >= 1.0 for text in axes.texts)
+
+
+def test_the_data_sheet_is_one_page_a4_on_which_no_text_lies_on_another(design: CamDesign) -> None:
+    page = data_sheet(design, deck="rubber")
+    assert page.get_size_inches() * 25.4 == pytest.approx([210.0, 297.0])
+    canvas = FigureCanvasAgg(page)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    sheet, first, last, *_ = page.axes
+    texts = [text for text in sheet.texts if text.get_text()]
+    boxes = [text.get_window_extent(renderer) for text in texts]
+    frame = sheet.get_window_extent(renderer)
+    for text, box in zip(texts, boxes, strict=True):
+        assert frame.x0 < box.x0 < box.x1 < frame.x1, text.get_text()
+        assert frame.y0 < box.y0 < box.y1 < frame.y1, text.get_text()
+    for number, one in enumerate(boxes):
+        for other in boxes[number + 1 :]:
+            assert min(one.x1, other.x1) <= max(one.x0, other.x0) or min(one.y1, other.y1) <= max(
+                one.y0, other.y0
+            )
+    words = [text.get_text() for text in texts]
+    torque = f"{float(design.check.torques[-1]):.3g}"
+    assert f"{np.degrees(design.target.last_angle):.4g}°" in words
+    assert any(word.startswith(torque) for word in words)
+    # Both views of the mechanism are drawn at one scale.
+    assert first.get_xlim() == last.get_xlim()
+    assert "Data sheet" in alternative_text(page)
