@@ -56,7 +56,15 @@ def declared_edge(actuator: Assembly, cam: CamNames) -> tuple[type[MachinedCam],
 
 DESIGN_FILES = (
     "report.html",
-    *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg", "data_sheet.pdf"),
+    *(
+        "model.toml",
+        "design.json",
+        "picture.svg",
+        "torque.svg",
+        "margins.svg",
+        "tolerance.svg",
+        "data_sheet.pdf",
+    ),
     *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
 )
 """Names of all files that a design can have, its report among them, which is written above."""

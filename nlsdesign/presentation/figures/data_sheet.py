@@ -29,15 +29,7 @@ _ASSUMED = (
 
 @styled
 def data_sheet(design: CamDesign, *, deck: str) -> Figure:
-    """Return the data sheet of a finished design on one page A4, for SVG and PDF.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    deck
-        Name of the deck that it began with.
-    """
+    """Return the data sheet of a finished design on one page A4; ``deck``: name of that it began with."""
     page = Sheet(_WIDTH, _HEIGHT)
     page.box(_BORDER, _BORDER, width=_WIDTH - 2 * _BORDER, height=_HEIGHT - 2 * _BORDER)
     page.text(_LEFT, 280.0, text=f"Spring of {design.actuator.name}", fontsize=15.0, weight="bold")
