@@ -44,7 +44,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """What was imported and collected stays until the end: the collector of garbage need not look at it again."""
+    """What was imported and collected stays until the end: no garbage has to be looked for in it."""
     gc.collect()
     gc.freeze()
 
