@@ -1,0 +1,250 @@
+"""Proofs about a generated step, for all inputs at once: Eva, the value analysis of Frama-C, reads the C.
+
+Eva computes with sets of values, so what it says holds for every number that the type can hold. Three things
+are written anew for it, in a copy, and mean the same:
+
+- ``(a - a) + (b - b) >= 0``, with which the step asks whether numbers are finite, becomes a comparison of
+  each with the largest number: a - a is 0 where a is finite, else not a number, and no sum with that is >= 0;
+- ``fabs`` and ``copysign`` get a body (but for the sign of a zero, which no number of the step depends on);
+- behind each comparison that holds stands that its sides are numbers, as IEEE 754 has it; Eva 25 misses that.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...foundation.errors import ExportError
+from ...foundation.processes import run_to_end
+from ..c.c_text import Real
+from ..c.writer import CSource
+from ..files import filled
+
+PROVER = "frama-c"
+_SECONDS = 1800
+_OPTIONS = (
+    "-eva-precision", "1", "-eva-slevel", "300", "-eva-interprocedural-splits", "-warn-special-float", "none",
+    "-eva-msg-key=-final-states",
+)  # fmt: skip
+_GUARD = re.compile(r"\(((?:\(\w+ - \w+\)(?: \+ )?)+) >= 0\.0f?\)")
+_NAME = r"[A-Za-z_]\w*(?:(?:->|\.)\w+|\[[^\]]*\])*"
+_BRANCH = re.compile(r"^(\s*(?:else )?if \()(.+?) (<|>|<=|>=) (.+?)\)(\s.*|)$")
+_SHOWN = re.compile(r"Frama_C_show_each_(\w+):\s*\{(\d+)\},\s*([^\n]+)")
+_ALARM = re.compile(r"^\[eva:alarm\] [^:\n]*:(\d+): Warning:\s*([^\[]*)", re.MULTILINE)
+_REACHED = re.compile(r"(\d+) statements reached \(out of (\d+)\)")
+_BODIES = """\
+static {real} fabs_({real} x) {{ return x < ({real})0 ? -x : x; }}
+static {real} copysign_({real} x, {real} y)
+{{ const {real} size = fabs_(x); return y < ({real})0 ? -size : size; }}
+"""
+
+
+@dataclass(frozen=True)
+class StepProof:
+    """What was proved of a generated step, for all inputs, accepted parameters and numbers of steps.
+
+    Parameters
+    ----------
+    name
+        Of the step.
+    alarms
+        What may be undefined, as Eva says it, with the line of the copy that it read; empty where nothing is.
+    open_members
+        Members that were not proved finite after a step; empty where all were.
+    reached, statements
+        How many statements the analysis reached, and of how many.
+    seconds
+        Of both analyses.
+    """
+
+    name: str
+    alarms: tuple[str, ...]
+    open_members: tuple[str, ...]
+    reached: int
+    statements: int
+    seconds: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing is undefined and all that is given and remembered stays finite."""
+        return not self.alarms and not self.open_members
+
+
+def missing_prover() -> str:
+    """Return why nothing can be proved, or an empty text."""
+    if shutil.which(PROVER) is None:
+        return f"{PROVER} is not installed (Debian: apt-get install frama-c-base)"
+    return ""
+
+
+def prove_step(source: CSource) -> StepProof:
+    """Prove what a generated step never does, whatever it is given.
+
+    Of a state of any content, any inputs and any parameters: no access beyond an array or structure, no
+    conversion of a number that does not fit, no overflow of a signed number, no shift too far, nothing read
+    that was not set. Of a state after :c:func:`init`, by induction over the steps: all outputs, states, taken
+    inputs and remembered readings are finite.
+
+    Parameters
+    ----------
+    source
+        As :func:`~nlsdesign.export.export_c` has written it.
+
+    Returns
+    -------
+    StepProof
+        Holds or names what is open.
+
+    Raises
+    ------
+    ExportError
+        If Frama-C is not installed, or cannot read the code.
+    """
+    missing = missing_prover()
+    if missing:
+        raise ExportError("a proof", f"needs Frama-C: {missing}", next_step="install it")
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        shutil.copy(source.header, folder / source.header.name)
+        copy, harness = folder / source.source.name, folder / "proof.c"
+        copy.write_text(_readable(source.source.read_text(encoding="utf-8"), source.real), encoding="utf-8")
+        copy.write_text(with_numbers_admitted(_printed(copy, folder)), encoding="utf-8")
+        members = _members(source)
+        harness.write_text(_harness(source, members), encoding="utf-8")
+        files = [str(harness), str(copy)]
+        anything = _run([*_OPTIONS, *files, "-eva", "-main", "any_content"], folder)
+        induction = _run([*_OPTIONS, *files, "-eva", "-main", "every_step"], folder)
+    # In both runs: of any content a number may be anything, so a conversion that fits there always fits.
+    alarms = tuple(
+        f"line {line}: {' '.join(text.split())}"
+        for said in (anything, induction)
+        for line, text in _ALARM.findall(said)
+    )
+    reached, statements = (int(number) for number in (_REACHED.findall(induction) or [(0, 0)])[-1])
+    seconds = time.perf_counter() - begin
+    return StepProof(source.name, alarms, _open(induction, members), reached, statements, seconds)
+
+
+def _readable(code: str, real: Real) -> str:
+    """Return code with the guards of finite numbers, ``fabs`` and ``copysign`` in words that Eva knows."""
+
+    def compared(guard: re.Match[str]) -> str:
+        names = re.findall(r"\((\w+) - \w+\)", guard[1])
+        return f"({' && '.join(f'{n} >= -{_largest(real)} && {n} <= {_largest(real)}' for n in names)})"
+
+    text = re.sub(r"\b(fabs|copysign)f?\(", r"\1_(", _GUARD.sub(compared, code))
+    return _BODIES.format(real=real) + text
+
+
+def _largest(real: Real) -> str:
+    return "FLT_MAX" if real is Real.FLOAT else "DBL_MAX"
+
+
+def _printed(file: Path, folder: Path) -> str:
+    """Return code as Frama-C prints it: each comparison is the condition of a branch of its own."""
+    text = _run([str(file), "-no-annot", "-print"], folder)
+    mark = "/* Generated by Frama-C */"
+    if mark not in text:
+        raise ExportError(
+            file.name, f"cannot be read by Frama-C: {text.strip()[-300:]}", next_step="report it"
+        )
+    return text[text.index(mark) :]
+
+
+def with_numbers_admitted(code: str) -> str:
+    """Return printed code that says behind each comparison that holds that its sides are numbers."""
+    lines: list[str] = []
+    for line in code.splitlines():
+        if (
+            lines
+            and re.match(r"\s*(?:else )?if \(", lines[-1])
+            and lines[-1].count("(") > lines[-1].count(")")
+        ):
+            lines[-1] += f" {line.strip()}"
+        else:
+            lines.append(line)
+    for number, line in enumerate(lines):
+        branch = _BRANCH.match(line)
+        if branch is None:
+            continue
+        head, left, sign, right, rest = branch.groups()
+        sides = [re.sub(r"^\s*\((?:double|float)\)", "", side).strip() for side in (left, right)]
+        admitted = " ".join(
+            f"/*@ admit !\\is_NaN((double){side}); */" for side in sides if re.fullmatch(_NAME, side)
+        )
+        if admitted:
+            block, rest = ("{ ", rest.strip()[1:]) if rest.strip().startswith("{") else ("", rest)
+            lines[number] = f"{head}{left} {sign} {right}) {block}{admitted}{rest}"
+    # Whether the machine has begun decides whether its memory was set in this step: the cases stay apart.
+    split = r"\1  /*@ dynamic_split state->begun; */" + "\n"
+    return re.sub(r"(static uint32_t \w+_take\([^{]*\{\n(?:  \w[^\n]*;\n)*)", split, "\n".join(lines))
+
+
+def _members(source: CSource) -> dict[str, str]:
+    """Return all that has to be finite, as C text, by a word that Eva repeats with its values."""
+    paths, readings = source.writer.paths, source.writer.readings
+    remembered = ("last", "slope", "candidate", "mover")
+    groups = {
+        "outputs": [f"outputs.{path}" for path in paths.outputs],
+        "kept_outputs": [f"state.outputs.{path}" for path in paths.outputs],
+        "states": [f"state.states.{path}" for path in paths.states],
+        "inputs": [f"state.inputs.{path}" for path in paths.inputs],
+        "readings": [f"state.readings[{k}].{name}" for k in range(len(readings)) for name in remembered],
+    }
+    return {f"{group}_{k}": path for group, members in groups.items() for k, path in enumerate(members)}
+
+
+def _harness(source: CSource, members: dict[str, str]) -> str:
+    """Return the program whose values Eva computes."""
+    inside = {word: path for word, path in members.items() if path.startswith("state.")}
+    at_first = {word: path for word, path in inside.items() if not word.startswith(("states", "inputs"))}
+    unknown = ["Frama_C_make_unknown((char *)&state.readings, sizeof state.readings);"]
+    values = {
+        "name": source.name,
+        "real": source.real,
+        "largest": _largest(source.real),
+        "shown_at_first": _shown("at_first_", at_first),
+        "supposed": [
+            *(unknown if source.writer.readings else []),
+            *(f"{path} = any_finite();" for path in inside.values()),
+        ],
+        "shown": _shown("", members),
+    }
+    return filled("proof.c", values)
+
+
+def _shown(prefix: str, members: dict[str, str]) -> list[str]:
+    return [f"Frama_C_show_each_{prefix}{word}(0, {path});" for word, path in members.items()]
+
+
+def _open(said: str, members: dict[str, str]) -> tuple[str, ...]:
+    """Return the members that were not shown finite wherever they were shown, or not shown at all."""
+    finite: dict[str, bool] = {}
+    for word, _, values in _SHOWN.findall(said):
+        good = "NaN" not in values and "inf" not in values and "--" not in values
+        finite[word] = finite.get(word, True) and good
+    at_first = [word.removeprefix("at_first_") for word, good in finite.items() if not good]
+    return tuple(path for word, path in members.items() if not finite.get(word, False) or word in at_first)
+
+
+def _run(words: Sequence[str] | Iterable[str], folder: Path) -> str:
+    """Run Frama-C and return what it prints."""
+    flags = f"-std=c99 -I{folder}"
+    command = [PROVER, "-machdep", "x86_64", f"-cpp-extra-args={flags}", *words]
+    try:
+        done = run_to_end(command, seconds=_SECONDS)
+    except subprocess.TimeoutExpired as error:
+        raise ExportError(
+            "a proof", f"does not end within {_SECONDS} s", next_step="prove a smaller step"
+        ) from error
+    if done.returncode != 0:
+        last = (done.stdout + done.stderr).strip()[-300:]
+        raise ExportError("a proof", f"fails: {last}", next_step="report it with the code")
+    return done.stdout + done.stderr
