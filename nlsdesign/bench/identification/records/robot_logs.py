@@ -165,8 +165,8 @@ def _numbers(message: Any, kind: str, joints: Sequence[str] = ()) -> Iterator[tu
                 if isinstance(item, bool | int | float | np.number):
                     yield f"{name}{label}", (float(item), unit)
                 elif isinstance(item, Mapping) or is_dataclass(item):
-                    for path, number in _numbers(item, _kind_of(item) or kind):
-                        yield f"{name}{label}/{path}", number
+                    for path, numbered in _numbers(item, _kind_of(item) or kind):
+                        yield f"{name}{label}/{path}", numbered
 
 
 def _kind_of(message: Any) -> str:
