@@ -15,6 +15,7 @@ from .clocks import Channel, Resolution, lag_between, on_one_clock, resolutions
 from .mapping import Align, Column, ColumnMap
 from .quality import Checked, Finding, Sampled, check_channels, check_columns, check_time
 from .sampling import SAMPLED
+from .robot_logs import check_one_clock
 from .table_files import RecordTable
 
 _LEAST_STEP, _SHORT_STEP, _LONG_STEP = 1e-8, 1e-5, 0.5
@@ -53,6 +54,9 @@ class Run:
 
 def read_run(name: str, table: RecordTable, mapping: ColumnMap) -> Run:
     """Check a table and put its columns on one uniform clock."""
+    if not mapping.align:
+        clocks = [mapping.clock_of(column).name.partition(" [")[0] for column in mapping.columns]
+        check_one_clock(table.file, table.behind, clocks)
     table, began = _from_zero(table, mapping)
     checked = _checked(table, mapping)
     clean = replace(table, given={**table.given, **checked.values})

@@ -30,7 +30,7 @@ from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
 from .mapping import Inputs, check_signals, read_mapping, with_known_sampling
 from .quality import Finding
-from .robot_logs import check_one_clock, is_robot_log
+from .robot_logs import is_robot_log
 from .sampling import SAMPLED, Sampling
 from .table_files import RecordTable, read_table, table_files, unread_tables
 
@@ -382,10 +382,6 @@ def load_records(
     chosen = default_mapping(runs[first].heads, model, first.name, given, joint=joint is not None)
     check_signals(first.name, chosen.columns, model)
     chosen = with_known_sampling(first.name, replace(chosen, inputs=Inputs.of(model)), model)
-    if not chosen.align:
-        clocks = [chosen.clock_of(column).name.partition(" [")[0] for column in chosen.columns]
-        for file, table in runs.items():
-            check_one_clock(file.name, table.behind, clocks)
     pieces = {file: between_gaps(table, chosen) for file, table in runs.items()}
     whole = [
         _record(file, part, chosen, number if len(each.tables) > 1 else 0)
