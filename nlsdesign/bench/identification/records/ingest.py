@@ -14,8 +14,8 @@ from ....simulation import Trace
 from .clocks import Channel, Resolution, lag_between, on_one_clock, resolutions
 from .mapping import Align, Column, ColumnMap
 from .quality import Checked, Finding, Sampled, check_channels, check_columns, check_time
-from .sampling import SAMPLED
 from .robot_logs import check_one_clock
+from .sampling import SAMPLED
 from .table_files import RecordTable
 
 _LEAST_STEP, _SHORT_STEP, _LONG_STEP = 1e-8, 1e-5, 0.5
