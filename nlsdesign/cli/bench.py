@@ -14,8 +14,10 @@ from ..foundation.command_words import typed_command
 from ..foundation.errors import MeasurementError
 from ..foundation.quantity import typeset_unit, with_error
 from .options import (
+    DECK_HELP,
     deck_option,
     export_option,
+    joint_option,
     json_option,
     measured_option,
     sample_time_option,
@@ -62,6 +64,7 @@ def _part_files(parts: Sequence[str]) -> list[str]:
 @click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of records.")
 @_hold_out
 @_mapping
+@joint_option
 @click.option("--window", type=Number("s", above=0.0), default=None,
               help="Simulate the whole model over windows instead, for instance '1 s'.")  # fmt: skip
 @export_option
@@ -88,8 +91,8 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     from ..regeneration import export_machine
 
     actuator = declare(load_deck(deck_name))
-    mapping, hold_out = options["mapping"], options["hold_out"]
-    measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
+    reading = {name: options[name] for name in ("mapping", "hold_out", "joint")}
+    measured = load_records(records, flatten(actuator), **reading)
     steps = Steps()
     with steps.step("fit"):
         result = refit(actuator, measured, window=options["window"], progress=steps.note)
@@ -110,7 +113,7 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     for sentence in machine.findings() if machine else ():
         click.echo(sentence)
     click.echo(f"report: {page}")
-    following = next_command("diagnose", "--deck", deck, "--records", records, *as_read(mapping, hold_out))
+    following = next_command("diagnose", "--deck", deck, "--records", records, *as_read(**reading))
     click.echo(f"written: {file} and {deck}; next: {following}")
 
 
@@ -135,10 +138,11 @@ def _show_fit(result: Refit) -> None:
         click.echo(sentence)
 
 
-def as_read(mapping: Path | None, hold_out: Sequence[str]) -> list[str]:
+def as_read(mapping: Path | None, hold_out: Sequence[str], joint: str | None = None) -> list[str]:
     """Return the options with which another command reads the same records in the same way."""
     options = [item for name in hold_out for item in ("--hold-out", name)]
-    return options if mapping is None else [*options, "--mapping", str(mapping)]
+    options += [] if mapping is None else ["--mapping", str(mapping)]
+    return options if joint is None else [*options, "--joint", joint]
 
 
 def _roles(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -149,20 +153,47 @@ def _roles(options: Mapping[str, Any]) -> dict[str, Any]:
 def _diagnosis_files(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for, and of what an earlier diagnosis has left."""
     parts = [*(["observer"] if given["again"] else []), *(_PARTS if given["exports"] else [])]
-    names = ["verdict.json", "model.toml", "report.html", "next_record.csv", "regeneration.json"]
-    return [*names, *_part_files(parts)]
+    names = [
+        "verdict.json",
+        "model.toml",
+        "report.html",
+        "next_record.csv",
+        "regeneration.json",
+        *_part_files(parts),
+    ]
+    joints = [joint.partition("=")[0] for joint in given["joints"] if "=" in joint]
+    return [f"{joint}/{name}" for joint in joints for name in names] or names
+
+
+def _questions(deck: str | None, joints: Sequence[str], out: Path) -> list[tuple[str | None, str, Path]]:
+    """Return joint, deck and folder of what is to be diagnosed: one, or joints of a log with their decks."""
+    several = [joint.partition("=") for joint in joints]
+    if len(joints) <= 1 and not any(sign for _, sign, _ in several):
+        if deck is None:
+            raise MeasurementError("--deck", "is missing", next_step="name the deck: --deck my.toml")
+        return [(joints[0] if joints else None, deck, out)]
+    for name, sign, named in several:
+        if not (name and sign and named) or deck is not None or [n for n, _, _ in several].count(name) > 1:
+            raise MeasurementError(
+                f"--joint {name}{sign}{named}", "is not one joint with its deck among others",
+                next_step="write --joint elbow=elbow.toml --joint knee=knee.toml, without --deck",
+            )  # fmt: skip
+    return [(name, named, out / name) for name, _, named in several]
 
 
 @click.command(
     epilog=examples(
         "nlsdesign diagnose --deck my.toml --records bench --out out/diagnosis",
         "nlsdesign diagnose --deck my.toml --records bench --hold-out 'last*' --regenerate --json",
+        "nlsdesign diagnose --joint elbow=elbow.toml --joint knee=knee.toml --records logs",
     )
 )
-@deck_option
-@click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of CSV files.")
+@click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
+@click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of tables or logs.")
 @_hold_out
 @_mapping
+@click.option("--joint", "joints", multiple=True, metavar="NAME[=DECK]",
+              help="Joint of a log of a robot: read only its columns; with its deck repeatable.")  # fmt: skip
 @click.option(
     "--regenerate",
     "again",
@@ -177,8 +208,25 @@ def _diagnosis_files(given: Mapping[str, Any]) -> list[str]:
 @workers_option
 @out_option("out/diagnosis", writes=_diagnosis_files)
 @json_option
-def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
+def diagnose(
+    deck_name: str | None, records: Path, joints: tuple[str, ...], out: Path, as_json: bool, **options: Any
+) -> None:
     """Name and add the effects that a deck lacks. They are judged on held-out records."""
+    contents: dict[str, dict[str, Any]] = {}
+    for joint, deck, folder in _questions(deck_name, joints, out):
+        content, sentences = _diagnosed(deck, records, folder, joint, options)
+        contents[joint or ""] = content
+        warn(content["warnings"])
+        if not as_json:
+            click.echo("\n".join([*([f"{joint}:"] if len(joints) > 1 else []), *sentences]))
+    if as_json:
+        show_json(contents if len(contents) > 1 else content)
+
+
+def _diagnosed(
+    deck_name: str, records: Path, out: Path, joint: str | None, options: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return what is found and written of one machine, as content and as sentences."""
     from ..bench.discrepancy import diagnose as find_what_is_missing
     from ..bench.discrepancy import range_findings, verdict_of_run, write_verdict
     from ..bench.identification import load_records
@@ -193,9 +241,10 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     date = datetime.now().astimezone().isoformat(" ", "minutes")
     actuator = declare(load_deck(deck_name))
     plant, roles = flatten(actuator), _roles(options)
-    measured = load_records(records, plant, mapping=options["mapping"], hold_out=options["hold_out"])
+    reading = {name: options[name] for name in ("mapping", "hold_out")}
+    measured = load_records(records, plant, joint=joint, **reading)
     steps = Steps()
-    with steps.step("diagnosis"):
+    with steps.step("diagnosis" + (f" of {joint}" if joint else "")):
         verdict = find_what_is_missing(actuator, measured, progress=steps.note)
     verdict = verdict_of_run(
         verdict, measured, deck=deck_name, folder=str(records), command=command, date=date
@@ -203,8 +252,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     write_verdict(verdict, out)
     page, facts = out / "report.html", {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     write_diagnosis_report(page, verdict, facts=facts)
-    remarks = range_findings(verdict, measured)
-    content = {**verdict.to_dict(str(out / "model.toml")), "warnings": remarks}
+    content = {**verdict.to_dict(str(out / "model.toml")), "warnings": range_findings(verdict, measured)}
     sentences, observer = [str(verdict)], None
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
@@ -221,13 +269,9 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
             machine = export_machine(flatten(verdict.actuator), out, observer=observer, **roles)
         content |= machine.content()
         sentences += machine.findings()
-    warn(remarks)
-    if as_json:
-        show_json(content)
-        return
     if verdict.experiment is not None:
         sentences.append(f"command of the next record: {out / 'next_record.csv'}")
-    click.echo("\n".join([*sentences, f"report: {page}"]))
+    return content, [*sentences, f"report: {page}"]
 
 
 @click.command(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..foundation.text_files import write_text
-from .options import deck_option, json_option
+from .options import deck_option, joint_option, json_option
 from .output import examples, next_command, show_json, show_table
 from .overwriting import out_file_option
 from .typed_values import NamedPath
@@ -32,23 +32,25 @@ def records() -> None:
 )
 @click.argument("folder", type=NamedPath(example="bench"))
 @deck_option
+@joint_option
 @out_file_option("out/records.toml", "File for a mapping to begin with.", ending=".toml")
 @json_option
-def describe(folder: Path, deck_name: str, out: Path, as_json: bool) -> None:
+def describe(folder: Path, deck_name: str, joint: str | None, out: Path, as_json: bool) -> None:
     """Tell what files hold, and write a records.toml to edit. Columns, units, clocks, gaps, faults."""
     from ..bench.identification import describe_records
     from ..components import declare
     from ..foundation.deck import load_deck
     from ..model import flatten
 
-    description = describe_records(folder, flatten(declare(load_deck(deck_name))))
+    description = describe_records(folder, flatten(declare(load_deck(deck_name))), joint=joint)
     write_text(out, description.mapping())
     if as_json:
         show_json({**_content(description), "written": str(out)})
     else:
         _show(description)
         click.echo(f"written: {out}; put it beside the records as records.toml, or name it by --mapping")
-        words = ("fit", "--deck", deck_name, "--records", folder, "--mapping", out)
+        words = ["fit", "--deck", deck_name, "--records", folder, "--mapping", out]
+        words += ["--joint", joint] if joint else []
         click.echo(f"next: {next_command(*words)}")
     if description.problem or description.undecided:
         raise click.exceptions.Exit(1)

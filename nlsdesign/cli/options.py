@@ -29,6 +29,9 @@ measured_option = click.option(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 DECK_HELP = "Deck file, or the name of one that comes with the project."
 deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK", help=DECK_HELP)
+joint_option = click.option(
+    "--joint", default=None, metavar="NAME", help="Joint of a log of a robot: read only its columns."
+)
 sample_time_option = click.option(
     "--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
     help="Of what is computed in steps.",

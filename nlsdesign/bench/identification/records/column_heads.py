@@ -23,7 +23,12 @@ _TIME_WORDS = (
 def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
     """Return heads that name a time, with their units; 't' and 'time' come before further words."""
     named = [(head, *name_and_unit(head)) for head in heads]
-    timed = [(head, name.lower(), unit) for head, name, unit in named if unit and same_dimension(unit, "s")]
+    # A log has a clock for each topic, an HDF5 file for each group: topic/time.
+    timed = [
+        (head, name.lower().rpartition("/")[2], unit)
+        for head, name, unit in named
+        if unit and same_dimension(unit, "s")
+    ]
     plain = [(head, unit) for head, name, unit in timed if name in _TIME_NAMES]
     return plain or [(head, unit) for head, name, unit in timed if name in _TIME_WORDS]
 
@@ -36,11 +41,12 @@ def times_without_unit(heads: Sequence[str]) -> list[str]:
 
 
 def default_mapping(
-    heads: Sequence[str], model: FlatModel, file: str, given: ColumnMap | None = None
+    heads: Sequence[str], model: FlatModel, file: str, given: ColumnMap | None = None, *, joint: bool = False
 ) -> ColumnMap:
     """Return the mapping that follows from the heads of the columns.
 
     ``given``: where it maps columns, it is returned as it stands; else all but the columns are kept.
+    ``joint``: the heads are those of one joint in a log, of which a deck need not read everything.
     """
     if given is not None and given.columns:
         return given
@@ -49,6 +55,13 @@ def default_mapping(
     times = [(given.time.name, given.time.unit)] if given is not None and timed else times_among(heads)
     if not times:
         raise MeasurementError(file, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+    if joint:
+        clocks = [head for head, _ in times]
+        split_heads = [
+            (head, name, unit)
+            for head, name, unit in split_heads
+            if head not in clocks and unit and len(signals_for(name, unit, model)) == 1
+        ]
     columns = [
         Column(head, signal, str(unit), *_declared(model, signal), sampling=None)
         for head, name, unit in split_heads

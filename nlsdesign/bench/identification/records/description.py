@@ -170,7 +170,7 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def describe_records(folder: Path, model: FlatModel) -> RecordsDescription:
+def describe_records(folder: Path, model: FlatModel, *, joint: str | None = None) -> RecordsDescription:
     """Look at the files of a folder and tell what they hold, without refusing what is not clear.
 
     Parameters
@@ -179,6 +179,8 @@ def describe_records(folder: Path, model: FlatModel) -> RecordsDescription:
         Of records, as for :func:`~.measurement.load_records`; a ``records.toml`` in it is not read.
     model
         Whose signals may have been measured.
+    joint
+        Name of a joint in logs of a robot: only its columns are looked at.
 
     Returns
     -------
@@ -194,7 +196,8 @@ def describe_records(folder: Path, model: FlatModel) -> RecordsDescription:
     problems: dict[str, str] = {}
     for file in table_files(Path(folder)):
         try:
-            tables[file.name] = read_table(file)
+            table = read_table(file)
+            tables[file.name] = table if joint is None else table.of_joint(joint)
         except NlsError as error:
             problems[file.name] = str(error)
     whole = max(tables.values(), key=lambda table: len(table.heads), default=RecordTable("", {}))
@@ -203,7 +206,7 @@ def describe_records(folder: Path, model: FlatModel) -> RecordsDescription:
     files += [DescribedFile(name, 0, np.nan, np.nan, 0, text) for name, text in problems.items()]
     columns = tuple(_columns(whole, time, unit, model))
     description = RecordsDescription(time, unit, guessed, tuple(sorted(files, key=lambda f: f.name)), columns)
-    records, problem = _tried(Path(folder), model, description)
+    records, problem = _tried(Path(folder), model, description, joint)
     return RecordsDescription(time, unit, guessed, description.files, description.columns, records, problem)
 
 
@@ -274,12 +277,14 @@ def _is_clock(head: str, table: RecordTable) -> bool:
     return bool(unit and same_dimension(unit, "s") and len(values) > 1 and np.all(np.diff(values) > 0.0))
 
 
-def _tried(folder: Path, model: FlatModel, description: RecordsDescription) -> tuple[RecordSet | None, str]:
+def _tried(
+    folder: Path, model: FlatModel, description: RecordsDescription, joint: str | None
+) -> tuple[RecordSet | None, str]:
     """Return the records as they are read with the mapping that was found, or why they cannot be."""
     with tempfile.TemporaryDirectory() as scratch:
         mapping = Path(scratch) / "records.toml"
         mapping.write_text(description.mapping(), encoding="utf-8")
         try:
-            return load_records(folder, model, mapping=mapping), ""
+            return load_records(folder, model, mapping=mapping, joint=joint), ""
         except NlsError as error:
             return None, str(error)

@@ -14,6 +14,7 @@ from ....simulation import Trace
 from .clocks import Channel, Resolution, lag_between, on_one_clock, resolutions
 from .mapping import Align, Column, ColumnMap
 from .quality import Checked, Finding, Sampled, check_channels, check_columns, check_time
+from .robot_logs import check_one_clock
 from .sampling import SAMPLED
 from .table_files import RecordTable
 
@@ -53,6 +54,9 @@ class Run:
 
 def read_run(name: str, table: RecordTable, mapping: ColumnMap) -> Run:
     """Check a table and put its columns on one uniform clock."""
+    if not mapping.align:
+        clocks = [mapping.clock_of(column).name.partition(" [")[0] for column in mapping.columns]
+        check_one_clock(table.file, table.behind, clocks)
     table, began = _from_zero(table, mapping)
     checked = _checked(table, mapping)
     clean = replace(table, given={**table.given, **checked.values})

@@ -187,14 +187,15 @@ class ColumnMap:
         return replace(self.time, name=column.time) if column.time else self.time
 
 
-def read_mapping(path: Path) -> ColumnMap:
-    """Read the mapping of columns to signals.
+def read_mapping(path: Path, joint: str | None = None) -> ColumnMap:
+    """Read the mapping of columns to signals; ``{joint}`` in a head stands for the name of a joint.
 
     ``path``: TOML file. Where it has no table ``columns``, the heads of the records say what they are; where
     it has no ``time`` either, also which column holds the time, and the name of that column is empty here.
     """
     try:
-        tables = tomllib.loads(text_of(path, MeasurementError, next_step="name a records.toml"))
+        text = text_of(path, MeasurementError, next_step="name a records.toml")
+        tables = tomllib.loads(text if joint is None else text.replace("{joint}", joint))
     except (ValueError, RecursionError) as error:
         raise MeasurementError(
             path.name,

@@ -30,6 +30,7 @@ from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
 from .mapping import Inputs, check_signals, read_mapping, with_known_sampling
 from .quality import Finding
+from .robot_logs import is_robot_log
 from .sampling import SAMPLED, Sampling
 from .table_files import RecordTable, read_table, table_files, unread_tables
 
@@ -334,14 +335,16 @@ def load_records(
     *,
     mapping: Path | None = None,
     hold_out: Sequence[str] = (),
+    joint: str | None = None,
 ) -> RecordSet:
     """Read all tables of a folder as records of one rig.
 
     Parameters
     ----------
     folder
-        Holds one file per record, ``*.csv``, ``*.parquet``, ``*.mat``, ``*.h5`` or ``*.hdf5``, and perhaps
-        ``records.toml``. Files without a column of time are not records and are left out.
+        Holds one file per record, ``*.csv``, ``*.parquet``, ``*.mat``, ``*.h5`` or ``*.hdf5``, or one log of
+        a robot, ``*.mcap``, ``*.db3``, ``*.bag`` or a folder of rosbag2, and perhaps ``records.toml``. Files
+        without a column of time are not records and are left out.
     model
         Whose signals are measured.
     mapping
@@ -354,6 +357,9 @@ def load_records(
     hold_out
         Globs on record names. Without any, here or in the mapping, a third of the records is held out, those
         that the others surround, see :func:`~.held_out.surrounded`; a single record is cut after two thirds.
+    joint
+        Name of a joint in logs of a robot: only its columns are read. Without a mapping these are the ones of
+        which the model has one signal in their unit; in a mapping ``{joint}`` stands for the name.
 
     Raises
     ------
@@ -365,15 +371,15 @@ def load_records(
     folder = Path(folder)
     files = table_files(folder)
     path = mapping or (folder / "records.toml" if (folder / "records.toml").exists() else None)
-    given = read_mapping(path) if path else None
-    tables = {file: _table(file, given) for file in files}
+    given = read_mapping(path, joint) if path else None
+    tables = {file: _table(file, given, joint) for file in files}
     runs = {file: table for file, table in tables.items() if _is_run(table.heads, given)}
     if not runs:
         raise _without_time(str(folder), tables.values())
     # Where files differ in their columns, their names must not choose among them; of the file with the most
     # columns none is left out silently because another file lacks it.
     first = min(runs, key=lambda file: (-len(runs[file].heads), tuple(runs[file].heads)))
-    chosen = default_mapping(runs[first].heads, model, first.name, given)
+    chosen = default_mapping(runs[first].heads, model, first.name, given, joint=joint is not None)
     check_signals(first.name, chosen.columns, model)
     chosen = with_known_sampling(first.name, replace(chosen, inputs=Inputs.of(model)), model)
     pieces = {file: between_gaps(table, chosen) for file, table in runs.items()}
@@ -430,7 +436,7 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
         If the file does not exist, or cannot be used as it stands.
     """
     file = Path(file)
-    if not file.is_file():
+    if not (file.is_file() or is_robot_log(file)):
         near = nearest(file.name, [f.name for f in file.parent.glob("*")] if file.parent.is_dir() else [])
         raise MeasurementError(str(file), "there is no such file", did_you_mean=near)
     beside = file.parent / "records.toml"
@@ -446,9 +452,9 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
     return replace(one, records=(replace(one.records[0], role="held_out"),))
 
 
-def _table(file: Path, mapping: ColumnMap | None) -> RecordTable:
+def _table(file: Path, mapping: ColumnMap | None, joint: str | None = None) -> RecordTable:
     """Return the table of a file; units below its heads become part of them where no mapping names these."""
-    table = read_table(file)
+    table = read_table(file) if joint is None else read_table(file).of_joint(joint)
     if (mapping is not None and mapping.columns) or not table.units:
         return table
     units = {h: u for h, u in table.units.items() if mapping is None or h != mapping.time.name}

@@ -1,4 +1,4 @@
-"""Tables of measured numbers from files: CSV, Parquet, MAT and HDF5, each through the library made for it.
+"""Tables of numbers from files: CSV, Parquet, MAT, HDF5, logs, each through the library made for it.
 
 The elements of a MAT file are looked at before SciPy reads them: its reader looks up the type of a column's
 numbers without asking whether there is one, and follows arrays within arrays to any depth, so a code of no
@@ -16,7 +16,7 @@ import mmap
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,9 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.csv_tables import named_if_unreadable, read_csv
-from ....foundation.errors import MeasurementError, missing_library
+from ....foundation.errors import MeasurementError, missing_library, nearest
 from ....foundation.text_files import is_there
+from .robot_logs import LOG_ENDINGS, is_robot_log, read_robot_log
 
 _NUMBERS = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18))
 """Codes of the types of numbers and letters."""
@@ -37,7 +38,7 @@ LEAST_ROWS = 50
 """Smallest number of rows of a record."""
 _MOST_ROWS = 50_000_000
 """Largest number of rows of a record: 14 hours at 1 kHz."""
-_ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5")
+_ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5", *LOG_ENDINGS)
 _NOT_READ = (".dat", ".ods", ".tdms", ".tsv", ".txt", ".xls", ".xlsx")
 """Endings of other files that a bench may have left: one that is passed over is told."""
 
@@ -151,6 +152,8 @@ class RecordTable:
         Units of columns, by head, where the file gives them beside the heads.
     remarks
         What was assumed about the file.
+    behind
+        Usual time in s by which the clocks of a log, by head, lie behind its writing; empty for a table.
     """
 
     file: str
@@ -158,11 +161,28 @@ class RecordTable:
     first_row: int = 1
     units: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    behind: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def heads(self) -> tuple[str, ...]:
         """Heads in the order of the file."""
         return tuple(self.given)
+
+    def of_joint(self, joint: str) -> RecordTable:
+        """Return the columns of a joint, whose name stands between slashes in a head, with their clocks."""
+        of = [head for head in self.given if joint in head.split("/") and head not in self.behind]
+        if not of:
+            parts = {part for head in self.given for part in head.split("/")[1:] if head not in self.behind}
+            raise MeasurementError(
+                f"{self.file}: joint '{joint}'", "no column has this name between its slashes",
+                did_you_mean=nearest(joint, sorted(parts)),
+                next_step="name a joint as the messages do, or leave --joint out",
+            )  # fmt: skip
+        clocks = {
+            clock for head in of for clock in self.behind if head.startswith(clock.removesuffix("time"))
+        }
+        kept = {head: values for head, values in self.given.items() if head in clocks or head in of}
+        return replace(self, given=kept)
 
     def columns(self, heads: Sequence[str]) -> dict[str, Array]:
         """Return some columns of equal length."""
@@ -192,7 +212,7 @@ def table_files(folder: Path) -> list[Path]:
             did_you_mean=next(iter(near), None),
             next_step="name the folder of the records",
         )
-    files = sorted(f for f in folder.glob("[!.]*") if f.suffix.lower() in _ENDINGS)
+    files = sorted(f for f in folder.glob("[!.]*") if _is_record(f))
     if not files:
         raise MeasurementError(
             str(folder),
@@ -213,8 +233,13 @@ def _folders_of_records(parent: Path) -> list[str]:
     return [
         folder.name
         for folder in parent.glob("*")
-        if folder.is_dir() and any(f.suffix.lower() in _ENDINGS for f in folder.glob("[!.]*"))
+        if folder.is_dir() and any(_is_record(f) for f in folder.glob("[!.]*"))
     ]
+
+
+def _is_record(path: Path) -> bool:
+    """Tell whether a path may hold a record: a table by its ending, or a log."""
+    return is_robot_log(path) if path.is_dir() else path.suffix.lower() in _ENDINGS
 
 
 def unread_tables(folder: Path) -> list[Path]:
@@ -227,18 +252,20 @@ def read_table(file: Path) -> RecordTable:
 
     A CSV file is read by :func:`~nlsdesign.foundation.csv_tables.read_csv`. In a MAT file every numeric
     vector is a column, fields of a structure under ``structure.field``; in an HDF5 file every numeric
-    vector under its path, ``group/name``.
+    vector under its path, ``group/name``. A log gives ``topic/field``, see :mod:`~.robot_logs`.
     """
+    if is_robot_log(file):
+        return _log(file)
     reader = {".csv": _csv, ".parquet": _parquet, ".mat": _mat}.get(file.suffix.lower(), _hdf5)
     with named_if_unreadable(file):
         return reader(file)
 
 
-def _library(name: str, file: Path) -> Any:
+def _library(name: str, file: Path, extra: str = "records") -> Any:
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError:
-        raise missing_library(f"reading {file.name}", name, "records") from None
+        raise missing_library(f"reading {file.name}", name, extra) from None
 
 
 def _csv(file: Path) -> RecordTable:
@@ -262,6 +289,13 @@ def _parquet(file: Path) -> RecordTable:
                 next_step="give each column a head of its own",
             )
     return RecordTable(file.name, _numeric(dict(zip(names, vectors, strict=True))))
+
+
+def _log(path: Path) -> RecordTable:
+    rosbags, mcap = (_library(name, path, "robots") for name in ("rosbags.highlevel", "mcap.reader"))
+    with _damage_named(path):
+        log = read_robot_log(path, rosbags, mcap)
+    return RecordTable(path.name, log.columns, units=log.units, remarks=log.remarks, behind=log.behind)
 
 
 def _mat(file: Path) -> RecordTable:
