@@ -4,6 +4,7 @@ Presentation and commands may import it; it reads models, and designs nothing.
 """
 
 from .c.controller_code import export_c
+from .c.packages import write_package
 from .c.programs import write_examples
 from .c.writer import CSource
 from .compilation.compiled_step import natively, quickest
@@ -55,6 +56,7 @@ __all__ = [
     "read_exports",
     "read_ssp",
     "write_examples",
+    "write_package",
     "write_reference",
     "write_ssp",
 ]
