@@ -1,4 +1,4 @@
-"""A step as a library: CMake builds, tests and finds it, the schema of PlatformIO and a C++ compiler take it."""
+"""A step as a library: CMake builds and finds it, the schema of PlatformIO and a C++ compiler take it."""
 
 from __future__ import annotations
 
