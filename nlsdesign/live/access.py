@@ -53,34 +53,20 @@ def loopback(host: str) -> str:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a request is not answered.
-
-    Parameters
-    ----------
-    status
-        Of HTTP.
-    words
-        One sentence for whoever reads it.
-    """
+    """Why a request is not answered."""
 
     status: int
-    words: str
+    words: str  # one sentence for whoever reads it
 
 
 @dataclass(frozen=True)
 class Access:
-    """What a request must show.
+    """What a request must show."""
 
-    Parameters
-    ----------
-    host, port
-        Where the server listens; the host is a loopback address.
-    token
-        Random; part of the printed address only.
-    """
-
+    # host, port: where the server listens; the host is a loopback address
     host: str
     port: int
+    # token: random; part of the printed address only
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
 
     @property

@@ -101,24 +101,12 @@ _SAMPLE_TIME = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class AngleView:
-    """A design that can be looked at angle by angle.
+    """A design that can be looked at angle by angle."""
 
-    Parameters
-    ----------
-    view
-        What is shown of it over the angle.
-    contour
-        Of its cam.
-    cam
-        Names around it.
-    make
-        Gives the changed assembly; asked when it is first needed.
-    """
-
-    view: DesignView
-    contour: Contour
-    cam: CamNames
-    make: Callable[[], Assembly]
+    view: DesignView  # what is shown of it over the angle
+    contour: Contour  # of its cam
+    cam: CamNames  # names around it
+    make: Callable[[], Assembly]  # gives the changed assembly; asked when it is first needed
 
     @cached_property
     def machine(self) -> Assembly:

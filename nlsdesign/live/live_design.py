@@ -56,27 +56,14 @@ class Snapshots(dict[str, Snapshot]):
 
 @dataclass(frozen=True, eq=False)
 class LiveMoment:
-    """A question with its answer, and the last good design, which may be that of an earlier question.
+    """A question with its answer, and the last good design, which may be that of an earlier question."""
 
-    Parameters
-    ----------
-    question
-        What was asked.
-    answer
-        What was answered.
-    solved
-        The last good design; ``None`` before the first, and where its program is not kept.
-    numbers
-        Its numbers, which stay without the program.
-    shown
-        That design angle by angle.
-    """
-
-    question: LiveQuestion
-    answer: LiveAnswer
+    question: LiveQuestion  # what was asked
+    answer: LiveAnswer  # what was answered
+    # solved: the last good design; None before the first, and where its program is not kept
     solved: ParametricDesign | None
-    numbers: DesignedNumbers | None
-    shown: AngleView | None
+    numbers: DesignedNumbers | None  # its numbers, which stay without the program
+    shown: AngleView | None  # that design angle by angle
 
     @property
     def values(self) -> dict[str, float]:
@@ -182,12 +169,7 @@ MOST_UNDO = 200
 class LiveHistory:
     """The moments of one session; one whose program the solver has dropped goes on without it.
 
-    Parameters
-    ----------
-    question
-        With which it begins.
-    values
-        Numbers in SI of a design to begin beside, by name; empty without one.
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
     """
 
     def __init__(self, question: LiveQuestion, values: dict[str, float]) -> None:
@@ -250,12 +232,8 @@ class LiveDesign:
     (``SettleDesign()``) in a process of its own; its answer replaces the quick one when
     :meth:`poll` finds it done.
 
-    Parameters
-    ----------
-    question
-        With which it begins, for instance ``gallery_question("cam-actuator")``.
-    values
-        Numbers in SI of a design to begin beside, as :func:`~.saved.reopened` gives them.
+    ``question``: with which it begins, for instance ``gallery_question("cam-actuator")``. ``values``: numbers
+    in SI of a design to begin beside, as :func:`~.saved.reopened` gives them.
     """
 
     def __init__(self, question: LiveQuestion, values: dict[str, float] | None = None) -> None:

@@ -36,21 +36,11 @@ _HEAD = "# Asked on the live page. `nlsdesign design --deck deck.toml --task des
 
 @dataclass(frozen=True)
 class SavedDesign:
-    """A live design as three TOML texts.
+    """A live design as three TOML texts."""
 
-    Parameters
-    ----------
-    deck
-        The actuator with the numbers that were given.
-    job
-        Target, limits and what is free: a design file.
-    begin
-        Title, points and the numbers at which the last design stood, so that it is found again.
-    """
-
-    deck: str
-    job: str
-    begin: str = ""
+    deck: str  # the actuator with the numbers that were given
+    job: str  # target, limits and what is free: a design file
+    begin: str = ""  # title, points and the numbers at which the last design stood, so that it is found again
 
 
 def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:

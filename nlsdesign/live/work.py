@@ -115,15 +115,9 @@ class TorqueLoop(LiveTask):
 
 @dataclass(frozen=True)
 class DiagnoseRecords(LiveTask):
-    """What bench records say that the declared machine lacks: :class:`DiagnosisAnswer`.
+    """What bench records say that the declared machine lacks: :class:`DiagnosisAnswer`."""
 
-    Parameters
-    ----------
-    folder
-        Of the records, as for ``load_records``; bounded in number and size of files.
-    """
-
-    folder: Path
+    folder: Path  # of the records, as for load_records; bounded in number and size of files
 
     def call(
         self, question: LiveQuestion, shown: AngleView | None
@@ -200,27 +194,13 @@ class LiveWork:
 
 @dataclass(frozen=True, eq=False)
 class CloudAnswer:
-    """What the spreads of all numbers do to the torque.
+    """What the spreads of all numbers do to the torque."""
 
-    Parameters
-    ----------
-    angles
-        In rad.
-    nominal
-        Torque without deviations in N·m.
-    band
-        Torque below which 5, 50 and 95 % of the springs lie, shape (3, angles).
-    errors
-        Rms error of each draw in N·m.
-    rows
-        Summary: pairs of text.
-    """
-
-    angles: Array
-    nominal: Array
-    band: Array
-    errors: Array
-    rows: tuple[tuple[str, str], ...]
+    angles: Array  # in rad
+    nominal: Array  # torque without deviations in N·m
+    band: Array  # torque below which 5, 50 and 95 % of the springs lie, shape (3, angles)
+    errors: Array  # rms error of each draw in N·m
+    rows: tuple[tuple[str, str], ...]  # summary: pairs of text
 
 
 def tolerance_cloud(
@@ -234,30 +214,15 @@ def tolerance_cloud(
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisAnswer:
-    """What a diagnosis came to.
+    """What a diagnosis came to."""
 
-    Parameters
-    ----------
-    verdict
-        ``none``, ``named``, ``unknown``, ``undecidable`` or ``data_suspect``.
-    effects
-        What was named, in words.
-    gap
-        Block, role of the records, and error before and after with noise floor and signal, in the unit.
-    course
-        A held-out record over time: name, quantity, unit, time, measured, before, after.
-    words
-        The whole verdict as text.
-    deck
-        The better model as a deck.
-    """
-
-    verdict: str
-    effects: tuple[str, ...]
+    verdict: str  # none, named, unknown, undecidable or data_suspect
+    effects: tuple[str, ...]  # what was named, in words
+    # gap: block, role of the records, and error before and after with noise floor and signal, in the unit
     gap: dict[str, Any]
-    course: dict[str, Any]
-    words: str
-    deck: str
+    course: dict[str, Any]  # a held-out record over time: name, quantity, unit, time, measured, before, after
+    words: str  # the whole verdict as text
+    deck: str  # the better model as a deck
 
 
 def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) -> DiagnosisAnswer:
@@ -435,18 +400,10 @@ class ShownDesign:
 
 @dataclass(frozen=True)
 class ExportDesign(LiveTask):
-    """The design as a file: :class:`ExportedDesign`.
+    """The design as a file: :class:`ExportedDesign`."""
 
-    Parameters
-    ----------
-    what
-        ``"deck"``, ``"svg"``, ``"dxf"``, ``"c"`` or ``"fmu"``.
-    note
-        What the head of the file says; empty for nothing.
-    """
-
-    what: str
-    note: str = ""
+    what: str  # "deck", "svg", "dxf", "c" or "fmu"
+    note: str = ""  # what the head of the file says; empty for nothing
 
     def call(
         self, question: LiveQuestion, shown: AngleView | None

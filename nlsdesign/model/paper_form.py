@@ -24,24 +24,15 @@ GEOMETRIC = "geometric"
 
 @dataclass(frozen=True)
 class PaperFormNames:
-    """Names of the variables that make the form of the paper; each is decided from the structure by default.
+    """Names of the variables that make the form of the paper; the structure decides those not given."""
 
-    Parameters
-    ----------
-    inner
-        State of the rubber that the force replaces: the only one of the element behind the cam.
-    force, extension
-        Signals of one element behind the cam.
-    rate
-        Name of the new input dδ/dt.
-    angle, speed
-        States of the driven body.
-    """
-
+    # inner: state of the rubber that the force replaces: the only one of the element behind the cam
     inner: str | None = None
+    # force, extension: signals of one element behind the cam
     force: str | None = None
     extension: str | None = None
-    rate: str | None = None
+    rate: str | None = None  # name of the new input dδ/dt
+    # angle, speed: states of the driven body
     angle: str | None = None
     speed: str | None = None
 

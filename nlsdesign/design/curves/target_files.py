@@ -18,24 +18,12 @@ from .target import TabulatedStiffness, TabulatedTorque, Target, TorqueBand
 
 @dataclass(frozen=True, eq=False)
 class ReadColumns:
-    """Columns of one table in SI.
+    """Columns of one table in SI."""
 
-    Parameters
-    ----------
-    file
-        Name of the file, for messages.
-    values
-        By name, shape (n,).
-    units
-        As the heads give them, by name.
-    lines
-        Number of the line of each row.
-    """
-
-    file: str
-    values: Mapping[str, Array]
-    units: Mapping[str, str]
-    lines: tuple[int, ...]
+    file: str  # name of the file, for messages
+    values: Mapping[str, Array]  # by name, shape (n,)
+    units: Mapping[str, str]  # as the heads give them, by name
+    lines: tuple[int, ...]  # number of the line of each row
 
     def cell(self, row: int, name: str) -> str:
         """Return where a number stands: file, line and column."""

@@ -19,20 +19,11 @@ class ArcPath:
 
     A bulge of zero is a straight line, a positive one an arc to the left (anticlockwise). From the last point
     of a closed path an arc leads to the first.
-
-    Parameters
-    ----------
-    points
-        Shape (n, 2), in m.
-    bulges
-        Shape (n,); of an open path the last is not used.
-    closed
-        Whether the path returns to its first point.
     """
 
-    points: Array
-    bulges: Array
-    closed: bool = False
+    points: Array  # shape (n, 2), in m
+    bulges: Array  # shape (n,); of an open path the last is not used
+    closed: bool = False  # whether the path returns to its first point
 
     @cached_property
     def ends(self) -> tuple[Array, Array, Array]:

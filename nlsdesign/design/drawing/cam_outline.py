@@ -24,25 +24,14 @@ _CHECKED = 33
 
 @dataclass(frozen=True, eq=False)
 class LipEdge:
-    """Edge under the cable from the channel to the end of the run-out, clockwise, as arcs.
+    """Edge under the cable from the channel to the end of the run-out, clockwise, as arcs."""
 
-    Parameters
-    ----------
-    path
-        Open path in the frame of the cam, in m.
-    deviation
-        Largest distance between the arcs and the contour less the radius of the cable, in m.
-    first_direction, last_direction
-        φ at both ends in rad: the outward normal is (sin φ, cos φ).
-    last_support
-        Distance of the last tangent from the centre in m.
-    """
-
-    path: ArcPath
-    deviation: float
+    path: ArcPath  # open path in the frame of the cam, in m
+    deviation: float  # largest distance between the arcs and the contour less the radius of the cable, in m
+    # first_direction, last_direction: φ at both ends in rad: the outward normal is (sin φ, cos φ)
     first_direction: float
     last_direction: float
-    last_support: float
+    last_support: float  # distance of the last tangent from the centre in m
 
 
 def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> LipEdge:

@@ -74,18 +74,10 @@ class PicturesOfDesign(Protocol):
 
 @dataclass(frozen=True)
 class WrittenDesign:
-    """The files of a design.
+    """The files of a design."""
 
-    Parameters
-    ----------
-    files
-        In the order in which they were written.
-    remarks
-        What a designer should know before a part is made.
-    """
-
-    files: tuple[Path, ...]
-    remarks: tuple[str, ...]
+    files: tuple[Path, ...]  # in the order in which they were written
+    remarks: tuple[str, ...]  # what a designer should know before a part is made
 
 
 def write_design(

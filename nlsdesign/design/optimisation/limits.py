@@ -661,18 +661,10 @@ class AtMost(Limit):
 
 @dataclass(frozen=True)
 class LimitKind:
-    """A limit with one number.
+    """A limit with one number."""
 
-    Parameters
-    ----------
-    kind
-        Its class.
-    described
-        What the class says of its number.
-    """
-
-    kind: type[Limit]
-    described: OneNumber
+    kind: type[Limit]  # its class
+    described: OneNumber  # what the class says of its number
 
     @property
     def words(self) -> str:

@@ -42,24 +42,12 @@ _SHOWN_IN = {"m": "mm", "m^2": "mm^2"}
 
 
 class FrontPoint(NamedTuple):
-    """One design of a front.
+    """One design of a front."""
 
-    Parameters
-    ----------
-    values
-        The goals, in SI.
-    numbers
-        Free numbers in SI by full name, besides the contour.
-    units
-        SI units of these.
-    binding
-        Names of the limits on which the design sits.
-    """
-
-    values: tuple[float, ...]
-    numbers: tuple[tuple[str, float], ...]
-    units: tuple[str, ...]
-    binding: tuple[str, ...]
+    values: tuple[float, ...]  # the goals, in SI
+    numbers: tuple[tuple[str, float], ...]  # free numbers in SI by full name, besides the contour
+    units: tuple[str, ...]  # SI units of these
+    binding: tuple[str, ...]  # names of the limits on which the design sits
 
 
 class LeftOut(NamedTuple):

@@ -58,26 +58,14 @@ class _Interval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SteadyCycle:
-    """One steady cycle; each sum over intervals is Simpson's rule over the phase.
+    """One steady cycle; each sum over intervals is Simpson's rule over the phase."""
 
-    Parameters
-    ----------
-    design
-        The design in symbols.
-    amplitude
-        A in rad.
-    intervals
-        From angle zero to the amplitude.
-    static
-        Force of one element in equilibrium at begin, middle and end of each interval.
-    up, down
-        What is added to it on the way up and on the way down.
-    """
-
-    design: DesignPoint
-    amplitude: float
-    intervals: tuple[_Interval, ...]
+    design: DesignPoint  # the design in symbols
+    amplitude: float  # a in rad
+    intervals: tuple[_Interval, ...]  # from angle zero to the amplitude
+    # static: force of one element in equilibrium at begin, middle and end of each interval
     static: tuple[Expression, ...]
+    # up, down: what is added to it on the way up and on the way down
     up: tuple[Expression, ...]
     down: tuple[Expression, ...]
 

@@ -33,20 +33,11 @@ _SOURCE = "designed: fitted to a lever arm over the angle"
 
 @dataclass(frozen=True)
 class CamFit:
-    """A declared cam and how well it holds the lever arm that it was made for.
-
-    Parameters
-    ----------
-    cam
-        The cam.
-    error
-        Largest deviation of its lever arm in m, outside the change of sides or the onset.
-    changed
-        Names of the numbers of the cam that the fit has set.
-    """
+    """A declared cam and how well it holds the lever arm that it was made for."""
 
     cam: Cam
-    error: float
+    error: float  # largest deviation of its lever arm in m, outside the change of sides or the onset
+    # changed: names of the numbers of the cam that the fit has set
     changed: tuple[str, ...] = ("lever_arm", "last_angle")
 
     def changes(self) -> dict[str, Quantity]:

@@ -81,22 +81,13 @@ def _rewritten(
 
 @dataclass(frozen=True, eq=False)
 class ElasticLaw:
-    """Force of the element behind a cam over its extension, in equilibrium.
+    """Force of the element behind a cam over its extension, in equilibrium."""
 
-    Parameters
-    ----------
-    cam
-        Names around the cam, and of the pieces of rubber behind it.
-    parameters
-        All parameters of the flat model, in its order.
-    function
-        ``casadi.Function`` (extension, parameters) -> (force, stiffness, strains, stresses, coils); one
-        strain and one nominal stress for each specimen; extension, shear stress, tensile strength and volume
-        of wire of each coil, zero where they are not known.
-    """
-
-    cam: CamNames
-    parameters: tuple[Variable, ...]
+    cam: CamNames  # names around the cam, and of the pieces of rubber behind it
+    parameters: tuple[Variable, ...]  # all parameters of the flat model, in its order
+    # function: casadi.Function (extension, parameters) -> (force, stiffness, strains, stresses, coils); one
+    # strain and one nominal stress for each specimen; extension, shear stress, tensile strength and volume of
+    # wire of each coil, zero where they are not known
     function: ca.Function
 
     @property
@@ -335,22 +326,13 @@ _ANGLE = 0.2
 
 @dataclass(frozen=True, eq=False)
 class RelaxingLaw:
-    """Force of the element behind a cam above that of equilibrium, over extension, rate and inner states.
+    """Force of the element behind a cam above that of equilibrium, over extension, rate and inner states."""
 
-    Parameters
-    ----------
-    element
-        Path of the element.
-    states
-        Names of the inner states.
-    function
-        ``casadi.Function`` (extension, rate, states, parameters) -> (excess force, derivatives of the
-        states); parameters are all those of the flat model, in its order. The derivatives are affine in the
-        states.
-    """
-
-    element: str
-    states: tuple[str, ...]
+    element: str  # path of the element
+    states: tuple[str, ...]  # names of the inner states
+    # function: casadi.Function (extension, rate, states, parameters) -> (excess force, derivatives of the
+    # states); parameters are all those of the flat model, in its order. The derivatives are affine in the
+    # states.
     function: ca.Function
 
 

@@ -78,14 +78,9 @@ class Cause(ABC):
 
 @dataclass(frozen=True)
 class NumberCause(Cause):
-    """Numbers behind the cam that move together.
+    """Numbers behind the cam that move together."""
 
-    Parameters
-    ----------
-    numbers
-        Pairs of parameter name and its deviation in SI per standard deviation of the cause.
-    """
-
+    # numbers: pairs of parameter name and its deviation in SI per standard deviation of the cause
     numbers: tuple[tuple[str, float], ...]
 
 
@@ -106,14 +101,9 @@ class WaveCause(Cause):
 
 @dataclass(frozen=True)
 class ProfileCause(Cause):
-    """Declared numbers of the cam: the contour deviates as the lever arm changes with them.
+    """Declared numbers of the cam: the contour deviates as the lever arm changes with them."""
 
-    Parameters
-    ----------
-    numbers
-        Pairs of parameter name and its deviation in SI per standard deviation of the cause.
-    """
-
+    # numbers: pairs of parameter name and its deviation in SI per standard deviation of the cause
     numbers: tuple[tuple[str, float], ...]
 
 

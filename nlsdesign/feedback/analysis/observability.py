@@ -343,25 +343,15 @@ _NO_ARM = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class RankDrop:
-    """An angle, or a range of angles, at which something is not seen.
+    """An angle, or a range of angles, at which something is not seen."""
 
-    Parameters
-    ----------
-    first, last
-        In rad; equal for a single angle.
-    unseen
-        What is not seen there, with its eigenvalues; in the middle of a range.
-    cause
-        What vanishes there, by name, where the structure says it: the lever arm of a cam; else empty.
-    open_ended
-        Whether a range goes on beyond the angles that were looked at.
-    """
-
+    # first, last: in rad; equal for a single angle
     first: float
     last: float
-    unseen: Unseen
+    unseen: Unseen  # what is not seen there, with its eigenvalues; in the middle of a range
+    # cause: what vanishes there, by name, where the structure says it: the lever arm of a cam; else empty
     cause: str = ""
-    open_ended: bool = False
+    open_ended: bool = False  # whether a range goes on beyond the angles that were looked at
 
     @property
     def isolated(self) -> bool:

@@ -54,12 +54,7 @@ def rest_states(
 class RestSolver:
     """Finds rest states of one model with many sets of numbers; its functions are built once.
 
-    Parameters
-    ----------
-    model
-        Continuous; inputs are at their start values.
-    angle, consistent
-        As for :func:`rest_states`.
+    ``model``: continuous; inputs are at their start values.
     """
 
     def __init__(

@@ -43,36 +43,22 @@ _TO_ZERO = (8.0 / 3.0, -2.0, 1.0 / 3.0)
 
 @dataclass(frozen=True, eq=False)
 class PlantMode:
-    """The linear plant in one mode, at N angles.
+    """The linear plant in one mode, at N angles."""
 
-    Parameters
-    ----------
-    name
-        ``"free"`` without dry friction, else ``"sliding"``, or ``"sliding_forward"`` and
-        ``"sliding_backward"`` where these differ, and ``"stuck"``.
-    words
-        What is linearised, in words.
-    a, b
-        Slopes of the rates of the states in states and inputs, shapes (N, n, n) and (N, n, m).
-    c
-        Slopes of the outputs in the states, shape (N, r, n).
-    rates
-        What the states would do if the angle were let go, in the mean of both directions, so without dry
-        friction; shape (N, n).
-    held
-        Number of rates that are held: as many motions stand still.
-    allowed
-        Projection onto the states in which nothing that is held moves, shape (N, n, n); ``None`` where
-        nothing is held.
-    """
-
+    # name: "free" without dry friction, else "sliding", or "sliding_forward" and "sliding_backward" where
+    # these differ, and "stuck"
     name: str
-    words: str
+    words: str  # what is linearised, in words
+    # a, b: slopes of the rates of the states in states and inputs, shapes (N, n, n) and (N, n, m)
     a: Array
     b: Array
-    c: Array
+    c: Array  # slopes of the outputs in the states, shape (N, r, n)
+    # rates: what the states would do if the angle were let go, in the mean of both directions, so without dry
+    # friction; shape (N, n)
     rates: Array
-    held: int = 0
+    held: int = 0  # number of rates that are held: as many motions stand still
+    # allowed: projection onto the states in which nothing that is held moves, shape (N, n, n); None where
+    # nothing is held
     allowed: Array | None = None
 
     @property
@@ -256,28 +242,15 @@ def _extrapolated(values: list[Array]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class RestPoint:
-    """The model at rest at one angle.
+    """The model at rest at one angle."""
 
-    Parameters
-    ----------
-    model
-        Whole model.
-    angle
-        Name of the state that is swept.
-    state
-        Rest state, shape (states,).
-    linear
-        Exact linearisation there. Where dry friction is smoothed, it is that of its corner; see
-        :class:`~nlsdesign.feedback.analysis.rest_points.PlantMode` for the machine that slides or sticks.
-    sizes
-        Typical size of states and outputs over the sweep.
-    """
-
-    model: FlatModel
-    angle: str
-    state: Array
+    model: FlatModel  # whole model
+    angle: str  # name of the state that is swept
+    state: Array  # rest state, shape (states,)
+    # linear: exact linearisation there. Where dry friction is smoothed, it is that of its corner; see
+    # PlantMode for the machine that slides or sticks.
     linear: LinearModel
-    sizes: Mapping[str, float]
+    sizes: Mapping[str, float]  # typical size of states and outputs over the sweep
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,17 +60,10 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Tone:
-    """One colour of the figures.
+    """One colour of the figures."""
 
-    Parameters
-    ----------
-    name
-        Name of its CSS variable, without the leading dashes.
-    light, dark
-        As ``#rrggbb``, on light and on dark pages.
-    """
-
-    name: str
+    name: str  # name of its CSS variable, without the leading dashes
+    # light, dark: as #rrggbb, on light and on dark pages
     light: str
     dark: str
 

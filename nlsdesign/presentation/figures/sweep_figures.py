@@ -42,21 +42,11 @@ _LINES = 6
 
 
 class ShownColumn(NamedTuple):
-    """One column of a sweep as a figure shows it.
+    """One column of a sweep as a figure shows it."""
 
-    Parameters
-    ----------
-    name
-        Full name.
-    unit
-        Of the values; empty for words and counts.
-    values
-        One for each point: numbers, or words.
-    """
-
-    name: str
-    unit: str
-    values: NDArray[Any]
+    name: str  # full name
+    unit: str  # of the values; empty for words and counts
+    values: NDArray[Any]  # one for each point: numbers, or words
 
     @property
     def words(self) -> bool:
@@ -78,18 +68,11 @@ class ShownColumn(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PointKinds:
-    """What the points of a figure are.
+    """What the points of a figure are."""
 
-    Parameters
-    ----------
-    points
-        Numbers of the points, shape (n,).
-    front, missed, failed
-        Which no other betters, which keep not all requirements, which have no answer; no point is two of
-        them.
-    """
-
-    points: NDArray[np.int64]
+    points: NDArray[np.int64]  # numbers of the points, shape (n,)
+    # front, missed, failed: which no other betters, which keep not all requirements, which have no answer; no
+    # point is two of them
     front: Mask
     missed: Mask
     failed: Mask
@@ -173,17 +156,10 @@ _MOST_BARS = 40
 
 
 class MarkedQuantile(NamedTuple):
-    """A quantile in a histogram.
+    """A quantile in a histogram."""
 
-    Parameters
-    ----------
-    share
-        Of the values below it.
-    value, lower, upper
-        In the unit of the column; bounds that are not a number are not drawn.
-    """
-
-    share: float
+    share: float  # of the values below it
+    # value, lower, upper: in the unit of the column; bounds that are not a number are not drawn
     value: float
     lower: float
     upper: float
@@ -400,27 +376,16 @@ _STEPS = 7
 
 
 class SurfacePanel(NamedTuple):
-    """One answer over two axes.
+    """One answer over two axes."""
 
-    Parameters
-    ----------
-    title
-        Answer with its unit.
-    across, up
-        Axes, values at the points.
-    kinds
-        What the points are.
-    nodes
-        Nodes of the surface across and up, in the units of the axes; ``None`` where only points are drawn.
-    values
-        Of the answer at the nodes, shape (up, across); not a number where nothing is drawn.
-    """
-
-    title: str
+    title: str  # answer with its unit
+    # across, up: axes, values at the points
     across: ShownColumn
     up: ShownColumn
-    kinds: PointKinds
+    kinds: PointKinds  # what the points are
+    # nodes: nodes of the surface across and up, in the units of the axes; None where only points are drawn
     nodes: tuple[Array, Array] | None
+    # values: of the answer at the nodes, shape (up, across); not a number where nothing is drawn
     values: Array | None
 
 
@@ -465,21 +430,13 @@ def _contours(panel: Axes, across: Array, up: Array, values: Array) -> None:
 
 
 class VarianceShare(NamedTuple):
-    """Share of one axis.
+    """Share of one axis."""
 
-    Parameters
-    ----------
-    axis
-        Its name.
-    first, first_error
-        Share of the axis alone, and half of its interval.
-    total, total_error
-        The same with its interactions; not a number where there is none.
-    """
-
-    axis: str
+    axis: str  # its name
+    # first, first_error: share of the axis alone, and half of its interval
     first: float
     first_error: float
+    # total, total_error: the same with its interactions; not a number where there is none
     total: float
     total_error: float
 

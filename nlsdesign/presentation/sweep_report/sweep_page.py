@@ -97,27 +97,14 @@ _FACTS = ("deck", "deck, digest", "question", "version", "seed", "points asked")
 
 
 class SweepPage(NamedTuple):
-    """What was written.
-
-    Parameters
-    ----------
-    page
-        The page.
-    points
-        Table of all points, as CSV.
-    decks
-        Decks of the points in the table of the page, by number.
-    front
-        Numbers of the points that no other betters, the best in the first direction first.
-    remarks
-        What the reader should know, one sentence each.
-    """
+    """What was written."""
 
     page: Path
-    points: Path
-    decks: dict[int, Path]
+    points: Path  # table of all points, as CSV
+    decks: dict[int, Path]  # decks of the points in the table of the page, by number
+    # front: numbers of the points that no other betters, the best in the first direction first
     front: tuple[int, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # what the reader should know, one sentence each
 
 
 def write_sweep_report(

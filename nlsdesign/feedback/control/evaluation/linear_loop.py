@@ -44,44 +44,29 @@ _WITHOUT_ERROR = 6
 
 @dataclass(frozen=True, eq=False)
 class LinearLoop:
-    """x⁺ = A x + B v + B⁺ v⁺, y = C x + D v of the whole loop at many angles.
+    """x⁺ = A x + B v + B⁺ v⁺, y = C x + D v of the whole loop at many angles."""
 
-    Parameters
-    ----------
-    angles
-        Of the spring in rad, shape (n,).
-    torque
-        That the spring holds there, in N·m, shape (n,).
-    current
-        That holds it, in A, shape (n,); where it is beyond the limit of the controller the loop cannot rest
-        there, ``reached`` is false and poles and responses are not numbers.
-    reached
-        Whether the loop rests there inside all limits, shape (n,); false also where the controller was only
-        found inside a limit of its own, so that it does not hear what is wanted.
-    sample_time
-        In s.
-    states, inputs, outputs
-        Full names.
-    a, b, b_next, c, d
-        Shapes (n, states, states), (n, states, inputs), twice, (n, outputs, states), (n, outputs, inputs).
-    mode
-        Of the plant's dry friction.
-    """
-
-    angles: Array
-    torque: Array
+    angles: Array  # of the spring in rad, shape (n,)
+    torque: Array  # that the spring holds there, in N·m, shape (n,)
+    # current: that holds it, in A, shape (n,); where it is beyond the limit of the controller the loop cannot
+    # rest there, reached is false and poles and responses are not numbers
     current: Array
+    # reached: whether the loop rests there inside all limits, shape (n,); false also where the controller was
+    # only found inside a limit of its own, so that it does not hear what is wanted
     reached: Mask
-    sample_time: float
+    sample_time: float  # in s
+    # states, inputs, outputs: full names
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    # a, b, b_next, c, d: shapes (n, states, states), (n, states, inputs), twice, (n, outputs, states), (n,
+    # outputs, inputs)
     a: Array
     b: Array
     b_next: Array
     c: Array
     d: Array
-    mode: LinearMode
+    mode: LinearMode  # of the plant's dry friction
 
     def poles(self) -> Complex:
         """Return the closed-loop poles s = ln(z)/T in 1/s, the slowest first, shape (n, states).

@@ -166,29 +166,19 @@ class FrozenTables(TableSlope):
 
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
-    """A plant linearised at many angles: ẋ = A x + B u, signals = C x + D u.
+    """A plant linearised at many angles: ẋ = A x + B u, signals = C x + D u."""
 
-    Parameters
-    ----------
-    states, inputs, signals
-        Names; the driven input comes first.
-    a, b, c, d
-        Shapes (n, states, states), (n, states, inputs), (n, signals, states), (n, signals, inputs).
-    values
-        Of the signals, shape (n, signals).
-    drive
-        Value of the driven input that holds the plant, shape (n,).
-    """
-
+    # states, inputs, signals: names; the driven input comes first
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     signals: tuple[str, ...]
+    # a, b, c, d: shapes (n, states, states), (n, states, inputs), (n, signals, states), (n, signals, inputs)
     a: Array
     b: Array
     c: Array
     d: Array
-    values: Array
-    drive: Array
+    values: Array  # of the signals, shape (n, signals)
+    drive: Array  # value of the driven input that holds the plant, shape (n,)
 
     def sampled(self, step: float) -> tuple[Array, Array, Array, Array]:
         """Return exact matrices over one sample.
@@ -273,18 +263,12 @@ def _holding(function: ca.Function, rest: Array, fixed: tuple[Array, Array], pla
 
 @dataclass(frozen=True, eq=False)
 class BlockPoint:
-    """A discrete block evaluated and linearised at many points.
+    """A discrete block evaluated and linearised at many points."""
 
-    Parameters
-    ----------
-    following, output
-        Shapes (n, states) and (n, outputs).
-    a, b, c, d
-        Slopes of both over state and input, tables included.
-    """
-
+    # following, output: shapes (n, states) and (n, outputs)
     following: Array
     output: Array
+    # a, b, c, d: slopes of both over state and input, tables included
     a: Array
     b: Array
     c: Array
@@ -292,15 +276,7 @@ class BlockPoint:
 
 
 class LinearBlock:
-    """Evaluates a discrete block with its tables, and their slopes, at many points.
-
-    Parameters
-    ----------
-    model
-        Discrete.
-    tables
-        How the tables take part.
-    """
+    """Evaluates a discrete block with its tables, and their slopes, at many points."""
 
     def __init__(self, model: FlatModel, tables: TableSlope) -> None:
         self.model, self.tables = model, tables

@@ -26,19 +26,12 @@ from .law_writer import GAIN, AntiWindup, ConditionalIntegration, Integration, L
 
 
 class Heard(NamedTuple):
-    """What a controller is given at a sample.
+    """What a controller is given at a sample."""
 
-    Parameters
-    ----------
-    desired, torque
-        Torque that the spring should have, and the estimate of the one it has, in N·m.
-    angle
-        Measured angle of the motor in rad.
-    """
-
+    # desired, torque: torque that the spring should have, and the estimate of the one it has, in N·m
     desired: Expression
     torque: Expression
-    angle: Expression
+    angle: Expression  # measured angle of the motor in rad
 
 
 SLOW_PART = 3.125
@@ -46,41 +39,22 @@ SLOW_PART = 3.125
 
 
 class HeldBack(NamedTuple):
-    """By how much commands exceed their limits at a sample; zero within them.
+    """By how much commands exceed their limits at a sample; zero within them."""
 
-    Parameters
-    ----------
-    speed
-        Of the spring, in rad/s.
-    current
-        In A.
-    speed_per_current
-        Speed of the spring that makes one ampere, in rad/s/A; its sign says which way the current pushes.
-    """
-
-    speed: Expression
-    current: Expression
+    speed: Expression  # of the spring, in rad/s
+    current: Expression  # in A
+    # speed_per_current: speed of the spring that makes one ampere, in rad/s/A; its sign says which way the
+    # current pushes
     speed_per_current: Expression
 
 
 class SpeedCommand(NamedTuple):
-    """What an outer law asks for.
+    """What an outer law asks for."""
 
-    Parameters
-    ----------
-    speed
-        Of the spring, within its limits, in rad/s.
-    beyond
-        What the limits took away, in rad/s.
-    acceleration
-        Of the spring, as far as the law knows it beforehand, in rad/s².
-    finish
-        Takes what all limits held back and says what the states of the law are one sample later.
-    """
-
-    speed: Expression
-    beyond: Expression
-    acceleration: Expression
+    speed: Expression  # of the spring, within its limits, in rad/s
+    beyond: Expression  # what the limits took away, in rad/s
+    acceleration: Expression  # of the spring, as far as the law knows it beforehand, in rad/s²
+    # finish: takes what all limits held back and says what the states of the law are one sample later
     finish: Callable[[HeldBack], None]
 
 

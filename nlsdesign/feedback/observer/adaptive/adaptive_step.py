@@ -46,17 +46,10 @@ class _Side(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class AdaptiveStep:
-    """One step as exact functions of the angle, nominal and with every direction one deviation up and down.
+    """One step as exact functions of the angle, nominal and with each direction a deviation up and down."""
 
-    Parameters
-    ----------
-    nominal
-        The step with the declared numbers; its gain is not used.
-    raised, lowered
-        The plant with each direction at +1 and −1, and its inertia over the declared one.
-    """
-
-    nominal: ObserverStep
+    nominal: ObserverStep  # the step with the declared numbers; its gain is not used
+    # raised, lowered: the plant with each direction at +1 and −1, and its inertia over the declared one
     raised: tuple[_Side, ...]
     lowered: tuple[_Side, ...]
 
@@ -204,17 +197,9 @@ SLOWEST, STEP = 0.4, 0.23
 
 @dataclass(frozen=True, eq=False)
 class HeldObserver:
-    """Inner states and torque estimate of an adaptive observer whose slow states are given courses of time.
+    """Inner states and torque estimate of an adaptive observer with given courses of its slow states."""
 
-    Parameters
-    ----------
-    model
-        Discrete; its first input is the angle, its only output the estimate.
-    step
-        Of the adaptive observer.
-    """
-
-    model: FlatModel
+    model: FlatModel  # discrete; its first input is the angle, its only output the estimate
     step: AdaptiveStep
 
     def start(self, angle: float) -> dict[str, float]:

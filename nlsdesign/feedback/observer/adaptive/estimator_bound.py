@@ -29,21 +29,11 @@ from ....simulation.prior import Prior
 
 @dataclass(frozen=True, eq=False)
 class EstimatorBound:
-    """Least standard deviation of an estimate along a run.
+    """Least standard deviation of an estimate along a run."""
 
-    Parameters
-    ----------
-    time
-        In s, shape (T,).
-    deviation
-        Of the estimate from all readings so far, shape (T,).
-    before
-        The same from the numbers of the deck alone, without any reading, shape (T,).
-    """
-
-    time: Array
-    deviation: Array
-    before: Array
+    time: Array  # in s, shape (T,)
+    deviation: Array  # of the estimate from all readings so far, shape (T,)
+    before: Array  # the same from the numbers of the deck alone, without any reading, shape (T,)
 
 
 @dataclass(frozen=True)

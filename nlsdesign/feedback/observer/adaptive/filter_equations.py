@@ -50,39 +50,19 @@ _WIDE = 5.0
 
 @dataclass(frozen=True)
 class FilterNoise:
-    """What the filter does not know.
+    """What the filter does not know."""
 
-    Parameters
-    ----------
-    angle
-        Standard deviation of the measured angle in rad.
-    acceleration
-        Of what the equations miss, in rad/s².
-    estimate
-        Of the estimate beyond what its states explain, in its unit.
-    safe_inputs
-        Size of each limited input up to which the drive surely gives it.
-    """
-
-    angle: float
-    acceleration: float
-    estimate: float
-    safe_inputs: Mapping[str, float]
+    angle: float  # standard deviation of the measured angle in rad
+    acceleration: float  # of what the equations miss, in rad/s²
+    estimate: float  # of the estimate beyond what its states explain, in its unit
+    safe_inputs: Mapping[str, float]  # size of each limited input up to which the drive surely gives it
 
 
 class FilterEquations:
     """Writes the filter with the entries read from the table.
 
-    Parameters
-    ----------
-    step
-        One step and its slopes along the slow states.
-    compact
-        Its table.
-    trust
-        How far the equations are trusted.
-    noise
-        What the filter does not know.
+    ``step``: one step and its slopes along the slow states. ``trust``: how far the equations are trusted.
+    ``noise``: what the filter does not know.
     """
 
     def __init__(self, step: AdaptiveStep, compact: Compact, trust: Trust, noise: FilterNoise) -> None:

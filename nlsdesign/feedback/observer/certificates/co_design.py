@@ -29,18 +29,10 @@ SOLVED = ("Solved", "AlmostSolved")
 
 @dataclass(frozen=True, eq=False)
 class Inequality:
-    """F₀ + Σ xᵢ Fᵢ ⪰ 0.
+    """F₀ + Σ xᵢ Fᵢ ⪰ 0."""
 
-    Parameters
-    ----------
-    constant
-        F₀, shape (n, n), symmetric.
-    factors
-        F, shape (unknowns, n, n), symmetric.
-    """
-
-    constant: Array
-    factors: Array
+    constant: Array  # F₀, shape (n, n), symmetric
+    factors: Array  # F, shape (unknowns, n, n), symmetric
 
 
 def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
@@ -118,27 +110,13 @@ def least_disturbed(p: Array, y: Array, inequalities: Sequence[Inequality]) -> G
 
 @dataclass(frozen=True, eq=False)
 class GainProblem:
-    """Corners of one sample before the correction, in scaled states, and what is asked of the gain.
+    """Corners of one sample before the correction, in scaled states, and what is asked of the gain."""
 
-    Parameters
-    ----------
-    corners
-        F(q)·Φ, shape (corners, n, n).
-    output_matrix
-        C, shape (r, n).
-    sample_time
-        T in s.
-    moving
-        Places of angle and speed.
-    condition
-        Largest condition of P.
-    """
-
-    corners: Array
-    output_matrix: Array
-    sample_time: float
-    moving: tuple[int, int]
-    condition: float
+    corners: Array  # F(q)·Φ, shape (corners, n, n)
+    output_matrix: Array  # C, shape (r, n)
+    sample_time: float  # T in s
+    moving: tuple[int, int]  # places of angle and speed
+    condition: float  # largest condition of P
 
     @property
     def structures(self) -> tuple[tuple[int, ...], ...]:

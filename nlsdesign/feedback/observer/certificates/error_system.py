@@ -34,29 +34,15 @@ REFINEMENTS, TOLERANCE = 24, 2e-3
 
 @dataclass(frozen=True, eq=False)
 class ErrorSystem:
-    """All matrices A of ė = (A − L·C)·e, entry by entry.
+    """All matrices A of ė = (A − L·C)·e, entry by entry."""
 
-    Parameters
-    ----------
-    states
-        Names, in the order of the observer.
-    sizes
-        Typical sizes of the states, shape (n,); V = eᵀPe is written in states over these.
-    moving
-        Places of angle and speed.
-    seen
-        Places of the measured states.
-    angles
-        Range of the angle in rad.
-    lower, upper
-        Bounds of each entry of A, shape (n, n).
-    """
-
-    states: tuple[str, ...]
+    states: tuple[str, ...]  # names, in the order of the observer
+    # sizes: typical sizes of the states, shape (n,); V = eᵀPe is written in states over these
     sizes: tuple[float, ...]
-    moving: tuple[int, int]
-    seen: tuple[int, ...]
-    angles: tuple[float, float]
+    moving: tuple[int, int]  # places of angle and speed
+    seen: tuple[int, ...]  # places of the measured states
+    angles: tuple[float, float]  # range of the angle in rad
+    # lower, upper: bounds of each entry of A, shape (n, n)
     lower: tuple[tuple[float, ...], ...]
     upper: tuple[tuple[float, ...], ...]
 

@@ -30,14 +30,9 @@ ELEMENTARY = 4
 
 @dataclass(frozen=True, eq=False)
 class Range:
-    """Lower and upper bounds of many numbers.
+    """Lower and upper bounds of many numbers."""
 
-    Parameters
-    ----------
-    lower, upper
-        Arrays of one shape.
-    """
-
+    # lower, upper: arrays of one shape
     lower: Array
     upper: Array
 
@@ -50,17 +45,11 @@ class Range:
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Ranges of the outputs of a function over many boxes.
+    """Ranges of the outputs of a function over many boxes."""
 
-    Parameters
-    ----------
-    outputs
-        One per output of the function, arrays of shape (boxes, elements).
-    undecided
-        Boxes that reach over the edge of a piece of a table, shape (boxes,): their ranges are valid but wide.
-    """
-
-    outputs: tuple[Range, ...]
+    outputs: tuple[Range, ...]  # one per output of the function, arrays of shape (boxes, elements)
+    # undecided: boxes that reach over the edge of a piece of a table, shape (boxes,): their ranges are valid
+    # but wide
     undecided: Mask
 
 

@@ -31,35 +31,19 @@ NARROWEST = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class SpringView:
-    """ż = a·(r(θ) − z) for each inner state, and the torque τ(θ, z), with their slopes, all symbolic.
+    """ż = a·(r(θ) − z) for each inner state, and the torque τ(θ, z), with their slopes, all symbolic."""
 
-    Parameters
-    ----------
-    inner
-        Names of the inner states z.
-    uncertain
-        Names of the parameters with a range.
-    nominal, spread
-        Their values and half ranges, shape (parameters,).
-    rest
-        ``casadi.Function`` (θ, z, p) -> (r, ∂r/∂θ, a).
-    torque
-        ``casadi.Function`` (θ, z, p) -> (τ, ∂τ/∂θ, ∂τ/∂z).
-    rest_by_parameter, torque_by_parameter
-        ``casadi.Function`` (θ, z, p) -> (∂r/∂p,) and (∂τ/∂p,).
-    affine
-        Whether the torque is affine in z.
-    """
-
-    inner: tuple[str, ...]
-    uncertain: tuple[str, ...]
+    inner: tuple[str, ...]  # names of the inner states z
+    uncertain: tuple[str, ...]  # names of the parameters with a range
+    # nominal, spread: their values and half ranges, shape (parameters,)
     nominal: Array
     spread: Array
-    rest: ca.Function
-    torque: ca.Function
+    rest: ca.Function  # casadi.Function (θ, z, p) -> (r, ∂r/∂θ, a)
+    torque: ca.Function  # casadi.Function (θ, z, p) -> (τ, ∂τ/∂θ, ∂τ/∂z)
+    # rest_by_parameter, torque_by_parameter: casadi.Function (θ, z, p) -> (∂r/∂p,) and (∂τ/∂p,)
     rest_by_parameter: ca.Function
     torque_by_parameter: ca.Function
-    affine: bool
+    affine: bool  # whether the torque is affine in z
 
     def ranges(
         self, function: ca.Function, cells: Bounds, z: Array | None = None, *, whole: bool = False
@@ -238,29 +222,14 @@ class Assumptions:
 
 @dataclass(frozen=True)
 class TorqueErrorBound:
-    """Bounds on the torque error in N·m, by cause; they add up.
+    """Bounds on the torque error in N·m, by cause; they add up."""
 
-    Parameters
-    ----------
-    encoder
-        Of the measured angle.
-    motion
-        Of what the angle does between two samples.
-    parameters
-        Of parameters anywhere in their ranges.
-    table
-        Of interpolation, shared columns and linearisation.
-    rounding
-        Of the numbers of the controller.
-    start
-        By inner state: torque per unit of a wrong start, and 1/s with which that is forgotten.
-    """
-
-    encoder: float
-    motion: float
-    parameters: float
-    table: float
-    rounding: float
+    encoder: float  # of the measured angle
+    motion: float  # of what the angle does between two samples
+    parameters: float  # of parameters anywhere in their ranges
+    table: float  # of interpolation, shared columns and linearisation
+    rounding: float  # of the numbers of the controller
+    # start: by inner state: torque per unit of a wrong start, and 1/s with which that is forgotten
     start: Mapping[str, tuple[float, float]]
 
     @property

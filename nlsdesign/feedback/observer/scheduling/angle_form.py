@@ -47,55 +47,27 @@ class Coefficients(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AngleScheduledPlant:
-    """The plant in the form ẋ = A(θ)x + g(θ) + b(θ)·δ̇ + E·d(u) + friction(ω).
+    """The plant in the form ẋ = A(θ)x + g(θ) + b(θ)·δ̇ + E·d(u) + friction(ω)."""
 
-    Parameters
-    ----------
-    name
-        Name of the model.
-    states
-        All states: the inner ones, then angle and speed.
-    angle, speed
-        Names of the state that is measured and scheduled over, and of its rate.
-    estimate
-        What is wanted.
-    inputs
-        Known inputs u.
-    measured
-        States that are measured besides the angle, because they follow from it: the published extension.
-        Their rate δ̇ is then an input too.
-    at
-        Takes angles of shape (N,) and returns the coefficients there.
-    rest
-        Takes angles of shape (N,) and returns the states at rest, shape (N, n).
-    driven
-        ``casadi.Function`` u -> d, what the inputs add to the rates.
-    rows
-        States into whose rates d goes; they make E.
-    friction
-        ``casadi.Function`` ω -> ω̇, what the speed adds to its own rate beyond its linear part, or ``None``.
-    sizes
-        Typical sizes of the states as the observer carries them, shape (n,).
-    rate_bandwidth
-        Cut-off frequency of the filter on δ̇ in Hz.
-    affine_error
-        Deviation of the estimate from its tangent in the inner states, share of its largest value.
-    """
-
-    name: str
-    states: tuple[Variable, ...]
+    name: str  # name of the model
+    states: tuple[Variable, ...]  # all states: the inner ones, then angle and speed
+    # angle, speed: names of the state that is measured and scheduled over, and of its rate
     angle: str
     speed: str
-    estimate: Variable
-    inputs: tuple[Variable, ...]
+    estimate: Variable  # what is wanted
+    inputs: tuple[Variable, ...]  # known inputs u
+    # measured: states that are measured besides the angle, because they follow from it: the published
+    # extension. Their rate δ̇ is then an input too.
     measured: tuple[str, ...]
-    at: Callable[[Array], Coefficients]
-    rest: Callable[[Array], Array]
-    driven: ca.Function
-    rows: tuple[int, ...]
+    at: Callable[[Array], Coefficients]  # takes angles of shape (N,) and returns the coefficients there
+    rest: Callable[[Array], Array]  # takes angles of shape (N,) and returns the states at rest, shape (N, n)
+    driven: ca.Function  # casadi.Function u -> d, what the inputs add to the rates
+    rows: tuple[int, ...]  # states into whose rates d goes; they make E
+    # friction: casadi.Function ω -> ω̇, what the speed adds to its own rate beyond its linear part, or None
     friction: ca.Function | None
-    sizes: Array
-    rate_bandwidth: float
+    sizes: Array  # typical sizes of the states as the observer carries them, shape (n,)
+    rate_bandwidth: float  # cut-off frequency of the filter on δ̇ in Hz
+    # affine_error: deviation of the estimate from its tangent in the inner states, share of its largest value
     affine_error: float
 
     @property
@@ -124,39 +96,21 @@ FINE = 2.5e-4
 
 @dataclass(frozen=True)
 class ScheduledNames:
-    """Which variable of a model plays which role.
+    """Which variable of a model plays which role."""
 
-    Parameters
-    ----------
-    angle, speed
-        States.
-    speed_size
-        Typical speed in rad/s.
-    angles
-        Ascending, shape (n,): the range in which the form is wanted.
-    consistent
-        States that agree with a signal at rest, as for :func:`~nlsdesign.feedback.analysis.rest.rest_states`.
-    rate
-        Input that is the rate of a measured state, if there is one.
-    """
-
+    # angle, speed: states
     angle: str
     speed: str
-    speed_size: float
-    angles: Array
-    consistent: Mapping[str, str]
-    rate: str | None = None
+    speed_size: float  # typical speed in rad/s
+    angles: Array  # ascending, shape (n,): the range in which the form is wanted
+    consistent: Mapping[str, str]  # states that agree with a signal at rest, as for rest_states
+    rate: str | None = None  # input that is the rate of a measured state, if there is one
 
 
 class AngleForm:
     """Evaluates one model in the form above; states in the order of the observer: inner ones, angle, speed.
 
-    Parameters
-    ----------
-    model
-        Continuous; its first output is what is wanted.
-    layout
-        Which variable plays which role.
+    ``model``: continuous; its first output is what is wanted.
     """
 
     def __init__(self, model: FlatModel, layout: ScheduledNames) -> None:

@@ -329,24 +329,12 @@ def _column(items: Sequence[Expression]) -> Expression:
 
 @dataclass(frozen=True, eq=False)
 class ErrorStability:
-    """What is known of the stability of the estimation error.
+    """What is known of the stability of the estimation error."""
 
-    Parameters
-    ----------
-    angles
-        Checked angles in rad, shape (n,).
-    radius
-        Spectral radius of the error matrix at each.
-    proved
-        Whether the whole error is proved to vanish exponentially for every motion.
-    proved_inner
-        Whether that is proved of the inner states, on which the estimate of the force rests.
-    """
-
-    angles: Array
-    radius: Array
-    proved: bool
-    proved_inner: bool
+    angles: Array  # checked angles in rad, shape (n,)
+    radius: Array  # spectral radius of the error matrix at each
+    proved: bool  # whether the whole error is proved to vanish exponentially for every motion
+    proved_inner: bool  # whether that is proved of the inner states, on which the estimate of the force rests
 
     @property
     def worst(self) -> tuple[float, float]:

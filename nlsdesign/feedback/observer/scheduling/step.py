@@ -91,36 +91,16 @@ Spectrum: TypeAlias = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class SampledPlant:
-    """The plant at one angle over one sample.
+    """The plant at one angle over one sample."""
 
-    Parameters
-    ----------
-    angle
-        In rad.
-    a
-        Continuous, shape (n, n).
-    transition
-        Φ = e^(AT), shape (n, n).
-    output_matrix
-        C, shape (r, n); the angle comes first.
-    names
-        Of the states.
-    sizes
-        Typical sizes of the states, shape (n,).
-    sample_time
-        T in s.
-    speed
-        Name of the state that is the rate of the measured angle.
-    """
-
-    angle: float
-    a: Array
-    transition: Array
-    output_matrix: Array
+    angle: float  # in rad
+    a: Array  # continuous, shape (n, n)
+    transition: Array  # Φ = e^(AT), shape (n, n)
+    output_matrix: Array  # C, shape (r, n); the angle comes first
     names: tuple[str, ...]
-    sizes: Array
-    sample_time: float
-    speed: str
+    sizes: Array  # typical sizes of the states, shape (n,)
+    sample_time: float  # T in s
+    speed: str  # name of the state that is the rate of the measured angle
 
     @property
     def moving(self) -> tuple[int, int]:
@@ -405,23 +385,12 @@ class ObserverStep:
     s⁺ = Φ(θ)·x̂ + γ₀(θ) + Γ(θ)·d(u) + Γ_δ(θ)·δ̇. What the angle drives runs linearly between samples: γ₀ is
     its part at the beginning of a sample, γ₁ at the end, which is known only when the next angle is. In the
     published form it is held instead, γ₁ = 0: there it is the offset of a tangent in the extension.
-
-    Parameters
-    ----------
-    plant
-        In the form of an angle-scheduled plant.
-    gain
-        Chooses M.
-    sample_time
-        In s.
-    reference
-        Angles over which typical sizes of the sums are taken.
     """
 
-    plant: AngleScheduledPlant
-    gain: GainRule
-    sample_time: float
-    reference: Array
+    plant: AngleScheduledPlant  # in the form of an angle-scheduled plant
+    gain: GainRule  # chooses M
+    sample_time: float  # in s
+    reference: Array  # angles over which typical sizes of the sums are taken
 
     def matrices(self, angles: Array) -> dict[str, Array]:
         """Return the matrices of the step at many angles."""

@@ -56,12 +56,7 @@ class _Motions:
 class TableTrial:
     """Compares tables with the exact functions of the angle, on the same motions.
 
-    Parameters
-    ----------
-    draft
-        Plant, and how an observer is written for a table.
-    fine
-        The exact entries.
+    ``draft``: plant, and how an observer is written for a table.
     """
 
     def __init__(self, draft: Draft, fine: FineEntries) -> None:
@@ -320,18 +315,9 @@ class GridByTorqueError(Grid):
 class TableTooLargeError(ConvergenceError):
     """A table cannot be as small as was asked for.
 
-    Parameters
-    ----------
-    most
-        Bytes that it may take.
-    allowed
-        Torque error that it may cause.
-    cost
-        Torque error that the best table of that size would cause; ``None`` where there is none that small.
-    least
-        Bytes of the smallest table found that keeps what is allowed.
-    unit
-        Of the torque.
+    ``allowed``: torque error that it may cause. ``cost``: torque error that the best table of that size would
+    cause; ``None`` where there is none that small. ``least``: bytes of the smallest table found that keeps
+    what is allowed.
     """
 
     def __init__(self, most: int, allowed: float, cost: float | None, least: int, unit: str) -> None:
