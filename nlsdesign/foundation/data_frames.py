@@ -11,12 +11,19 @@ _EXTRA = "tables"
 
 
 class Axis(NamedTuple):
-    """What rows are numbered by."""
+    """What rows are numbered by.
 
-    # name, unit: for instance "time" and "s"; no unit for words
+    Parameters
+    ----------
+    name, unit
+        For instance ``"time"`` and ``"s"``; no unit for words.
+    values
+        One for each row.
+    """
+
     name: str
     unit: str
-    values: Any  # one for each row
+    values: Any
 
 
 def data_frame(

@@ -53,12 +53,24 @@ class Written(float):
 
 @dataclass(frozen=True)
 class ParentDeck:
-    """The deck that another deck was made from, as ``[deck]`` names it."""
+    """The deck that another deck was made from, as ``[deck]`` names it.
+
+    Parameters
+    ----------
+    name
+        Of the earlier deck.
+    digest
+        SHA-256 of its parts, 64 hexadecimal digits.
+    change
+        What was done to it, such as ``"diagnosed"``.
+    parent
+        The deck that it was made from itself.
+    """
 
     name: str
-    digest: str  # SHA-256 of its parts, 64 hexadecimal digits
-    change: str = ""  # what was done to it, such as "diagnosed"
-    parent: ParentDeck | None = None  # the deck that it was made from itself
+    digest: str
+    change: str = ""
+    parent: ParentDeck | None = None
 
     def __post_init__(self) -> None:
         for field_name in ("name", "digest", "change"):

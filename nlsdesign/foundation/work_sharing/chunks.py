@@ -97,9 +97,15 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class Chunk:
-    """Points that one worker computes in one go."""
+    """Points that one worker computes in one go.
 
-    points: tuple[tuple[int, Any], ...]  # pairs of number and point
+    Parameters
+    ----------
+    points
+        Pairs of number and point.
+    """
+
+    points: tuple[tuple[int, Any], ...]
 
 
 @dataclass(frozen=True)
@@ -129,10 +135,18 @@ class PointOutcome:
 
 @dataclass(frozen=True)
 class ChunkLoss:
-    """A chunk that came to no end."""
+    """A chunk that came to no end.
 
-    reason: str  # what became of its worker
-    deaths: int = 1  # of workers that computed it; 0 where only the connection was lost
+    Parameters
+    ----------
+    reason
+        What became of its worker.
+    deaths
+        Of workers that computed it; 0 where only the connection was lost.
+    """
+
+    reason: str
+    deaths: int = 1
 
 
 @dataclass(frozen=True)

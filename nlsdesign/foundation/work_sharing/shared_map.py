@@ -33,11 +33,18 @@ _LARGEST: Final = 4096
 
 @dataclass(frozen=True)
 class ChunkSizes:
-    """How many points make a chunk."""
+    """How many points make a chunk.
 
-    # seconds: that a chunk is to take: short against what may be lost, long against what a message costs
+    Parameters
+    ----------
+    seconds
+        That a chunk is to take: short against what may be lost, long against what a message costs.
+    largest
+        Most points of a chunk.
+    """
+
     seconds: float = 1.0
-    largest: int = _LARGEST  # most points of a chunk
+    largest: int = _LARGEST
 
 
 def shared_map(

@@ -327,13 +327,6 @@ class _Bounding:
         box: Array = np.clip(np.stack([rest.lower - slow, rest.upper + slow], axis=2), *self.box)
         return box
 
-    def _rest_deviation(self, cells: Bounds) -> Array:
-        """Return how far parameters move the rest value, shape (cells, inner)."""
-        slopes = self.view.ranges(self.view.rest_by_parameter, cells, whole=True)[0].magnitude
-        by = slopes.reshape(len(cells[0]), len(self.view.uncertain), len(self.inner))
-        moved: Array = np.einsum("cpi,p->ci", by, self.view.spread)
-        return moved
-
     def bound(self) -> TorqueErrorBound:
         """Return the bound; see :func:`torque_bound`."""
         view, assumed, cells = self.view, self.assumed, self.cells
@@ -388,7 +381,11 @@ class _Bounding:
         jump = slower * (np.max(z[:, :, 1], axis=0) - np.min(z[:, :, 0], axis=0))
         # ∫|e^(−at) − e^(−a*t)| dt = |1/a − 1/a*|, times the largest rate of the rest value.
         creep = self.lead * self.assumed.speed / nominal * np.max(np.abs(1.0 - 1.0 / ends), axis=0)
-        error: Array = np.max(self._rest_deviation(self.cells), axis=0) + np.minimum(jump, creep)
+        # How far parameters move the rest value, shape (cells, inner).
+        slopes = self.view.ranges(self.view.rest_by_parameter, self.cells, whole=True)[0].magnitude
+        by = slopes.reshape(len(self.cells[0]), len(self.view.uncertain), len(self.inner))
+        moved: Array = np.einsum("cpi,p->ci", by, self.view.spread)
+        error: Array = np.max(moved, axis=0) + np.minimum(jump, creep)
         return error
 
     def _step_errors(self, z: Array) -> tuple[Array, Array]:
@@ -406,21 +403,18 @@ class _Bounding:
             weights = {f"next[{i}][{n}]": -math.expm1(-x) - end, f"prior[{i}][0]": end}
             off = abs(math.exp(-x) - kept[k]) * float(np.max(np.abs(z[:, k])))
             for key, weight in weights.items():
-                off += self._reading_error(key, weight, k)
+                # The largest distance of what is read from weight × rest value, by cells.
+                middle = (self.cells[0] + self.cells[1]) / 2.0
+                half = (self.cells[1] - self.cells[0]) / 2.0
+                value, slope = _read(self.design, key, middle)
+                at = _distance(value, weight, self.rest_in_middle[0], k)
+                steep = _distance(slope, weight, self.rest[1], k)
+                off += float(np.max(at + steep * half))
             size = max(float(np.max(np.abs(z[:, k]))), float(np.max(rest.magnitude[:, k])))
             table.append(off / (1.0 - kept[k]))
             unit = OPERATIONS * ROUNDING[self.assumed.real]
             rounding.append(unit * size / (1.0 - kept[k]))
         return np.array(table), np.array(rounding)
-
-    def _reading_error(self, key: str, weight: float, k: int) -> float:
-        """Return the largest distance of what is read from weight × rest value, by cells."""
-        middle = (self.cells[0] + self.cells[1]) / 2.0
-        half = (self.cells[1] - self.cells[0]) / 2.0
-        value, slope = _read(self.design, key, middle)
-        at = _distance(value, weight, self.rest_in_middle[0], k)
-        steep = _distance(slope, weight, self.rest[1], k)
-        return float(np.max(at + steep * half))
 
     # --- torque -----------------------------------------------------------------------------------------
 

@@ -324,7 +324,10 @@ class PolePlacement:
         seen, hidden = _decomposed(a * plant.sample_time, c, self.condition_limit)
         if hidden.shape[1]:
             own = np.linalg.eigvals(hidden.T @ a @ hidden).astype(complex)
-            poles = _without_nearest(poles, own)
+            left = list(poles)
+            for eigenvalue in own:
+                left.pop(int(np.argmin([abs(pole - eigenvalue) for pole in left])))
+            poles = np.array(left)
         inner: Array = expm(seen.T @ a @ seen * plant.sample_time)
         gain = seen @ _placed(inner, c @ seen, np.exp(poles * plant.sample_time))
         # The gain of the prediction, L = Φ M, is what is placed.
@@ -340,13 +343,6 @@ def _decomposed(a: Array, c: Array, limit: float) -> tuple[Array, Array]:
     _, singular, directions = np.linalg.svd(np.vstack(rows))
     rank = int(np.sum(singular > singular[0] / limit))
     return directions[:rank].T, directions[rank:].T
-
-
-def _without_nearest(poles: Spectrum, taken: Spectrum) -> Spectrum:
-    left = list(poles)
-    for eigenvalue in taken:
-        left.pop(int(np.argmin([abs(pole - eigenvalue) for pole in left])))
-    return np.array(left)
 
 
 def _placed(a: Array, c: Array, poles: Spectrum) -> Array:

@@ -69,7 +69,12 @@ class TableTrial:
         self._motions = _motions(draft.plant, float(self._model.sample_time or 1.0), fine)
         begin = [self._model.with_values(observer.start(float(a))) for a in self._motions.angles[0]]
         self._start = np.array([each.start(each.states) for each in begin]).T
-        self._step = self._stepped()
+        many, s = self._motions.angles.shape[1], self._model.symbols()
+        step = ca.Function(
+            "step", [s.state, ca.vertcat(s.input, s.table)],
+            [ca.densify(s.derivative), ca.densify(s.output[0])],
+        )  # fmt: skip
+        self._step = step.map(many).mapaccum("samples", CHUNK, {"base": 10})
         values = np.array([entry.values for entry in self.deciding]).reshape(-1, len(fine.angles))
         self._exactly = linearly(fine.angles, values.T, self._seen)
         self._estimate = self._run(self._exactly)
@@ -103,14 +108,6 @@ class TableTrial:
     def _inputs(self) -> Array:
         angles, inputs = self._motions.angles, self._motions.inputs
         return np.concatenate([angles[:, :, None], inputs], axis=2).reshape(angles.size, -1).T
-
-    def _stepped(self) -> ca.Function:
-        many, s = self._motions.angles.shape[1], self._model.symbols()
-        step = ca.Function(
-            "step", [s.state, ca.vertcat(s.input, s.table)],
-            [ca.densify(s.derivative), ca.densify(s.output[0])],
-        )  # fmt: skip
-        return step.map(many).mapaccum("samples", CHUNK, {"base": 10})
 
     def _run(self, read: Array) -> Array:
         """Return the estimates with these entries, shape (N · motions,)."""
