@@ -305,25 +305,8 @@ def cam_from_profile(
     The control values are fitted to h(θ) through the law of the cam, with its change of sides or onset. A
     jump of h at zero is rounded over the width of those.
 
-    Parameters
-    ----------
-    angles
-        θ from zero, ascending, shape (n,), n ≥ 4.
-    lever_arms
-        h, shape (n,), in m.
-    like
-        A cam as for :func:`contour_of_cam`; all but its contour is kept.
-    count
-        Number of control values.
-    anchor_distance
-        Of the new cam in m; that of ``like`` if it is left out.
-
-    Raises
-    ------
-    ValueRangeError
-        If the table does not ascend from zero.
-    ArrangementError
-        If ``like`` has no contour.
+    ``angles`` are four or more θ that ascend from zero, ``lever_arms`` h there in m; of ``like``, a cam as
+    for :func:`contour_of_cam`, all but its contour is kept, the anchor distance too where none is given.
     """
     made = declared_cam(like)
     theta, arm = np.asarray(angles, dtype=float), np.asarray(lever_arms, dtype=float)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
-from ...model import FlatModel, Variable
+from ...model import Variable
 from ...model.roles import spring_torque
 from .rest_points import PlantMode, RestPoints
 from .sweep import Columns, View

@@ -452,14 +452,8 @@ def held_torque(
 ) -> HeldTorque:
     """Return how a loop holds torques: the error at rest, and whether it limit-cycles there.
 
-    Parameters
-    ----------
-    loop
-        Load fixed, or held by its inputs at zero.
-    torques
-        In N·m, shape (n,).
-    translate
-        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
+    ``loop``: load fixed, or held by its inputs at zero. ``translate``: for instance
+    :func:`~nlsdesign.export.natively`: then compiled code runs.
     """
     wanted = np.asarray(torques, dtype=float)
     check_torque(loop.plant, float(np.max(np.abs(wanted))))
@@ -630,12 +624,7 @@ def torque_resolution(loop: ClosedLoop, angles: Sequence[float] | Array) -> Arra
 
     The counts of all encoders between which the deflection is read add up; zero for readings without counts.
 
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    angles
-        Of the driven body with the load at zero, shape (n,), in rad.
+    ``angles``: of the driven body with the load at zero, shape (n,), in rad.
     """
     at = np.atleast_1d(np.asarray(angles, dtype=float))
     result: Array = np.abs(tangent_stiffness(loop.plant, at)) * LoopJudge(loop).count

@@ -276,10 +276,7 @@ def only_side(plant: FlatModel) -> float:
 
     A cable that pulls to one side gives no torque at rest at the other end of its travel.
 
-    Parameters
-    ----------
-    plant
-        Continuous, load fixed or prescribed; friction in its smooth form.
+    ``plant``: continuous, load fixed or prescribed; friction in its smooth form.
     """
     drive = KnownDrive(plant)
     spring = series_spring(plant)
