@@ -54,7 +54,7 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
     lines += [f"TabulatedTorque = {{angles = {angles}, torques = {torques}}}", "", "[limits]"]
     for name, value in question.limits.items():
         kind = limit_kinds()[name]
-        lines.append(f'{name} = {{{kind.described.field} = "{float(value)!r} {kind.unit}"}}')
+        lines.append(f'{name} = {{{kind.field} = "{float(value)!r} {kind.unit}"}}')
     ranges = [
         f'{{name = {json.dumps(name)}, minimum = "{float(low)!r} {question.numbers[name].unit}", '
         f'maximum = "{float(high)!r} {question.numbers[name].unit}"}}'

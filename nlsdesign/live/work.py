@@ -8,6 +8,7 @@ import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -370,11 +371,6 @@ def _differences(design: CamDesign, solved: ParametricDesign, quick: DesignView)
     return sentences
 
 
-def angle_view_of(view: DesignView, design: CamDesign, question: LiveQuestion) -> AngleView:
-    """Return a finished design as it is looked at angle by angle."""
-    return AngleView(view, design.contour, question.cam, lambda: design.actuator)
-
-
 _SAMPLE_TIME = 1e-3
 _OLD = (1980, 1, 1, 0, 0, 0)
 """Date of files in an archive, so that the same design gives the same bytes."""
@@ -422,16 +418,6 @@ def exported_deck(stage: Callable[[str], None], design: ShownDesign) -> Exported
     return ExportedDesign(f"{design.machine.name}.toml", "application/toml", text.encode())
 
 
-def exported_svg(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
-    """Return the drawing of the cam as SVG."""
-    return _drawing(design, "svg")
-
-
-def exported_dxf(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
-    """Return the drawing of the cam as DXF."""
-    return _drawing(design, "dxf")
-
-
 def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
     """Return cascade observer and torque controller as C, in an archive."""
     from ..export import export_c
@@ -468,20 +454,11 @@ def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedD
         return ExportedDesign("plant.fmu", "application/zip", file.read_bytes())
 
 
-EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {
-    "deck": exported_deck,
-    "svg": exported_svg,
-    "dxf": exported_dxf,
-    "c": exported_c,
-    "fmu": exported_fmu,
-}
-"""What a design can be saved as."""
-
-
 _MEDIA = {"svg": "image/svg+xml", "dxf": "image/vnd.dxf"}
 
 
-def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
+def exported_drawing(stage: Callable[[str], None], design: ShownDesign, *, ending: str) -> ExportedDesign:
+    """Return the drawing of the cam, without the edge where the cable is not declared."""
     kind, radius = declared_edge(design.machine, series_cam(flatten(design.machine)))
     machined = None if radius is None else kind(cable_radius=radius)
     centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
@@ -490,3 +467,13 @@ def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
         files = write_drawings(Path(folder), design.contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
     return ExportedDesign(f"cam.{ending}", _MEDIA[ending], content)
+
+
+EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {
+    "deck": exported_deck,
+    "svg": partial(exported_drawing, ending="svg"),
+    "dxf": partial(exported_drawing, ending="dxf"),
+    "c": exported_c,
+    "fmu": exported_fmu,
+}
+"""What a design can be saved as."""

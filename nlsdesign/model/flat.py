@@ -256,10 +256,6 @@ class Switch:
     # integrated by a method that locates it. A mere corner costs other methods accuracy, but they get across.
     jumps: bool
 
-    def event_text(self, mode: int) -> str:
-        """Return what has happened when a mode begins."""
-        return dict(self.words)[mode]
-
 
 @dataclass(frozen=True, eq=False)
 class Switching:

@@ -102,7 +102,7 @@ class EventLog:
     def record(self, time: float, i: int, mode: int) -> None:
         """Record that a mode of a switch has begun."""
         switch = self._switches[i]
-        self.events.append(Event(time, switch.name, switch.event_text(mode)))
+        self.events.append(Event(time, switch.name, dict(switch.words)[mode]))
         self._recent.append(time)
         if len(self._recent) == MOST_EVENTS and time - self._recent[0] < self._window:
             raise self.accumulation(i, time)

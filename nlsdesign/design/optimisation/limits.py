@@ -659,37 +659,11 @@ class AtMost(Limit):
         yield self.bound(measure.what, measure.expression, plain(self.value), upper=True, unit=measure.unit)
 
 
-@dataclass(frozen=True)
-class LimitKind:
-    """A limit with one number."""
+@dataclass(frozen=True, kw_only=True)
+class LimitKind(OneNumber):
+    """A limit with one number: what its class says of the number, and the class."""
 
-    kind: type[Limit]  # its class
-    described: OneNumber  # what the class says of its number
-
-    @property
-    def words(self) -> str:
-        """What is limited."""
-        return self.described.words
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the number."""
-        return self.described.unit
-
-    @property
-    def shown_unit(self) -> str:
-        """Unit in which people read it."""
-        return self.described.shown_unit
-
-    @property
-    def upper(self) -> bool:
-        """Whether the number is the largest that is allowed, or the least."""
-        return self.described.upper
-
-    @property
-    def of_shape(self) -> bool:
-        """Whether the contour alone decides it."""
-        return self.described.of_shape
+    kind: type[Limit]
 
     @property
     def name(self) -> str:
@@ -716,11 +690,11 @@ class LimitKind:
         """Return the limit."""
         if not abs(value) < float("inf"):
             raise ValueRangeError(f"{self.title} = {value:g}", "is no finite number")
-        return self.kind(**{self.described.field: value})
+        return self.kind(**{self.field: value})
 
     def value_of(self, limit: Limit) -> float:
         """Return the number of a limit of this kind in SI: what is allowed, with its safety factor."""
-        return plain(getattr(limit, self.described.field)) / float(getattr(limit, "safety_factor", 1.0))
+        return plain(getattr(limit, self.field)) / float(getattr(limit, "safety_factor", 1.0))
 
 
 def limit_kinds() -> dict[str, LimitKind]:
@@ -730,6 +704,6 @@ def limit_kinds() -> dict[str, LimitKind]:
     while classes:
         kind = classes.pop(0)
         if kind.described is not None:
-            known[kind.__name__] = LimitKind(kind, kind.described)
+            known[kind.__name__] = LimitKind(kind=kind, **vars(kind.described))
         classes += kind.__subclasses__()
     return known

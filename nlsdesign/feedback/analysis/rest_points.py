@@ -29,7 +29,7 @@ from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.flat import Switching
 from ...model.linear import LinearModel
-from .rest import evaluate_rows, rate_state, rest_states, typical_sizes
+from .rest import evaluate_at, evaluate_rows, rate_state, rest_states, typical_sizes
 
 JUMP = 1e-6
 """Accelerations that jump by less than this share of the largest one have no dry friction behind them."""
@@ -379,12 +379,7 @@ def rest_points(
         sizes = _sizes(model, states) if consistent else typical_sizes(model, at, angle=angle)
     s = model.symbols()
     slopes = [ca.jacobian(of, by) for of in (s.derivative, s.output) for by in (s.state, s.input)]
-    function = ca.Function(
-        "slopes",
-        [s.time, s.state, s.input, s.parameter],
-        [ca.densify(each) for each in (s.derivative, s.output, *slopes)],
-    )
-    results = evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
+    results = evaluate_at(model, s, [s.derivative, s.output, *slopes], states)
     broken = np.flatnonzero(~np.all([np.all(np.isfinite(each), axis=1) for each in results[2:]], axis=0))
     if len(broken):
         raise ValueRangeError(

@@ -74,6 +74,7 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
     for group in ((*states, *inputs), parameters, outputs):
         _check_names(group)
     _check_tables(controller, {v.name for v in (*states, *inputs)})
+    joint = _Joint(wiring, inputs, delay)
     return FlatModel(
         name=f"{observer.name}_and_controller",
         description=f"{observer.description}; {controller.description}",
@@ -82,12 +83,12 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
         parameters=parameters,
         outputs=outputs,
         signals=(*observer.signals, *controller.signals),
-        equations=_Joint(wiring, inputs, delay).equations(),
+        equations=joint.equations(),
         sample_time=observer.sample_time,
         tables=tables,
         bodies=observer.bodies,
-        begin=_Joint(wiring, inputs, delay).begin(),
-        expected=_Joint(wiring, inputs, delay).expected(),
+        begin=joint.begin(),
+        expected=joint.expected(),
         origin=common_origin(observer.origin, controller.origin),
     )
 
@@ -143,10 +144,7 @@ class _Joint:
     def __init__(self, wiring: _Wiring, inputs: Sequence[Variable], delay: int) -> None:
         self.wiring, self.observer, self.controller = wiring, wiring.observer, wiring.controller
         self.inputs = {v.name: ca.SX.sym(v.name) for v in inputs}
-        self.seen, self.heard = (
-            _ModelSymbols(*(ca.SX.sym(name, count) for name, count in zip("xpw", _sizes(model), strict=True)))
-            for model in (self.observer, self.controller)
-        )
+        self.seen, self.heard = self.observer.symbols(), self.controller.symbols()
         self.waiting = ca.SX.sym("waiting", delay)
 
     def _arguments(self) -> list[Expression]:
@@ -219,17 +217,6 @@ class _Joint:
             v.name: values[i] for i, v in enumerate(self.observer.inputs) if v.name in self.inputs
         }
         return ca.Function("expected", self._arguments(), [ca.vertcat(*known.values())])
-
-
-@dataclass(frozen=True, eq=False)
-class _ModelSymbols:
-    state: Expression
-    parameter: Expression
-    table: Expression
-
-
-def _sizes(model: FlatModel) -> tuple[int, int, int]:
-    return len(model.states), len(model.parameters), sum(len(table.columns) for table in model.tables)
 
 
 def _driven(observer: FlatModel, controller: FlatModel) -> Variable:

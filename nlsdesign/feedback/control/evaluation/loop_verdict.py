@@ -30,7 +30,7 @@ from ....model import FlatModel
 from ....model.roles import measured_motion, series_spring
 from ....model.transform import named
 from ....simulation.sampled_batch import PLANT
-from ...analysis.rest import evaluate_rows, rate_state, rest_states
+from ...analysis.rest import evaluate_at, rate_state, rest_states
 from ..closed_loop import ClosedLoop
 
 SETTLED, LIMIT_CYCLE, UNSETTLED, DIVERGED = "settled", "limit cycle", "not settled", "diverged"
@@ -409,9 +409,5 @@ def tangent_stiffness(plant: FlatModel, angles: Array) -> Array:
     jump = row[at]
     for i in inner:
         jump += row[i] * ca.jacobian(s.derivative[i], s.state[of])
-    slope = ca.Function("slope", [s.time, s.state, s.input, s.parameter], [ca.densify(jump)])
-    rest = rest_states(plant, angles)
-    result: Array = evaluate_rows(slope, rest, plant.start(plant.inputs), plant.start(plant.parameters))[0][
-        :, 0
-    ]
-    return result
+    (slopes,) = evaluate_at(plant, s, [jump], rest_states(plant, angles))
+    return slopes.ravel()

@@ -20,7 +20,7 @@ from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
 from ....model.roles import series_spring
 from ....model.transform import named
-from ...analysis.rest import evaluate_rows, rest_states
+from ...analysis.rest import evaluate_at, rest_states
 from .known_drive import KnownDrive
 from .law_writer import GAIN, AntiWindup, ConditionalIntegration, Integration, LawWriter, limited
 
@@ -344,11 +344,8 @@ class ScheduledTorque(TorqueLaw):
     def command(self, writer: LawWriter, drive: KnownDrive, heard: Heard) -> SpeedCommand:
         """Return v within its limits; see :class:`TorqueLaw`."""
         stiffness = self._stiffness(writer, drive, heard)
-        gain = (
-            2.0
-            * math.pi
-            * writer.setting("bandwidth", "Hz", "torque loop: bandwidth", self.closes_at(writer.sample_time))
-        )
+        closes_at = self.closes_at(writer.sample_time)
+        gain = 2.0 * math.pi * writer.setting("bandwidth", "Hz", "torque loop: bandwidth", closes_at)
         share = writer.setting(
             "feedforward", "1", "torque loop: share of the rate of the desired torque", self.feedforward
         )
@@ -443,9 +440,8 @@ def stiffness_table(drive: KnownDrive) -> Table:
 def _rest_torques(plant: FlatModel, torque: str, angles: Array) -> Array:
     """Return a torque at rest at many angles of the motor."""
     s = plant.symbols()
-    function = ca.Function("torque", [s.time, s.state, s.input, s.parameter], [named(plant, s)[torque]])
-    states = rest_states(plant, angles)
-    return evaluate_rows(function, states, plant.start(plant.inputs), plant.start(plant.parameters))[0][:, 0]
+    (torques,) = evaluate_at(plant, s, [named(plant, s)[torque]], rest_states(plant, angles))
+    return torques.ravel()
 
 
 def _secant(table: Table) -> float:

@@ -26,7 +26,7 @@ from ....foundation.errors import ArrangementError, ValueRangeError, unknown_nam
 from ....model import FlatModel, Variable
 from ....model.paper_form import GEOMETRIC, PaperFormNames, paper_form
 from ....model.transform import with_outputs, without_idle_states
-from ...analysis.rest import RestSolver, evaluate_rows, rate_state, rest_states, typical_sizes
+from ...analysis.rest import RestSolver, evaluate_at, evaluate_rows, rate_state, rest_states, typical_sizes
 
 
 class Coefficients(NamedTuple):
@@ -408,14 +408,7 @@ class PaperForm:
         names, sizes = [v.name for v in published.states], np.max(np.abs(rest), axis=0)
         s = published.symbols()
         led = s.input[[v.name for v in published.inputs].index(n.rate)]
-        probe = ca.Function(
-            "probe",
-            [s.time, s.state, s.input, s.parameter],
-            [s.derivative, ca.densify(ca.jacobian(s.derivative, led))],
-        )
-        rates, jumps = evaluate_rows(
-            probe, rest, published.start(published.inputs), published.start(published.parameters)
-        )
+        rates, jumps = evaluate_at(published, s, [s.derivative, ca.jacobian(s.derivative, led)], rest)
         # What rests at zero, such as a relaxing stress, is as large as its jump when the cable is pulled.
         sizes = np.maximum(sizes, np.max(np.abs(jumps), axis=0) * sizes[names.index(n.extension)])
         sizes[names.index(n.speed)] = np.sqrt(

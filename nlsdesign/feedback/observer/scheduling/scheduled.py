@@ -237,7 +237,7 @@ class _Writer:
             name=f"{plant.name}_observer",
             description=self._description(),
             states=self._states(),
-            inputs=self._inputs(),
+            inputs=(measured_angle(plant, self.compact.angles), *plant.inputs),
             parameters=(),
             outputs=self._outputs(),
             signals=(),
@@ -298,9 +298,6 @@ class _Writer:
             v = plant.states[plant.names.index(name)]
             states.append(Variable(f"{name}.rate", f"{v.unit}/s", f"filtered rate of {name}"))
         return tuple(states)
-
-    def _inputs(self) -> tuple[Variable, ...]:
-        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
 
     def _outputs(self) -> tuple[Variable, ...]:
         plant = self.plant
