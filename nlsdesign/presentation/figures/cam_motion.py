@@ -336,8 +336,7 @@ def torque_curve(motion: CamMotion, *, at: int) -> Figure:
         [degrees[at]], [motion.torques[at]], marker="o", color=VERMILLION.light, markersize=7, gid=MARKER
     )
     axes.margins(x=0.03)
-    axes.set_xlabel("angle in degrees")
-    axes.set_ylabel("torque in N·m")
+    axes.set(xlabel="angle in degrees", ylabel="torque in N·m")
     top = typeset_number(float(np.max(motion.torques)))
     return described(
         figure,

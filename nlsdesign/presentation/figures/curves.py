@@ -65,8 +65,7 @@ def curves(
         axes.plot(*thinned(x, y), color=tone, linestyle=dash, marker=marker, label=label, linewidth=1.4)
     if logarithmic:
         log_axis(axes, abscissa=True)
-    axes.set_xlabel(across)
-    axes.set_ylabel(up)
+    axes.set(xlabel=across, ylabel=up)
     axes.margins(x=0.02)
     legend(axes, columns=3)
     return described(figure, words)
@@ -150,8 +149,7 @@ def curves_beside_points(shown: Sequence[PointPanel], *, across: str, words: str
                 axis.plot(*panel.points[label], color=tone, linestyle="none", marker=point, fillstyle="none")
         if panel.logarithmic:
             log_axis(axis)
-        axis.set_title(panel.title)
-        axis.set_ylabel(panel.up)
+        axis.set(title=panel.title, ylabel=panel.up)
         axis.margins(x=0.03)
         log_axis(axis, abscissa=True)
     for axis in axes[-columns:]:
@@ -252,9 +250,7 @@ def torque_against_measured(
         upper.plot(np.degrees(at), points, color=INK.light, linestyle="none", marker=marker, label=label,
                    markerfacecolor="none", markeredgewidth=1.2, markersize=5.5)  # fmt: skip
     label_panel(upper, "torque in N·m", "Torque of the spring", columns=2)
-    lower.set_ylabel("error in N·m")
-    lower.set_title("Model minus measurement")
-    lower.set_xlabel("angle in degrees")
+    lower.set(title="Model minus measurement", xlabel="angle in degrees", ylabel="error in N·m")
     upper.margins(x=0.02)
     return described(
         figure,

@@ -221,8 +221,7 @@ def legend(axes: Axes, *, columns: int = 4) -> None:
 
 def label_panel(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> None:
     """Give a panel its ordinate, title and legend."""
-    axes.set_ylabel(ordinate)
-    axes.set_title(title)
+    axes.set(title=title, ylabel=ordinate)
     legend(axes, columns=columns)
 
 

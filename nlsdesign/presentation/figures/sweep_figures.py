@@ -180,8 +180,7 @@ def answer_histograms(
         panel.margins(x=0.02)
         panel.set_xlim(*panel.get_xlim())
         _marks(panel, marks)
-        panel.set_xlabel(column.label)
-        panel.set_ylabel("points in %")
+        panel.set(xlabel=column.label, ylabel="points in %")
         panel.xaxis.set_major_locator(MaxNLocator(nbins=5))
     for unused in axes[len(columns) :]:
         unused.set_visible(False)
@@ -265,8 +264,7 @@ def answers_against(
         for value, draw in ((wanted[0], panel.axhline), (wanted[number + 1], panel.axvline)):
             if value is not None:
                 draw(value, color=INK.light, linewidth=0.9, linestyle=(0, (1.2, 1.2)), label="wanted")
-        panel.set_xlabel(column.label)
-        panel.set_ylabel(columns[0].label)
+        panel.set(xlabel=column.label, ylabel=columns[0].label)
         panel.margins(0.06)
         if number == 0:
             legend(panel)
@@ -403,9 +401,7 @@ def response_surfaces(surfaces: Sequence[SurfacePanel], *, words: str) -> Figure
         if surface.nodes is not None and surface.values is not None:
             _contours(panel, *surface.nodes, surface.values)
         scatter_points(panel, surface.across.numbers(), surface.up.numbers(), kinds=surface.kinds, small=True)
-        panel.set_title(surface.title)
-        panel.set_xlabel(surface.across.label)
-        panel.set_ylabel(surface.up.label)
+        panel.set(title=surface.title, xlabel=surface.across.label, ylabel=surface.up.label)
         panel.grid(visible=False)
         panel.margins(0.03)
     for unused in axes[len(surfaces) :]:
@@ -452,8 +448,7 @@ def sensitivity_bars(shares: Mapping[str, Sequence[VarianceShare]], *, words: st
     figure, axes = panels(rows, wide, height=rows * (1.15 + 0.3 * most))
     for number, ((answer, each), panel) in enumerate(zip(shares.items(), axes, strict=False)):
         _draw(panel, each)
-        panel.set_title(shortened(answer, 50))
-        panel.set_xlabel("share of the variance in %")
+        panel.set(title=shortened(answer, 50), xlabel="share of the variance in %")
         if number == 0:
             legend(panel)
     for unused in axes[len(shares) :]:

@@ -26,12 +26,12 @@ from ...observer.adaptive.corrected_cascade import PREFIX
 from ..closed_loop import ClosedLoop
 from ..laws.law_writer import DESIRED
 from .linear_parts import (
-    LinearBlock,
     LinearMode,
     LinearPlant,
     SlidingPlant,
     SlopedTables,
     TableSlope,
+    block_at,
     linear_plant,
     with_fine_counts,
 )
@@ -192,8 +192,7 @@ class _Assembler:
     def __init__(
         self, system: SampledSystem, plant: LinearPlant, cut: tuple[str, ...], tables: TableSlope
     ) -> None:
-        self.system, self.plant, self.cut = system, plant, cut
-        self.blocks = {name: LinearBlock(model, tables) for name, model in system.blocks.items()}
+        self.system, self.plant, self.cut, self.tables = system, plant, cut, tables
         self.n = len(plant.drive)
         self.driven = f"{PLANT}.{system.driven}"
         prescribed = [f"{PLANT}.{name}" for name in plant.inputs[1:]]
@@ -325,7 +324,7 @@ class _Assembler:
             sources = [name if name in self.cut else self.system.sources[name] for name in names]
             # A cut loop rests where the closed one does.
             resting = [values[self.system.sources[name]] for name in names]
-            point = self.blocks[b].at(self.state[b], np.stack(resting, axis=1))
+            point = block_at(model, self.tables, self.state[b], np.stack(resting, axis=1))
             given = np.stack([rows[source] for source in sources], axis=1)
             first, count = self.first[b], len(model.states)
             after, out = point.b @ given, point.d @ given

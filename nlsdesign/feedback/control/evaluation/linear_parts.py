@@ -275,38 +275,29 @@ class BlockPoint:
     d: Array
 
 
-class LinearBlock:
-    """Evaluates a discrete block with its tables, and their slopes, at many points."""
+def block_at(model: FlatModel, tables: TableSlope, state: Array, inputs: Array) -> BlockPoint:
+    """Return values and slopes of a discrete block with its tables at many points.
 
-    def __init__(self, model: FlatModel, tables: TableSlope) -> None:
-        self.model, self.tables = model, tables
-
-    def at(self, state: Array, inputs: Array) -> BlockPoint:
-        """Return values and slopes.
-
-        ``state``, ``inputs``: shapes (n, states) and (n, inputs).
-        """
-        model, n = self.model, len(state)
-        names, given = [v.name for v in model.states], [v.name for v in model.inputs]
-        columns, into = [np.zeros((n, 0))], [np.zeros((n, 0, len(names) + len(given)))]
-        for table in model.tables:
-            place = names.index(table.argument) if table.argument in names else (
-                len(names) + given.index(table.argument)
-            )  # fmt: skip
-            at = np.concatenate([state, inputs], axis=1)[:, place]
-            columns.append(np.array([table.look_up(float(v)) for v in at]))
-            slope = np.zeros((n, table.values.shape[1], len(names) + len(given)))
-            slope[:, :, place] = self.tables.of(table, at)
-            into.append(slope)
-        w, dw = np.concatenate(columns, axis=1), np.concatenate(into, axis=1)
-        p = model.start(model.parameters)
-        following, output, fx, fu, fw, yx, yu, yw = _with_slopes(model.equations, n)(state, inputs, p, w)
-        count = len(names)
-        return BlockPoint(
-            following[:, :, 0], output[:, :, 0],
-            fx + fw @ dw[:, :, :count], fu + fw @ dw[:, :, count:],
-            yx + yw @ dw[:, :, :count], yu + yw @ dw[:, :, count:],
-        )  # fmt: skip
+    ``state``, ``inputs``: shapes (n, states) and (n, inputs).
+    """
+    names, n = [v.name for v in (*model.states, *model.inputs)], len(state)
+    columns, into = [np.zeros((n, 0))], [np.zeros((n, 0, len(names)))]
+    for table in model.tables:
+        place = names.index(table.argument)
+        at = np.concatenate([state, inputs], axis=1)[:, place]
+        columns.append(np.array([table.look_up(float(v)) for v in at]))
+        slope = np.zeros((n, table.values.shape[1], len(names)))
+        slope[:, :, place] = tables.of(table, at)
+        into.append(slope)
+    w, dw = np.concatenate(columns, axis=1), np.concatenate(into, axis=1)
+    p = model.start(model.parameters)
+    following, output, fx, fu, fw, yx, yu, yw = _with_slopes(model.equations, n)(state, inputs, p, w)
+    count = len(model.states)
+    return BlockPoint(
+        following[:, :, 0], output[:, :, 0],
+        fx + fw @ dw[:, :, :count], fu + fw @ dw[:, :, count:],
+        yx + yw @ dw[:, :, :count], yu + yw @ dw[:, :, count:],
+    )  # fmt: skip
 
 
 class _AtPoints:

@@ -9,7 +9,6 @@ lives with its own errors: what a wrong entry does to a state is carried on from
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -45,14 +44,6 @@ CHUNK = 250
 """Samples that one call computes."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Motions:
-    """Angles (N, motions) and inputs (N, motions, inputs) at the samples."""
-
-    angles: Array
-    inputs: Array
-
-
 class TableTrial:
     """Compares tables with the exact functions of the angle, on the same motions.
 
@@ -66,15 +57,17 @@ class TableTrial:
         self._model = observer.model
         self.deciding = _deciding(self._model, separate.columns)
         self._columns = [separate.columns.index(entry) for entry in self.deciding]
-        self._motions = _motions(draft.plant, float(self._model.sample_time or 1.0), fine)
-        begin = [self._model.with_values(observer.start(float(a))) for a in self._motions.angles[0]]
+        angles, inputs = _motions(draft.plant, float(self._model.sample_time or 1.0), fine)
+        self._many, self._seen = angles.shape[1], angles.ravel()
+        self._inputs = np.concatenate([angles[:, :, None], inputs], axis=2).reshape(angles.size, -1).T
+        begin = [self._model.with_values(observer.start(float(a))) for a in angles[0]]
         self._start = np.array([each.start(each.states) for each in begin]).T
-        many, s = self._motions.angles.shape[1], self._model.symbols()
+        s = self._model.symbols()
         step = ca.Function(
             "step", [s.state, ca.vertcat(s.input, s.table)],
             [ca.densify(s.derivative), ca.densify(s.output[0])],
         )  # fmt: skip
-        self._step = step.map(many).mapaccum("samples", CHUNK, {"base": 10})
+        self._step = step.map(self._many).mapaccum("samples", CHUNK, {"base": 10})
         values = np.array([entry.values for entry in self.deciding]).reshape(-1, len(fine.angles))
         self._exactly = linearly(fine.angles, values.T, self._seen)
         self._estimate = self._run(self._exactly)
@@ -100,18 +93,9 @@ class TableTrial:
             return TableTorqueError(np.inf, np.inf, self.full_scale)
         return TableTorqueError(float(np.max(np.abs(off))), float(np.sqrt(np.mean(off**2))), self.full_scale)
 
-    @cached_property
-    def _seen(self) -> Array:
-        return self._motions.angles.ravel()
-
-    @cached_property
-    def _inputs(self) -> Array:
-        angles, inputs = self._motions.angles, self._motions.inputs
-        return np.concatenate([angles[:, :, None], inputs], axis=2).reshape(angles.size, -1).T
-
     def _run(self, read: Array) -> Array:
         """Return the estimates with these entries, shape (N · motions,)."""
-        many = self._motions.angles.shape[1]
+        many = self._many
         looked_up = np.zeros((self._model.symbols().table.numel(), read.shape[1]))
         looked_up[self._columns] = read
         given = np.vstack([self._inputs, looked_up])
@@ -154,8 +138,11 @@ def _separate(fine: FineEntries) -> Compact:
     return Compact(fine.angles, tuple(columns), values, places, {}, 0.0, uniform=False)
 
 
-def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) -> _Motions:
-    """Return swings over the whole range, runs between rests, and a mixture of frequencies."""
+def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) -> tuple[Array, Array]:
+    """Return swings over the whole range, runs between rests, and a mixture of frequencies.
+
+    Angles (N, motions) and inputs (N, motions, inputs) at the samples.
+    """
     count = CHUNK * -(-max(FEWEST, round(SPAN / sample_time)) // CHUNK)
     time, low, high = sample_time * np.arange(float(count)), float(fine.angles[0]), float(fine.angles[-1])
     end = float(time[-1])
@@ -170,7 +157,7 @@ def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) 
     angles = (low + high) / 2.0 + (high - low) / 2.0 * np.array(shares).T
     speed = np.gradient(angles, sample_time, axis=0)
     acceleration = np.gradient(speed, sample_time, axis=0)
-    return _Motions(angles, _inputs(plant, angles, speed, acceleration))
+    return angles, _inputs(plant, angles, speed, acceleration)
 
 
 def _smooth(time: Array, marks: Array, values: Array) -> Array:
