@@ -88,8 +88,7 @@ def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Ar
 def _one_lip(contour: Contour, angle: float) -> Array:
     """Return the sector between the lip and the centre, closed, in the resting frame."""
     points = contour.points
-    result: Array = turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
-    return result
+    return turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
 
 
 _GRID = 21

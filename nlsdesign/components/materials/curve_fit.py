@@ -115,8 +115,7 @@ def _engaging(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[Fi
 
 
 def _positive(value: Array, width: float) -> Array:
-    softened: Array = width * np.logaddexp(0.0, value / width)
-    return softened
+    return width * np.logaddexp(0.0, value / width)
 
 
 def _fewest(columns: Array, stress: Array, *, first: tuple[int, ...]) -> tuple[list[int], Array]:

@@ -212,7 +212,6 @@ def crossing(polygon: Array) -> Array | None:
 
 def _side(a: Array, b: Array, c: Array) -> Array:
     """Return which side of the line from a to b the point c lies on, for one or many lines or points."""
-    result: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
+    return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
         c[..., 0] - a[..., 0]
     )
-    return result

@@ -90,8 +90,7 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
 
 def _point(support: BPoly, direction: float, cable_radius: float) -> Array:
     p, slope = float(support(direction)), float(support(direction, 1))
-    result: Array = (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
-    return result
+    return (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
 
 
 def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, float]:

@@ -77,10 +77,7 @@ class DesignProblem:
 
     def evaluate(self, expression: Expression, point: Array) -> Array:
         """Return the value of an expression of the variables."""
-        result: Array = np.array(
-            ca.Function("value", [self.vector], [expression])(point), dtype=float
-        ).ravel()
-        return result
+        return np.array(ca.Function("value", [self.vector], [expression])(point), dtype=float).ravel()
 
     def rms(self, point: Array) -> float:
         """Return the rms torque error in N·m at a point."""

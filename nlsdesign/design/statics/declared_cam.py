@@ -348,8 +348,7 @@ def _lever_arms(row: Quantity, last: Quantity, at: Array) -> Array:
     end, values = last.number, np.array(row.values)
     first = np.linspace(0.0, end / (len(values) - 3), 4)
     start = np.polynomial.Polynomial.fit(first, spline_basis(first, end, len(values)) @ values, 3)
-    result: Array = np.where(at < 0.0, start(at), spline_basis(at, end, len(values)) @ values)
-    return result
+    return np.where(at < 0.0, start(at), spline_basis(at, end, len(values)) @ values)
 
 
 def _dense(angles: Array, lever_arms: Array, count: int) -> tuple[Array, Array]:

@@ -134,8 +134,7 @@ class ElasticLaw:
     def _evaluated(self, extension: ArrayLike, which: int) -> Array:
         given = np.asarray(extension, dtype=float)
         values = self._with_numbers(given.reshape(1, -1))[which]
-        result: Array = np.array(values, dtype=float).reshape(given.shape)
-        return result
+        return np.array(values, dtype=float).reshape(given.shape)
 
     @cached_property
     def _with_numbers(self) -> ca.Function:
@@ -245,8 +244,7 @@ def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) 
     """
     given = np.asarray(angles, dtype=float)
     torque = torque_function(model, spring)(given.reshape(1, -1), model.start(model.parameters))
-    result: Array = np.array(torque, dtype=float).reshape(given.shape)
-    return result
+    return np.array(torque, dtype=float).reshape(given.shape)
 
 
 def _at_rest(
@@ -412,5 +410,4 @@ def _moved(
     others = [i for i, name in enumerate(names) if name not in cam.states]
     old = ca.vertcat(*[movable[i] for i in others])
     new = ca.vertcat(*[values.get(names[i], ca.SX(0)) for i in others])
-    result: Expression = ca.substitute(cut, old, new)
-    return result
+    return ca.substitute(cut, old, new)

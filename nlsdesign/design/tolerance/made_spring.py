@@ -270,8 +270,7 @@ class MadeSpring:
         steps = np.diff(self.angles)
         weights = self.importance * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
         weights = weights / np.sum(weights)
-        result: Array = np.tile(weights / 2, 2) if self.rubs else weights
-        return result
+        return np.tile(weights / 2, 2) if self.rubs else weights
 
     @cached_property
     def nominal(self) -> Array:
@@ -302,8 +301,7 @@ class MadeSpring:
 
         ``torques``: shape (draws, columns), in N·m.
         """
-        result: Array = np.sqrt((torques - self.wanted) ** 2 @ self.weights)
-        return result
+        return np.sqrt((torques - self.wanted) ** 2 @ self.weights)
 
     def held(self, deviations: Array) -> int:
         """Return in how many draws a number had to be held at the end of its range.

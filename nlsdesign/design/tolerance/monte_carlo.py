@@ -252,8 +252,7 @@ def _effects(made: MadeSpring, with_less: _WithLess, acting: Sequence[int]) -> l
 def _without(rows: Array, tangent: Array, weights: Array) -> Array:
     """Return rows without their part along a tangent, in the mean over angle and stroke."""
     along = (rows * tangent) @ weights / (tangent**2 @ weights)
-    result: Array = rows - along[:, None] * tangent
-    return result
+    return rows - along[:, None] * tangent
 
 
 def _alone(made: MadeSpring, column: int) -> float:

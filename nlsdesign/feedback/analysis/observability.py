@@ -556,16 +556,14 @@ class _Search:
         # The determinant is a straight line over so little: where it changes its sign, it says where.
         line = ends[0] * ends[1] < 0.0
         share = np.where(line, ends[0] / np.where(line, ends[0] - ends[1], 1.0), 0.5)
-        angles: Array = low + share * (high - low)
-        return angles
+        return low + share * (high - low)
 
     def _are_zeros(self, at: Array) -> Mask:
         """Tell at which angles the smallest singular value falls to nothing, and is not only low."""
         if not len(at):
             return np.zeros(0, dtype=bool)
         here, near = (self._numbers(self.points(each))[1] for each in (at, at + 1e4 * REFINED))
-        zero: Mask = here <= np.maximum(self.view.tolerance, 1e-3 * near)
-        return zero
+        return here <= np.maximum(self.view.tolerance, 1e-3 * near)
 
     def _run(self, at: Array, rows: list[int]) -> RankDrop:
         """Return the range around angles of lost rank; one angle where it is narrower than 1e-6 rad."""

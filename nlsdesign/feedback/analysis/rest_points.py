@@ -66,8 +66,7 @@ class PlantMode:
         """Eigenvalues, shape (N, n − 2·held): without those of what is held and of where it stands."""
         eigenvalues = np.linalg.eigvals(self.a).astype(complex)
         order = np.argsort(np.abs(eigenvalues), axis=-1)
-        kept: NDArray[np.complex128] = np.take_along_axis(eigenvalues, order, axis=-1)[:, 2 * self.held :]
-        return kept
+        return np.take_along_axis(eigenvalues, order, axis=-1)[:, 2 * self.held :]
 
 
 class _Side(NamedTuple):
@@ -236,8 +235,7 @@ def _extrapolated(values: list[Array]) -> Array:
     """Return the limit at zero speed; exactly what they are where all are equal."""
     limit = sum((weight * value for weight, value in zip(_TO_ZERO, values, strict=True)), np.zeros(1))
     same = (values[0] == values[1]) & (values[1] == values[2])
-    result: Array = np.where(same, values[0], limit)
-    return result
+    return np.where(same, values[0], limit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,8 +66,7 @@ class CamMotion:
     def lever_arms(self) -> Array:
         """Lever arm in m at each angle; odd like the torque."""
         arms = np.interp(np.abs(self.angles), self.contour.angles, self.contour.lever_arms)
-        result: Array = np.sign(self.angles) * arms
-        return result
+        return np.sign(self.angles) * arms
 
     @property
     def guide(self) -> float:

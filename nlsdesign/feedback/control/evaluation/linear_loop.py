@@ -89,8 +89,7 @@ class LinearLoop:
     def stable(self) -> Mask:
         """Return where the loop is stable, shape (n,)."""
         # A gain of zero leaves an integrator that nothing moves at exactly one.
-        result: Mask = self.radius() < 1.0 + 1e-9
-        return result
+        return self.radius() < 1.0 + 1e-9
 
     def response(self, output: str, given: str, frequencies: Sequence[float] | Array) -> Complex:
         """Return the ratio of an output to an input, shape (n, frequencies)."""

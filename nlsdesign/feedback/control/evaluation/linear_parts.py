@@ -257,8 +257,7 @@ def _holding(function: ca.Function, rest: Array, fixed: tuple[Array, Array], pla
         inputs[:, place] = value
         accelerations.append(evaluate_rows(function, rest, inputs, p)[5][:, 0])
     slope = (accelerations[1] - accelerations[0]) / 1e-3
-    result: Array = -accelerations[0] / slope
-    return result
+    return -accelerations[0] / slope
 
 
 @dataclass(frozen=True, eq=False)

@@ -263,16 +263,14 @@ def without_harmonics(values: Array, cycles: int) -> Array:
     """
     if cycles == 0:
         time = np.linspace(-1.0, 1.0, len(values))
-        drift: Array = values - np.polynomial.Polynomial.fit(time, values, 1)(time)
-        return drift
+        return values - np.polynomial.Polynomial.fit(time, values, 1)(time)
     spectrum = np.fft.rfft(values)
     spectrum[0] = 0.0
     multiples = spectrum[cycles::cycles]
     # A sharp end would ring before and after every kick, so the removal fades out.
     share = np.clip((np.arange(1.0, len(multiples) + 1.0) - HARMONICS) / HARMONICS, 0.0, 1.0)
     multiples *= 0.5 - 0.5 * np.cos(math.pi * share)
-    rest: Array = np.fft.irfft(spectrum, len(values))
-    return rest
+    return np.fft.irfft(spectrum, len(values))
 
 
 def locked(values: Array, cycles: int) -> tuple[float, int]:
@@ -299,8 +297,7 @@ def _faster(error: Array, desired: Array) -> Array:
     # Below the resolution of the window nothing is told apart.
     last = int(np.searchsorted(power, 0.999 * power[-1])) if power[-1] > 0.0 else 0
     spectrum[: 3 * max(last, 2) + 1] = 0.0
-    faster: Array = np.fft.irfft(spectrum, len(error))
-    return faster
+    return np.fft.irfft(spectrum, len(error))
 
 
 def _without_answer(error: Array, desired: Array) -> Array:

@@ -266,8 +266,7 @@ class CoupledStability:
     def stable(self) -> Mask:
         """Where the coupled loop is stable or at its limit, shape (i, s)."""
         # A free load has a double eigenvalue at one, which rounding parts by 1e-8.
-        result: Mask = self.radius < 1.0 + 1e-6
-        return result
+        return self.radius < 1.0 + 1e-6
 
 
 def coupled_stability(

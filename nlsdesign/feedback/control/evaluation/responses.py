@@ -252,8 +252,7 @@ class SineResponse:
     @property
     def decibel(self) -> Array:
         """Magnitude in dB."""
-        magnitude: Array = 20.0 * np.log10(np.abs(self.response))
-        return magnitude
+        return 20.0 * np.log10(np.abs(self.response))
 
     @property
     def phase_degrees(self) -> Array:
@@ -261,8 +260,7 @@ class SineResponse:
         phase = np.angle(self.response)
         good = np.isfinite(phase)
         phase[good] = np.unwrap(phase[good])
-        degrees: Array = np.degrees(phase)
-        return degrees
+        return np.degrees(phase)
 
     @property
     def saturated(self) -> Array:
@@ -627,5 +625,4 @@ def torque_resolution(loop: ClosedLoop, angles: Sequence[float] | Array) -> Arra
     ``angles``: of the driven body with the load at zero, shape (n,), in rad.
     """
     at = np.atleast_1d(np.asarray(angles, dtype=float))
-    result: Array = np.abs(tangent_stiffness(loop.plant, at)) * LoopJudge(loop).count
-    return result
+    return np.abs(tangent_stiffness(loop.plant, at)) * LoopJudge(loop).count

@@ -170,8 +170,7 @@ class _Table:
         place = self.compact.places[key]
         if place.column is None:
             return np.full(len(self.compact.angles), place.factor)
-        column: Array = place.factor * self.compact.values[:, place.column]
-        return column
+        return place.factor * self.compact.values[:, place.column]
 
     def deck_box(self, k: int) -> Array:
         """Return the range of an inner state with all slow states at zero, shape (2,)."""

@@ -39,8 +39,7 @@ class Range:
     @property
     def magnitude(self) -> Array:
         """Largest absolute value in each."""
-        size: Array = np.maximum(np.abs(self.lower), np.abs(self.upper))
-        return size
+        return np.maximum(np.abs(self.lower), np.abs(self.upper))
 
 
 @dataclass(frozen=True, eq=False)

@@ -185,20 +185,18 @@ def _mean_exponential(x: Array) -> Array:
     """Return φ(x) = ∫₀¹ e^(sx) ds, which rises; to 1e-10."""
     near = np.abs(x) < 1e-3
     away = np.where(near, 1.0, x)
-    value: Array = np.where(near, 1.0 + x / 2.0 + x**2 / 6.0 + x**3 / 24.0, np.expm1(away) / away)
-    return value
+    return np.where(near, 1.0 + x / 2.0 + x**2 / 6.0 + x**3 / 24.0, np.expm1(away) / away)
 
 
 def _bent_exponential(x: Array) -> Array:
     """Return φ′(x) = ∫₀¹ s·e^(sx) ds, which rises; to 1e-10."""
     near = np.abs(x) < 1e-2
     away = np.where(near, 1.0, x)
-    value: Array = np.where(
+    return np.where(
         near,
         0.5 + x / 3.0 + x**2 / 8.0 + x**3 / 30.0 + x**4 / 144.0,
         (away * np.exp(away) - np.expm1(away)) / away**2,
     )
-    return value
 
 
 def _rounded(value: float, way: np.ufunc) -> float:

@@ -448,8 +448,7 @@ def _affine(read: list[Array], box: Array) -> Bounds:
 
 def _apart(a: Bounds, b: Bounds) -> Array:
     """Return the largest distance of two numbers in their ranges."""
-    apart: Array = np.maximum(a[1] - b[0], b[1] - a[0])
-    return apart
+    return np.maximum(a[1] - b[0], b[1] - a[0])
 
 
 def _distance(value: Array, weight: float, of: Range, k: int) -> Array:

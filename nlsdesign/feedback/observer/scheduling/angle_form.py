@@ -84,8 +84,7 @@ class AngleScheduledPlant:
     def output_matrix(self) -> Array:
         """C, shape (r, n): the angle first, then what else is measured."""
         places = [self.names.index(name) for name in (self.angle, *self.measured)]
-        matrix: Array = np.eye(len(self.states))[places]
-        return matrix
+        return np.eye(len(self.states))[places]
 
 
 ADDITIVE_LIMIT = 1e-6
@@ -154,8 +153,7 @@ class AngleForm:
 
     def rest(self, angles: Array) -> Array:
         """Return rest states in the order of the observer, shape (N, n)."""
-        ordered: Array = self.rest_in_model_order(angles)[:, self.order]
-        return ordered
+        return self.rest_in_model_order(angles)[:, self.order]
 
     def at(self, angles: Array) -> Coefficients:
         """Return the coefficients at many angles."""
@@ -269,15 +267,13 @@ class AngleForm:
         """Return ∂ż/∂ω of the inner states, shape (N, inner); it may depend on the angle only."""
         x = np.tile(self.model.start(self.model.states), (len(angles), 1))
         x[:, self.angle_state] = angles
-        slopes: Array = evaluate_rows(
+        return evaluate_rows(
             self._follow, _moving(x, self.speed_state, self.layout.speed_size), self.u, self.p
         )[0]
-        return slopes
 
     def _shift(self, angles: Array) -> Array:
         """Return Q(θ), shape (N, inner)."""
-        shift: Array = np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
-        return shift
+        return np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
 
     def _summed(self) -> CubicHermiteSpline | None:
         """Return Q = ∫₀^θ ∂ż/∂ω dθ as a spline with its exact slope at fine nodes, zero among them."""

@@ -373,8 +373,7 @@ def error_matrices(observer: FlatModel, angles: Array, speed: float = 0.0) -> Ar
         at = np.array(many(state, given, table)[1])
         state[moving] += [at[0], speed - at[1]]
     entries = np.array(many(state, given, table)[0])
-    matrices: Array = entries.T.reshape(len(angles), len(memory), len(memory))
-    return matrices
+    return entries.T.reshape(len(angles), len(memory), len(memory))
 
 
 def _memory(observer: FlatModel) -> tuple[list[int], list[int]]:

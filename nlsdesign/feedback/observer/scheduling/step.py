@@ -64,8 +64,7 @@ def _exponentials(blocks: Array) -> Array:
         and len(blocks) > 1
         and np.array_equal(blocks, np.broadcast_to(blocks[0], blocks.shape))
     ):
-        same: Array = np.broadcast_to(expm(blocks[0]), blocks.shape).copy()
-        return same
+        return np.broadcast_to(expm(blocks[0]), blocks.shape).copy()
     result: Array = expm(blocks)
     return result
 
@@ -331,8 +330,7 @@ class PolePlacement:
         inner: Array = expm(seen.T @ a @ seen * plant.sample_time)
         gain = seen @ _placed(inner, c @ seen, np.exp(poles * plant.sample_time))
         # The gain of the prediction, L = Φ M, is what is placed.
-        result: Array = np.asarray(np.linalg.solve(plant.transition, gain * scale[:, None]), dtype=np.float64)
-        return result
+        return np.asarray(np.linalg.solve(plant.transition, gain * scale[:, None]), dtype=np.float64)
 
 
 def _decomposed(a: Array, c: Array, limit: float) -> tuple[Array, Array]:

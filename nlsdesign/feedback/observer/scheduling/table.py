@@ -465,8 +465,7 @@ def linearly(grid: Array, values: Array, at: Array) -> Array:
     left = np.clip(np.searchsorted(grid, held, side="right") - 1, 0, len(grid) - 2)
     share = (held - grid[left]) / (grid[left + 1] - grid[left])
     rows = values.T
-    read: Array = rows[:, left] + share * (rows[:, left + 1] - rows[:, left])
-    return read
+    return rows[:, left] + share * (rows[:, left + 1] - rows[:, left])
 
 
 def _finite(entries: Sequence[Entry]) -> Sequence[Entry]:

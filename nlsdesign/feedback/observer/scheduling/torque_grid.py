@@ -164,8 +164,7 @@ def _smooth(time: Array, marks: Array, values: Array) -> Array:
     """Return a course through values at some times that is at rest at each of them."""
     cell = np.clip(np.searchsorted(marks, time, side="right") - 1, 0, len(marks) - 2)
     share = (time - marks[cell]) / (marks[cell + 1] - marks[cell])
-    course: Array = values[cell] + (values[cell + 1] - values[cell]) * share**2 * (3.0 - 2.0 * share)
-    return course
+    return values[cell] + (values[cell + 1] - values[cell]) * share**2 * (3.0 - 2.0 * share)
 
 
 def _inputs(plant: AngleScheduledPlant, angles: Array, speed: Array, acceleration: Array) -> Array:
