@@ -147,14 +147,6 @@ def _end_of_cable(contour: Contour, reach: float) -> Array:
     return np.array([contour.anchor_distance if near else 1.9 * reach, 0.0])
 
 
-def _halves(contour: Contour, parallel: bool) -> list[Array]:
-    if not parallel:
-        return list(contour.outlines())
-    # Of a cam with a parallel cable only the lip is designed; the body behind it is closed over the centre.
-    points = contour.points
-    return [np.vstack([points, [[0.0, 0.0]], points[:1]])]
-
-
 def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: float) -> None:
     """Draw one element behind the end of the cable: as long as it is, rubber as high as a square section."""
     piece = _piece(design)
@@ -261,7 +253,7 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     bars = axes.barh(places, values, 0.66, color=tones, edgecolor=SURFACE.light)
     for bar, hatch in zip(bars, hatches, strict=True):
         bar.set_hatch(hatch)
-    ends = [value for value in values]
+    ends = list(values)
     for k, (_, each) in enumerate(whole):
         upper = each.upper if np.isfinite(each.upper) else each.value
         axes.hlines(places[k], factor * each.lower, factor * upper, color=INK.light, linewidth=1.3)
