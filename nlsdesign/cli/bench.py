@@ -17,6 +17,7 @@ from .options import (
     deck_option,
     export_option,
     json_option,
+    machine_of,
     measured_option,
     sample_time_option,
     spring_option,
@@ -80,14 +81,12 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     """Refit the numbers that have a spread. Nothing is added to the model."""
     from ..bench.discrepancy import refit, refit_of_run, write_refit
     from ..bench.identification import load_records
-    from ..components import declare
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..presentation.report import write_fit_report
     from ..regeneration import export_machine
 
-    actuator = declare(load_deck(deck_name))
+    actuator = machine_of(deck_name)
     mapping, hold_out = options["mapping"], options["hold_out"]
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()
@@ -182,8 +181,6 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..bench.discrepancy import diagnose as find_what_is_missing
     from ..bench.discrepancy import range_findings, verdict_of_run, write_verdict
     from ..bench.identification import load_records
-    from ..components import declare
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..presentation.report import write_diagnosis_report
@@ -191,7 +188,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
 
     command = typed_command("nlsdesign", *sys.argv[1:])
     date = datetime.now().astimezone().isoformat(" ", "minutes")
-    actuator = declare(load_deck(deck_name))
+    actuator = machine_of(deck_name)
     plant, roles = flatten(actuator), _roles(options)
     measured = load_records(records, plant, mapping=options["mapping"], hold_out=options["hold_out"])
     steps = Steps()
