@@ -245,6 +245,26 @@ class Symbols(NamedTuple):
     residual: Expression
 
 
+INTERFACE = (["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"])
+"""Names of the arguments and of the results of the equations of a flat model."""
+_NONE = ca.SX(0, 1)
+
+
+def stated_equations(
+    state: Expression,
+    given: Expression,
+    *,
+    derivative: Expression,
+    output: Expression,
+    parameter: Expression = _NONE,
+    table: Expression = _NONE,
+    signal: Expression = _NONE,
+) -> ca.Function:
+    """Return equations of a flat model in which neither time nor a residual stands; ``given``: its inputs."""
+    arguments = [ca.SX.sym("time"), state, given, parameter, table]
+    return ca.Function("equations", arguments, [derivative, output, signal, _NONE], *INTERFACE)
+
+
 @dataclass(frozen=True)
 class Switch:
     """A place at which the equations of a model are not smooth."""

@@ -14,7 +14,7 @@ import casadi as ca
 
 from ..foundation.errors import ArrangementError, unknown_name
 from ..foundation.symbolic import Expression, depends
-from .flat import FlatModel, Variable
+from .flat import FlatModel, Variable, stated_equations
 from .roles import driven_body, series_cam
 from .transform import cut, named, parts_of, with_parts
 
@@ -90,17 +90,11 @@ def paper_form(model: FlatModel, names: PaperFormNames | None = None) -> FlatMod
     signals = {drive.variable(name): value for name, value in others.items() if value is not None}
     signals[replace(extension, name=f"{n.extension}.{GEOMETRIC}")] = _required(model, known, n.extension)
     carried = (n.force, n.extension, n.angle, n.speed)
-    equations = ca.Function(
-        "equations",
-        [
-            ca.SX.sym("time"), _column([symbols[name] for name in carried]),
-            _column([symbols[n.rate], *outer.values()]), _column(list(parameters.values())), ca.SX(0, 1),
-        ],
-        [
-            _column([force_rate, symbols[n.rate], symbols[n.speed], pull]),
-            _column([symbols[n.extension], symbols[n.angle]]), _column(list(signals.values())), ca.SX(0, 1),
-        ],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    equations = stated_equations(
+        _column([symbols[name] for name in carried]), _column([symbols[n.rate], *outer.values()]),
+        derivative=_column([force_rate, symbols[n.rate], symbols[n.speed], pull]),
+        output=_column([symbols[n.extension], symbols[n.angle]]),
+        parameter=_column(list(parameters.values())), signal=_column(list(signals.values())),
     )  # fmt: skip
     start = model.evaluate([v.start for v in model.states])
     kept = [model.variable(name) for name in carried]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..foundation.errors import ArrangementError, unknown_name
 from ..foundation.symbolic import Expression, dependence, depends
-from .flat import FlatModel, Switching, Symbols, Variable
+from .flat import INTERFACE, FlatModel, Switching, Symbols, Variable
 from .graph import applied
 from .structure import ModelParts
 
@@ -218,11 +218,8 @@ def _rebuilt(
     ends = [0]
     for row in rows:
         ends.append(ends[-1] + row.shape[0])
-    equations = ca.Function(
-        "equations", [s.time, s.state, s.input, s.parameter, s.table],
-        [shared[a:b] for a, b in pairwise(ends)],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-    )  # fmt: skip
+    given = [s.time, s.state, s.input, s.parameter, s.table]
+    equations = ca.Function("equations", given, [shared[a:b] for a, b in pairwise(ends)], *INTERFACE)
     changed = replace(
         model,
         equations=equations,

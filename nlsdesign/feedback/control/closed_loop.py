@@ -12,6 +12,7 @@ import numpy as np
 from ...foundation.errors import ArrangementError, ConvergenceError, ValueRangeError, nearest, unknown_name
 from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
+from ...model.flat import stated_equations
 from ...model.origin import common_origin
 from ...model.roles import moved_load, series_spring
 from ...model.transform import with_signal
@@ -184,12 +185,10 @@ class _Joint:
         place = [v.name for v in self.controller.outputs].index(self.wiring.driven.name)
         later = [self.waiting[i] for i in range(1, self.waiting.numel())]
         states = ca.vertcat(following, after, *later, command[place])
-        return ca.Function(
-            "equations",
-            [ca.SX.sym("time"), *self._arguments()],
-            [ca.densify(states), ca.densify(ca.vertcat(estimates, command)),
-             ca.densify(ca.vertcat(shown, signals)), ca.SX(0, 1)],
-            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+        x, u, p, w = self._arguments()
+        return stated_equations(
+            x, u, derivative=ca.densify(states), output=ca.densify(ca.vertcat(estimates, command)),
+            parameter=p, table=w, signal=ca.densify(ca.vertcat(shown, signals)),
         )  # fmt: skip
 
     def begin(self) -> ca.Function:

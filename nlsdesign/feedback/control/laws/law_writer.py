@@ -16,6 +16,7 @@ import casadi as ca
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Origin, Table, Variable
+from ....model.flat import stated_equations
 from ....model.roles import motor_of, series_spring
 
 DESIRED = "desired"
@@ -150,12 +151,14 @@ class LawWriter:
             parameters=tuple(v for v, _ in self._parameters.values()),
             outputs=(output[0],),
             signals=tuple(v for v, _ in self._signals.values()),
-            equations=ca.Function(
-                "equations",
-                [ca.SX.sym("time"), x, u, p, ca.vertcat(*w) if w else ca.SX(0, 1)],
-                [ca.vertcat(*following), output[1], ca.vertcat(*signals), ca.SX(0, 1)],
-                ["time", "state", "input", "parameter", "table"],
-                ["derivative", "output", "signal", "residual"],
+            equations=stated_equations(
+                x,
+                u,
+                derivative=ca.vertcat(*following),
+                output=output[1],
+                parameter=p,
+                table=ca.vertcat(*w) if w else ca.SX(0, 1),
+                signal=ca.vertcat(*signals),
             ),
             sample_time=self.sample_time,
             origin=self.origin,

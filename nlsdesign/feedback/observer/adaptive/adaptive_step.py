@@ -27,6 +27,7 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Variable
+from ....model.flat import stated_equations
 from ..scheduling.angle_form import AngleForm, AngleScheduledPlant
 from ..scheduling.step import ObserverStep, held, linear
 from ..scheduling.table import Compact, Entry
@@ -234,14 +235,9 @@ def held_observer(step: AdaptiveStep, compact: Compact) -> HeldObserver:
     known = [*state, ca.SX(1)]
     following = [_sum(read("next", i, j) * x for j, x in enumerate(known)) for i in range(inner)]
     estimate = _sum(read("estimate", 0, j) * x for j, x in enumerate(known))
-    nothing = ca.SX(0, 1)
-    equations = ca.Function(
-        "held",
-        [
-            ca.SX.sym("time"), ca.vertcat(memory, before, count), ca.vertcat(angle, other), ca.SX(0, 1), w
-        ],
-        [ca.vertcat(*following, angle, count + 1), estimate, nothing, nothing],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    equations = stated_equations(
+        ca.vertcat(memory, before, count), ca.vertcat(angle, other),
+        derivative=ca.vertcat(*following, angle, count + 1), output=estimate, table=w,
     )  # fmt: skip
     names = [Variable(f"{v.name}.memory", v.unit, "inner state") for v in plant.states[:inner]]
     states = (*names, Variable("before", "rad", "last angle"), Variable("samples", "1", "since the start"))

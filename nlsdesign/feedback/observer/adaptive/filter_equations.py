@@ -32,6 +32,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from ....foundation.symbolic import Expression
+from ....model.flat import stated_equations
 from ..scheduling.measured_angle import at_rest
 from ..scheduling.step import speed_change
 from ..scheduling.table import Compact
@@ -217,16 +218,9 @@ class FilterEquations:
         variance = ca.mtimes([slopes_of_estimate, posterior, slopes_of_estimate.T]) + self.noise.estimate**2
         shifted = state + self.matrix("shift", n, 1, slow_after)
         outputs = [estimate, ca.sqrt(variance), shifted, innovation, slow_after]
-        results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
-        return ca.Function(
-            "equations",
-            [
-                ca.SX.sym("time"), ca.vertcat(memory, slow, inflation, low_pass, packed),
-                ca.vertcat(angle, u), ca.SX(0, 1), self.w,
-            ],
-            [*results, ca.SX(0, 1), ca.SX(0, 1)],
-            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-        )  # fmt: skip
+        carried = ca.vertcat(memory, slow, inflation, low_pass, packed)
+        after, shown = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
+        return stated_equations(carried, ca.vertcat(angle, u), derivative=after, output=shown, table=self.w)
 
     def _gate(self, nis: Expression) -> Expression:
         """Return how much of a correction passes to the slow states, 0 to 1.

@@ -25,6 +25,7 @@ from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.quantity import typeset_unit
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
+from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
 from .angle_form import Minimal, StateForm
 from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
@@ -267,17 +268,10 @@ class _Writer(ObserverVariables):
         following = [self.row("next", i, [*state, ca.SX(1), *pushed]) for i in range(n)]
         estimate = self.row("estimate", 0, [*state, ca.SX(1)])
         shown = [state[i] + self.read("shift", i) for i in range(n)]
-        equations = ca.Function(
-            "equations",
-            [
-                ca.SX.sym("time"), _column([*memory, *previous, *filtered]), _column([angle, *u]),
-                ca.SX(0, 1), self.w,
-            ],
-            [
-                _column([*following, *measured[1:], *(rates if filtered else [])]),
-                _column([estimate, *shown, *innovation]), ca.SX(0, 1), ca.SX(0, 1),
-            ],
-            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+        equations = stated_equations(
+            _column([*memory, *previous, *filtered]), _column([angle, *u]),
+            derivative=_column([*following, *measured[1:], *(rates if filtered else [])]),
+            output=_column([estimate, *shown, *innovation]), table=self.w,
         )  # fmt: skip
         return FlatModel(
             name=f"{plant.name}_observer",
