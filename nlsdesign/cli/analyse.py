@@ -12,7 +12,7 @@ from ..foundation.errors import ValueRangeError
 from ..foundation.quantity import typeset_unit
 from ..foundation.text_files import make_folder
 from .options import LAWS, deck_option, json_option, law_of, machine_of, measured_option, spring_option
-from .output import examples, show_json, show_table, warn
+from .output import examples, show_json, show_lines, show_table, warn
 from .overwriting import out_option
 from .typed_values import Number
 
@@ -362,11 +362,9 @@ def _show_loop(result: LoopEvaluation) -> None:
         f"coupled at {math.degrees(result.coupled.angle):.3g}°: stable on {int(np.sum(stable_loads))} of "
         f"{stable_loads.size} loads"
     )
-    for sentence in [*result.spread.words(), *(f"finding: {each}" for each in result.findings())]:
-        click.echo(sentence)
+    show_lines([*result.spread.words(), *(f"finding: {each}" for each in result.findings())])
     if result.stable:
-        for onset in result.onsets:
-            click.echo(str(onset))
+        show_lines(result.onsets)
 
 
 def _text(value: float) -> str:

@@ -23,7 +23,7 @@ from .options import (
     spring_option,
     workers_option,
 )
-from .output import examples, next_command, show_json, show_table, warn
+from .output import examples, next_command, show_json, show_lines, show_table, warn
 from .overwriting import c_names, out_option
 from .typed_values import NamedPath, Number
 
@@ -106,8 +106,7 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
         show_json({**result.to_dict(str(deck)), "report": page, **exported})
         return
     _show_fit(result)
-    for sentence in machine.findings() if machine else ():
-        click.echo(sentence)
+    show_lines(machine.findings() if machine else ())
     click.echo(f"report: {page}")
     following = next_command("diagnose", "--deck", deck, "--records", records, *as_read(mapping, hold_out))
     click.echo(f"written: {file} and {deck}; next: {following}")
@@ -130,8 +129,7 @@ def _show_fit(result: Refit) -> None:
         for e in result.errors()
     ]
     show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
-    for sentence in result.words():
-        click.echo(sentence)
+    show_lines(result.words())
 
 
 def as_read(mapping: Path | None, hold_out: Sequence[str]) -> list[str]:
@@ -298,8 +296,7 @@ def calibrate(
         return
     heads = ("name", "before", "after", "unit", "moved, in spreads", "known from")
     show_table("Numbers", heads, shown_numbers(result.numbers))
-    for sentence in (*record_findings(tests), *result.words()):
-        click.echo(sentence)
+    show_lines((*record_findings(tests), *result.words()))
     click.echo(f"written: {', '.join(map(str, paths.values()))}")
 
 
@@ -325,8 +322,7 @@ def _show_plan(
         show_json(ranked.to_dict())
         return
     show_table("What a calibration buys", ranked.heads, ranked.rows())
-    for sentence in ranked.words():
-        click.echo(sentence)
+    show_lines(ranked.words())
     for title, reason in ranked.left_out.items():
         click.echo(f"{title} is left out: {reason}")
     following = ["--deck", deck_name, "--kind", "KIND", "--records", "FOLDER"]

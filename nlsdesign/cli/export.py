@@ -23,7 +23,7 @@ from .options import (
     sample_time_option,
     spring_option,
 )
-from .output import examples, show_json, show_table, show_written, warn
+from .output import examples, show_json, show_lines, show_table, show_written, warn
 from .overwriting import c_names, out_file_option, out_option
 from .typed_values import NamedPath
 
@@ -258,6 +258,5 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
             ("file", "kind", "deck", "digest", "state"),
             [(path, file.kind, file.deck, file.short, why or "belongs") for path, file, why in judged],
         )
-    for sentence in exports.findings():
-        click.echo(sentence)
+    show_lines(exports.findings())
     return status

@@ -59,7 +59,9 @@ def mechanism_at(
     corners = np.array([clamp + up, [wall, end[1] + half], [wall, end[1] - half], clamp - up])
     cable = np.vstack([line, clamp])
     sides = (1.0, -1.0) if both else (1.0,)
-    outlines = contour.outlines(angle) if both else (_one_lip(contour, angle),)
+    # Of one lip the sector between it and the centre is drawn.
+    lip = np.vstack([[0.0, 0.0], contour.points, [0.0, 0.0]])
+    outlines = contour.outlines(angle) if both else (turn(lip, angle),)
     short = "; the rubber is drawn shorter than it is" if shown < rest_length + extensions[0] else ""
     return Mechanism(
         angle=angle,
@@ -83,12 +85,6 @@ def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Ar
     begin = np.zeros((1, 2)) if both else np.zeros((0, 2))
     wrapped = turn(np.vstack([begin, touched]) * side, angle)
     return np.vstack([wrapped, contact, end]), contact, end
-
-
-def _one_lip(contour: Contour, angle: float) -> Array:
-    """Return the sector between the lip and the centre, closed, in the resting frame."""
-    points = contour.points
-    return turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
 
 
 _GRID = 21

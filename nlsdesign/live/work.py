@@ -381,7 +381,6 @@ class ExportedDesign:
     """One file."""
 
     name: str
-    media_type: str
     content: bytes
 
 
@@ -415,7 +414,7 @@ class ExportDesign(LiveTask):
 def exported_deck(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
     """Return the machine as a deck."""
     text = f"# {design.note}\n{deck_text(design.machine)}" if design.note else deck_text(design.machine)
-    return ExportedDesign(f"{design.machine.name}.toml", "application/toml", text.encode())
+    return ExportedDesign(f"{design.machine.name}.toml", text.encode())
 
 
 def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
@@ -438,7 +437,7 @@ def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDes
             for file in [files.header, files.source, files.selftest]:
                 archive.writestr(zipfile.ZipInfo(file.name, _OLD), head.encode() + file.read_bytes())
         content = buffer.getvalue()
-    return ExportedDesign("observer_and_controller.zip", "application/zip", content)
+    return ExportedDesign("observer_and_controller.zip", content)
 
 
 def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
@@ -451,10 +450,7 @@ def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedD
         if design.note:
             plant = replace(plant, description=f"{design.note}. {plant.description}")
         file = export_fmu(plant, Path(folder) / "plant.fmu")
-        return ExportedDesign("plant.fmu", "application/zip", file.read_bytes())
-
-
-_MEDIA = {"svg": "image/svg+xml", "dxf": "image/vnd.dxf"}
+        return ExportedDesign("plant.fmu", file.read_bytes())
 
 
 def exported_drawing(stage: Callable[[str], None], design: ShownDesign, *, ending: str) -> ExportedDesign:
@@ -466,7 +462,7 @@ def exported_drawing(stage: Callable[[str], None], design: ShownDesign, *, endin
     with tempfile.TemporaryDirectory() as folder:
         files = write_drawings(Path(folder), design.contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
-    return ExportedDesign(f"cam.{ending}", _MEDIA[ending], content)
+    return ExportedDesign(f"cam.{ending}", content)
 
 
 EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {

@@ -88,11 +88,6 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
         )
 
 
-def _point(support: BPoly, direction: float, cable_radius: float) -> Array:
-    p, slope = float(support(direction)), float(support(direction, 1))
-    return (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
-
-
 def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, float]:
     """Return as few biarcs as the accuracy allows, and their deviation."""
     share = np.arange(_REFINE) / _REFINE
@@ -117,7 +112,10 @@ def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, flo
 
 
 def _biarc_over(support: BPoly, first: float, last: float, cable_radius: float) -> tuple[ArcPath, float]:
-    start, end = (_point(support, direction, cable_radius) for direction in (first, last))
+    start, end = (
+        (float(support(phi)) - cable_radius) * _normal(phi) + float(support(phi, 1)) * _tangent(phi)
+        for phi in (first, last)
+    )
     path = biarc(start, end, first=_tangent(first), last=_tangent(last))
     phi = np.linspace(first, last, _CHECKED)
     normals = np.column_stack([np.sin(phi), np.cos(phi)])

@@ -10,9 +10,9 @@ from typing import ClassVar
 import casadi as ca
 
 from ...foundation.errors import UnitError, ValueRangeError, unknown_name
-from ...foundation.quantity import Quantity, parse_unit, same_dimension, typeset_unit, with_unit
+from ...foundation.quantity import Quantity, same_dimension, typeset_unit
 from ...foundation.symbolic import Expression
-from ..curves.numbers import in_si, plain
+from ..curves.numbers import in_si, in_unit, plain
 from ..curves.target import TorqueBand
 from .design_point import DesignPoint, anchor_of
 from .goals import Goal
@@ -32,7 +32,7 @@ class Bound:
 
     def shown(self, value: float) -> str:
         """Return a number in the unit of the limit as text."""
-        return with_unit(f"{value / parse_unit(self.unit).factor:.4g}", self.unit)
+        return in_unit(value, self.unit)
 
     def __str__(self) -> str:
         return f"{self.limit}: {self.of} {'<=' if self.upper else '>='} {self.shown(self.value)}"
@@ -677,9 +677,7 @@ class LimitKind(OneNumber):
 
     def shown(self, value: float) -> str:
         """Return a number in the unit in which people read it."""
-        if self.shown_unit == "%":
-            return f"{100.0 * value:.4g} %"
-        return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
+        return f"{100.0 * value:.4g} %" if self.shown_unit == "%" else in_unit(value, self.shown_unit)
 
     @property
     def read_unit(self) -> str:

@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.quantity import parse_unit, with_unit
 from ...foundation.work_sharing import parallel_map
+from ..curves.numbers import in_unit
 from .defaults import BREAKS
 from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
@@ -80,7 +80,7 @@ class Freed:
 
     def __str__(self) -> str:
         shown = [
-            f"{name} (to {with_unit(f'{value / parse_unit(unit).factor:.4g}', unit)})"
+            f"{name} (to {in_unit(value, unit)})"
             for name, value, unit in zip(self.names, self.values, self.units, strict=True)
         ]
         return "free " + " and ".join(shown)

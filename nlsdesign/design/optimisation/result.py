@@ -11,9 +11,10 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
-from ...foundation.quantity import Quantity, parse_unit, with_unit
+from ...foundation.quantity import Quantity, parse_unit
 from ...foundation.written_numbers import prefixed, without_power
 from ...model.structure import CamNames
+from ..curves.numbers import in_unit
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
@@ -55,10 +56,9 @@ class LimitState:
     where: str = ""
 
     def __str__(self) -> str:
-        factor = parse_unit(self.unit).factor
         sign = "<=" if self.upper else ">="
         mark = f"  ACTIVE {self.where}".rstrip() if self.active else ""
-        value, bound = (with_unit(f"{number / factor:.4g}", self.unit) for number in (self.value, self.bound))
+        value, bound = in_unit(self.value, self.unit), in_unit(self.bound, self.unit)
         return f"{self.limit}: {self.of} {value} {sign} {bound}{mark}"
 
 
