@@ -20,6 +20,7 @@ from .style import (
     GRID,
     INK,
     MUTED,
+    crosses,
     described,
     label_panel,
     legend,
@@ -140,11 +141,7 @@ def curves_beside_points(shown: Sequence[PointPanel], *, across: str, words: str
             axis.plot(
                 x, y, color=tone, linestyle=dash, label=label, linewidth=1.4, markersize=2.0, marker="."
             )
-            lost = x[~np.isfinite(y)]
-            axis.plot(
-                lost, np.full(len(lost), 0.04 + 0.06 * number), transform=axis.get_xaxis_transform(),
-                color=tone, linestyle="none", marker="x", markeredgewidth=1.6,
-            )  # fmt: skip
+            crosses(axis, x[~np.isfinite(y)], 0.04 + 0.06 * number, tone)
             if label in panel.points:
                 axis.plot(*panel.points[label], color=tone, linestyle="none", marker=point, fillstyle="none")
         if panel.logarithmic:

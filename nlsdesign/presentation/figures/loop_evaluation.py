@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...feedback.control import LoopEvaluation
@@ -21,6 +20,7 @@ from .style import (
     INK,
     LIMIT,
     MUTED,
+    crosses,
     described,
     legend,
     log_axis,
@@ -55,7 +55,8 @@ def torque_responses(responses: Sequence[SineResponse], line: SaturationLine | N
         for panel, values in ((axes[0], response.decibel), (axes[1], response.phase_degrees)):
             panel.plot(response.frequency, values, color=tone, linestyle=dash, marker=point, label=label)
         lost = [f for f, v in zip(response.frequency, response.verdicts, strict=True) if not v.holds]
-        _crosses(axes[0], lost, number)
+        if lost:
+            crosses(axes[0], lost, 0.04 + 0.07 * number, tone)
         words.append(_response_words(label, response, lost))
         if line is not None:
             axes[2].axhline(response.amplitude, color=tone, linestyle=dash, linewidth=1.0)
@@ -175,15 +176,6 @@ def passivity_words(first: float) -> str:
     if np.isnan(first):
         return "unstable, so it has no impedance"
     return f"active from {typeset_number(first)} Hz on" if np.isfinite(first) else "passive"
-
-
-def _crosses(axes: Axes, frequencies: Sequence[float], number: int) -> None:
-    if frequencies:
-        height = np.full(len(frequencies), 0.04 + 0.07 * number)
-        axes.plot(
-            frequencies, height, transform=axes.get_xaxis_transform(), color=look(number).color,
-            linestyle="none", marker="x", markeredgewidth=1.6,
-        )  # fmt: skip
 
 
 def _response_words(label: str, response: SineResponse, lost: Sequence[float]) -> str:

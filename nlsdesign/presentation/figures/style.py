@@ -26,6 +26,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import ArrayLike
 
+from ...foundation.arrays import Array
 from ...foundation.quantity import superscript, typeset_number
 
 
@@ -223,6 +224,14 @@ def label_panel(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> N
     """Give a panel its ordinate, title and legend."""
     axes.set(title=title, ylabel=ordinate)
     legend(axes, columns=columns)
+
+
+def crosses(axes: Axes, at: Array | list[float], height: float, color: str) -> None:
+    """Mark abscissae by crosses at a height, a share of that of the panel."""
+    axes.plot(
+        at, [height] * len(at), transform=axes.get_xaxis_transform(), color=color, linestyle="none",
+        marker="x", markeredgewidth=1.6,
+    )  # fmt: skip
 
 
 def log_axis(axes: Axes, *, abscissa: bool = False) -> None:
