@@ -97,11 +97,11 @@ class SensorRanking:
 
     def rows(self) -> list[list[str]]:
         """Return the table as text: name, gain over the spread, four deviations."""
-        unit = self.unit
+        factor = 1e3 if self.unit == "N*m" else 1.0
         rows = []
         for gain in (*self.gains, self.present):
             share = _share(self.present.spread[0], gain.spread[0])
-            numbers = [_shown(value, unit) for value in (*gain.spread, *gain.exact)]
+            numbers = [f"{factor * value:.3g}" for value in (*gain.spread, *gain.exact)]
             rows.append([gain.candidate.name, share, *numbers])
         return rows
 
@@ -395,7 +395,3 @@ def _share(present: float, now: float) -> str:
     if not np.isfinite(now):
         return "no steady state"
     return f"{present / now:.3g}" if now > 0.0 else "exact"
-
-
-def _shown(value: float, unit: str) -> str:
-    return f"{1e3 * value:.3g}" if unit == "N*m" else f"{value:.3g}"

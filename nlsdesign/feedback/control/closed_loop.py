@@ -434,7 +434,9 @@ class ClosedLoop:
                 raise unknown_name("input of the loop", name, known)
 
     def _check_sources(self, sources: Mapping[str, str]) -> None:
-        known = {f"{PLANT}.{name}" for name in _names(self.plant)}
+        plant = self.plant
+        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
+        known = {f"{PLANT}.{v.name}" for group in groups for v in group}
         known |= {f"{OBSERVER}.{v.name}" for v in self.observer.outputs}
         for name, source in sources.items():
             if source in known or source == name:
@@ -445,11 +447,6 @@ class ClosedLoop:
                 f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
                 next_step="give it in inputs or in wires",
             )  # fmt: skip
-
-
-def _names(model: FlatModel) -> set[str]:
-    groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
-    return {v.name for group in groups for v in group}
 
 
 def _kept(loop: ClosedLoop) -> list[str]:

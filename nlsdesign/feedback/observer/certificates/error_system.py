@@ -108,7 +108,8 @@ def error_system(
         return bounds.outputs[0].lower, bounds.outputs[0].upper, np.zeros(len(cells[0]), dtype=bool)
 
     low, high = (v.reshape(n, n) for v in hull(by_angle, np.linspace(*angles, CELLS + 1)))
-    (low[fast, fast],), (high[fast, fast],) = hull(by_speed, _speeds())
+    speeds = np.concatenate([[0.0], np.geomspace(1e-6, SPEED_LIMIT, 2000)])
+    (low[fast, fast],), (high[fast, fast],) = hull(by_speed, np.concatenate([-speeds[:0:-1], speeds]))
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
         i, j = np.argwhere(~np.isfinite(low + high))[0]
         raise ConvergenceError(
@@ -122,11 +123,6 @@ def error_system(
         angles=(float(angles[0]), float(angles[1])),
         lower=tuple(map(tuple, low.tolist())), upper=tuple(map(tuple, high.tolist())),
     )  # fmt: skip
-
-
-def _speeds() -> Array:
-    edges = np.concatenate([[0.0], np.geomspace(1e-6, SPEED_LIMIT, 2000)])
-    return np.concatenate([-edges[:0:-1], edges])
 
 
 def _slopes(

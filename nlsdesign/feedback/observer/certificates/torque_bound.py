@@ -332,7 +332,9 @@ class _Bounding:
         view, assumed, cells = self.view, self.assumed, self.cells
         z = self._carried(self.rest_of_all)
         table, roundoff = self._step_errors(z)
-        shift, lead = _angle_rounding(self.design, assumed.real), self.lead
+        grid, lead = self.design.compact.angles, self.lead
+        # Rounding moves a look-up as an error of the angle would.
+        shift = 4.0 * ROUNDING[assumed.real] * float(grid[-1] - grid[0] + np.max(np.abs(grid)))
         causes = {
             "encoder": lead * assumed.angle_error,
             "motion": lead * assumed.speed * self.design.step.sample_time / 2.0,
@@ -523,9 +525,3 @@ def _terms(design: ObserverDesign, inner: tuple[str, ...], z: Array, size: float
     terms = [float(np.max(np.abs(_read(design, key, design.compact.angles)[0]))) for key in keys]
     added = float(np.dot(terms, np.max(np.abs(z), axis=(0, 2)))) if keys else 0.0
     return size + 2.0 * added
-
-
-def _angle_rounding(design: ObserverDesign, real: str) -> float:
-    """Return the angle in rad by which rounding moves a look-up."""
-    grid = design.compact.angles
-    return 4.0 * ROUNDING[real] * float(grid[-1] - grid[0] + np.max(np.abs(grid)))
