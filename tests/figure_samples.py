@@ -15,11 +15,11 @@ from nlsdesign.design import (
     Task,
     TaskCurve,
     ToleranceResult,
-    contour_from_curvature,
     curve_for_task,
     tolerance_analysis,
 )
 from nlsdesign.design.optimisation.pareto import FrontPoint
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.feedback.analysis import Chart
 from nlsdesign.feedback.control import (
     LoopMargins,

@@ -11,8 +11,8 @@ import click
 from ..foundation.errors import ValueRangeError
 from ..foundation.quantity import typeset_unit
 from ..foundation.text_files import make_folder
-from .options import LAWS, deck_option, json_option, law_of, measured_option, spring_option
-from .output import examples, show_json, show_table, warn
+from .options import LAWS, deck_option, json_option, law_of, machine_of, measured_option, spring_option
+from .output import examples, show_json, show_lines, show_table, warn
 from .overwriting import out_option
 from .typed_values import Number
 
@@ -99,7 +99,6 @@ def analyse_angle(
     """Tell poles, hidden states and the best sensor over the angle. Poles are sliding and stuck."""
     import numpy as np
 
-    from ..components import declare
     from ..feedback.analysis import (
         EstimateDeviation,
         Observability,
@@ -109,14 +108,13 @@ def analyse_angle(
         rank_drops,
         rank_sensors,
     )
-    from ..foundation.deck import load_deck
     from ..foundation.errors import NlsError
     from ..model import flatten, series_spring, with_outputs
     from ..presentation.figures import observability_over_angle, stability_over_angle, write_figures
     from ..presentation.report import write_analysis_report
     from ..regeneration import range_remarks, swept_angle, usual_last
 
-    declared = declare(load_deck(deck_name))
+    declared = machine_of(deck_name)
     model = flatten(declared)
     torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
     last = usual_last(model) if last is None else last
@@ -271,10 +269,9 @@ def loop(
     deck, with the gain that has them. The observer is the cascade, with the numbers of the deck for the
     machine as well.
     """
-    from ..components import declare, with_moved_load
+    from ..components import with_moved_load
     from ..export import quickest
     from ..feedback.control import LoopRange, cascade_loops, evaluate_loop
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..presentation.figures import write_loop_figures
@@ -282,7 +279,7 @@ def loop(
 
     if options["law"] is None:
         options["law"] = "scheduled" if all(options[name] is None for name in _GAINS) else "pid"
-    law, declared = _law(options), declare(load_deck(deck_name))
+    law, declared = _law(options), machine_of(deck_name)
     fixed, moved = cascade_loops(
         flatten(declared), flatten(with_moved_load(declared)),
         delay=options["delay"], sample_time=options["sample_time"], **law,
@@ -365,11 +362,9 @@ def _show_loop(result: LoopEvaluation) -> None:
         f"coupled at {math.degrees(result.coupled.angle):.3g}°: stable on {int(np.sum(stable_loads))} of "
         f"{stable_loads.size} loads"
     )
-    for sentence in [*result.spread.words(), *(f"finding: {each}" for each in result.findings())]:
-        click.echo(sentence)
+    show_lines([*result.spread.words(), *(f"finding: {each}" for each in result.findings())])
     if result.stable:
-        for onset in result.onsets:
-            click.echo(str(onset))
+        show_lines(result.onsets)
 
 
 def _text(value: float) -> str:

@@ -19,12 +19,13 @@ from .options import (
     export_option,
     joint_option,
     json_option,
+    machine_of,
     measured_option,
     sample_time_option,
     spring_option,
     workers_option,
 )
-from .output import examples, next_command, show_json, show_table, warn
+from .output import examples, next_command, show_json, show_lines, show_table, warn
 from .overwriting import c_names, out_option
 from .typed_values import NamedPath, Number
 
@@ -83,14 +84,12 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     """Refit the numbers that have a spread. Nothing is added to the model."""
     from ..bench.discrepancy import refit, refit_of_run, write_refit
     from ..bench.identification import load_records
-    from ..components import declare
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..presentation.report import write_fit_report
     from ..regeneration import export_machine
 
-    actuator = declare(load_deck(deck_name))
+    actuator = machine_of(deck_name)
     reading = {name: options[name] for name in ("mapping", "hold_out", "joint")}
     measured = load_records(records, flatten(actuator), **reading)
     steps = Steps()
@@ -110,8 +109,7 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
         show_json({**result.to_dict(str(deck)), "report": page, **exported})
         return
     _show_fit(result)
-    for sentence in machine.findings() if machine else ():
-        click.echo(sentence)
+    show_lines(machine.findings() if machine else ())
     click.echo(f"report: {page}")
     following = next_command("diagnose", "--deck", deck, "--records", records, *as_read(**reading))
     click.echo(f"written: {file} and {deck}; next: {following}")
@@ -134,8 +132,7 @@ def _show_fit(result: Refit) -> None:
         for e in result.errors()
     ]
     show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
-    for sentence in result.words():
-        click.echo(sentence)
+    show_lines(result.words())
 
 
 def as_read(mapping: Path | None, hold_out: Sequence[str], joint: str | None = None) -> list[str]:
@@ -230,8 +227,6 @@ def _diagnosed(
     from ..bench.discrepancy import diagnose as find_what_is_missing
     from ..bench.discrepancy import range_findings, verdict_of_run, write_verdict
     from ..bench.identification import load_records
-    from ..components import declare
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..presentation.report import write_diagnosis_report
@@ -239,7 +234,7 @@ def _diagnosed(
 
     command = typed_command("nlsdesign", *sys.argv[1:])
     date = datetime.now().astimezone().isoformat(" ", "minutes")
-    actuator = declare(load_deck(deck_name))
+    actuator = machine_of(deck_name)
     plant, roles = flatten(actuator), _roles(options)
     reading = {name: options[name] for name in ("mapping", "hold_out")}
     measured = load_records(records, plant, joint=joint, **reading)
@@ -345,8 +340,7 @@ def calibrate(
         return
     heads = ("name", "before", "after", "unit", "moved, in spreads", "known from")
     show_table("Numbers", heads, shown_numbers(result.numbers))
-    for sentence in (*record_findings(tests), *result.words()):
-        click.echo(sentence)
+    show_lines((*record_findings(tests), *result.words()))
     click.echo(f"written: {', '.join(map(str, paths.values()))}")
 
 
@@ -372,8 +366,7 @@ def _show_plan(
         show_json(ranked.to_dict())
         return
     show_table("What a calibration buys", ranked.heads, ranked.rows())
-    for sentence in ranked.words():
-        click.echo(sentence)
+    show_lines(ranked.words())
     for title, reason in ranked.left_out.items():
         click.echo(f"{title} is left out: {reason}")
     following = ["--deck", deck_name, "--kind", "KIND", "--records", "FOLDER"]

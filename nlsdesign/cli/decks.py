@@ -21,7 +21,7 @@ from ..foundation.locations import bundled
 from ..foundation.quantity import sources, with_unit
 from ..foundation.text_files import write_text
 from .deck_new import force_option, new, refuse_to_replace, shown_command
-from .options import json_option
+from .options import json_option, machine_of
 from .output import examples, line_width, next_command, show_json, show_table
 from .overwriting import out_file_option
 from .typed_values import NamedPath
@@ -157,9 +157,9 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
             raise click.UsageError("--toml and --json exclude each other; give one")
         click.echo(load_deck(deck_name).path.read_text(encoding="utf-8-sig"), nl=False)
         return
-    from ..components import declare, draw
+    from ..components import draw
 
-    assembly = declare(load_deck(deck_name))
+    assembly = machine_of(deck_name)
     numbers = assembly.quantities()
     if as_json:
         show_json(

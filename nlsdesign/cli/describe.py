@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..foundation.text_files import write_text
-from .options import deck_option, joint_option, json_option
+from .options import deck_option, joint_option, json_option, machine_of
 from .output import examples, next_command, show_json, show_table
 from .overwriting import out_file_option
 from .typed_values import NamedPath
@@ -38,11 +38,9 @@ def records() -> None:
 def describe(folder: Path, deck_name: str, joint: str | None, out: Path, as_json: bool) -> None:
     """Tell what files hold, and write a records.toml to edit. Columns, units, clocks, gaps, faults."""
     from ..bench.identification import describe_records
-    from ..components import declare
-    from ..foundation.deck import load_deck
     from ..model import flatten
 
-    description = describe_records(folder, flatten(declare(load_deck(deck_name))), joint=joint)
+    description = describe_records(folder, flatten(machine_of(deck_name)), joint=joint)
     write_text(out, description.mapping())
     if as_json:
         show_json({**_content(description), "written": str(out)})

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..foundation.errors import NlsError, ValueRangeError
-from .options import DECK_HELP, json_option, spring_option, workers_option
+from .options import DECK_HELP, json_option, machine_of, spring_option, workers_option
 from .output import examples, show_json, show_table, warn
 from .overwriting import out_option
 from .typed_values import NamedPath, parse_number
@@ -107,15 +107,13 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
     if given.pop("listed") is not None:
         show_kinds(context.params["listed"], as_json)
         return
-    from ..components import declare
     from ..design import design_cam, design_summary, write_design
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..presentation.figures import DesignPictures
     from ..presentation.report import write_design_report
     from ..regeneration import range_remarks
 
-    actuator, job = declare(load_deck(deck_name)), _job(**given)
+    actuator, job = machine_of(deck_name), _job(**given)
     steps = Steps()
     target = _target_of(job, actuator, out, steps)
     with steps.step("design"):

@@ -17,12 +17,13 @@ from .options import (
     json_option,
     kind_option,
     law_options,
+    machine_of,
     measured_option,
     real_option,
     sample_time_option,
     spring_option,
 )
-from .output import examples, show_json, show_table, show_written, warn
+from .output import examples, show_json, show_lines, show_table, show_written, warn
 from .overwriting import c_names, out_file_option, out_option
 from .typed_values import NamedPath
 
@@ -79,14 +80,12 @@ def export_code(
 
     The observer is by default the one that is best over the spread of the deck.
     """
-    from ..components import declare
     from ..export import export_c, write_examples
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..regeneration import range_remarks
 
-    declared = declare(load_deck(deck_name))
+    declared = machine_of(deck_name)
     plant = flatten(declared)
     with_examples = chosen.pop("examples")
     with Steps().step(what):
@@ -146,14 +145,12 @@ def export_controller(
     deck_name: str, sample_time: float, out: Path, real: str, fmu: bool, as_json: bool, **chosen: Any
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
-    from ..components import declare
     from ..export import export_c, export_fmu
     from ..feedback.control import largest_torque
-    from ..foundation.deck import load_deck
     from ..model import flatten
     from ..regeneration import range_remarks
 
-    declared = declare(load_deck(deck_name))
+    declared = machine_of(deck_name)
     plant = flatten(declared)
     model, margins = controller_of(plant, sample_time, **chosen)
     most = largest_torque(plant)
@@ -192,12 +189,11 @@ def export_modelica_text(
 
     Names are those of the deck between quotation marks, such as 'motor.angle'.
     """
-    from ..components import declare, smoothed
+    from ..components import smoothed
     from ..export import export_modelica
-    from ..foundation.deck import load_deck
     from ..model import flatten
 
-    assembly = declare(load_deck(deck_name))
+    assembly = machine_of(deck_name)
     model = flatten(smoothed(assembly) if smooth else assembly, outputs=list(outputs) or None)
     show_written(as_json, (), [export_modelica(model, out)])
 
@@ -215,12 +211,11 @@ def export_modelica_text(
 @json_option
 def export_for_mujoco(deck_name: str, smooth: bool, out: Path, as_json: bool) -> None:
     """Write the plant as MJCF with a plug-in for its laws. A Python module tries both out."""
-    from ..components import declare, smoothed
+    from ..components import smoothed
     from ..export import export_mujoco
-    from ..foundation.deck import load_deck
     from ..model import flatten
 
-    assembly = declare(load_deck(deck_name))
+    assembly = machine_of(deck_name)
     written = export_mujoco(flatten(smoothed(assembly) if smooth else assembly), out)
     show_written(as_json, (f"next: python {written.module}",), written.files)
 
@@ -244,11 +239,10 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
 
     Exit status 0 if all do and none was edited, 1 if not, 2 if a file cannot be read.
     """
-    from ..components import deck_digest, declare
+    from ..components import deck_digest
     from ..export import read_exports
-    from ..foundation.deck import load_deck
 
-    exports = read_exports(folder, reference=deck_digest(declare(load_deck(deck_name))) if deck_name else "")
+    exports = read_exports(folder, reference=deck_digest(machine_of(deck_name)) if deck_name else "")
     status = UNREADABLE if exports.problems else TOGETHER if exports.together else APART
     judged = [(str(file.path.relative_to(folder)), file, why)
               for file, why in zip(exports.files, exports.apart, strict=True)]  # fmt: skip
@@ -264,6 +258,5 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
             ("file", "kind", "deck", "digest", "state"),
             [(path, file.kind, file.deck, file.short, why or "belongs") for path, file, why in judged],
         )
-    for sentence in exports.findings():
-        click.echo(sentence)
+    show_lines(exports.findings())
     return status

@@ -18,6 +18,7 @@ from .options import (
     json_option,
     kind_option,
     law_options,
+    machine_of,
     measured_option,
     sample_time_option,
     spring_option,
@@ -106,14 +107,12 @@ def export_fmus(
     **others: Any,
 ) -> None:
     """Write plant, observer, controller as FMUs. Also observer with controller in one."""
-    from ..components import declare
     from ..export import ALL_PLATFORMS, Authorship, export_fmu, write_reference
-    from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..regeneration import range_remarks
 
-    declared, steps = declare(load_deck(deck_name)), Steps()
+    declared, steps = machine_of(deck_name), Steps()
     # Before anything is written: not every system has an observer.
     with steps.step("models"):
         models, reasons, sentences = _models(flatten(declared), what, sample_time, others)

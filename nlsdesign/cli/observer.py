@@ -24,7 +24,7 @@ from .options import (
     sample_time_option,
     spring_option,
 )
-from .output import examples, next_command, show_json, show_table, show_written, warn
+from .output import examples, next_command, show_json, show_lines, show_table, show_written, warn
 from .overwriting import c_names, out_option
 from .typed_values import NamedPath, Number
 
@@ -150,8 +150,7 @@ def observer(
         }  # fmt: skip
         show_json(content | ({} if errors is None else {"errors": errors.content()}))
         return
-    for sentence in sentences:
-        click.echo(sentence)
+    show_lines(sentences)
     if proved is None:
         click.echo("not certified; --kind certified or --certificate proves what can be proved")
     if errors is not None:
@@ -277,8 +276,7 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
         checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in result.checks]
         show_json({"holds": result.holds, "statement": list(proved.statement), "checks": checks})
     else:
-        for sentence in proved.statement:
-            click.echo(sentence)
+        show_lines(proved.statement)
         click.echo(str(result))
         click.echo("the certificate holds" if result.holds else "the certificate DOES NOT HOLD")
     if not result.holds:

@@ -13,6 +13,7 @@ import click
 from .typed_values import Bytes, Number
 
 if TYPE_CHECKING:
+    from ..components import Assembly
     from ..model import FlatModel
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -64,6 +65,14 @@ kind_option = click.option(
     "each angle, with noise from the deck's sensors and assumed disturbances. published: states of Austin et "
     "al. 2015, with the gain of the cascade.",
 )
+
+
+def machine_of(deck_name: str) -> Assembly:
+    """Return the machine that a deck declares: a file, or the name of one that comes with the project."""
+    from ..components import declare
+    from ..foundation.deck import load_deck
+
+    return declare(load_deck(deck_name))
 
 
 def workers_option(command: F) -> F:

@@ -54,13 +54,18 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
+def show_lines(lines: Iterable[object]) -> None:
+    """Print a line for each."""
+    for line in lines:
+        click.echo(str(line))
+
+
 def show_written(as_json: bool, sentences: Sequence[str], files: Sequence[Path], **more: Any) -> None:
     """Print what was written, after sentences on it; or all of it as JSON."""
     if as_json:
         show_json({"sentences": list(sentences), **more, "files": list(files)})
         return
-    for sentence in sentences:
-        click.echo(sentence)
+    show_lines(sentences)
     click.echo(f"written: {', '.join(map(str, files))}")
 
 

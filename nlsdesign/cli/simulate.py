@@ -11,7 +11,7 @@ import click
 
 from ..foundation.errors import ValueRangeError, unknown_name
 from ..foundation.quantity import typeset_unit
-from .options import deck_option, json_option
+from .options import deck_option, json_option, machine_of
 from .output import examples, show_json, show_table
 from .overwriting import out_file_option
 from .typed_signals import BARE, FORMS, given_start, read_inputs, with_given_values
@@ -110,8 +110,7 @@ def simulate(
 
 
 def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
-    from ..components import declare, sharpened, smoothed
-    from ..foundation.deck import load_deck
+    from ..components import sharpened, smoothed
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..presentation.report import SIZES, write_simulation_report
@@ -127,7 +126,7 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     )
     from ..simulation import simulate as integrate
 
-    actuator, values = with_given_values(declare(load_deck(deck_name)), given["values"])
+    actuator, values = with_given_values(machine_of(deck_name), given["values"])
     readings: dict[str, Callable[[Assembly], Assembly]] = {"sharp": sharpened, "smooth": smoothed}
     if given["friction"] in readings:
         actuator = readings[given["friction"]](actuator)
@@ -213,12 +212,10 @@ def predict_record(deck_name: str, record: Path, mapping: Path | None, out: Path
     """Drive a deck with a measured record; write its predictions and print their errors."""
     from ..bench.discrepancy import band_errors, predict
     from ..bench.identification import load_record
-    from ..components import declare
-    from ..foundation.deck import load_deck
     from ..model import flatten
     from ..simulation import rms_against
 
-    actuator = declare(load_deck(deck_name))
+    actuator = machine_of(deck_name)
     records = load_record(record, flatten(actuator), mapping=mapping)
     (measured,) = records.records
     predicted = predict(actuator, records, measured.name)

@@ -12,7 +12,7 @@ from .curves.target import (
     Target,
     TorqueBand,
 )
-from .curves.target_files import read_band, read_target
+from .curves.target_files import read_target
 from .curves.task import Task, read_task, walking_task
 from .curves.task_curve import (
     LeastEnergy,
@@ -89,8 +89,8 @@ from .optimisation.solve import GOALS as GOALS
 from .optimisation.solve import design_cam
 from .optimisation.stock import CoilStock, RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
-from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
-from .statics.declared_cam import cam_from_profile, contour_of_cam
+from .statics.contour import Contour, contour_from_lever_arm
+from .statics.declared_cam import contour_of_cam
 from .statics.equilibrium import elastic_law, equilibrium_torque
 from .tolerance.causes import Cause, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
@@ -177,8 +177,6 @@ __all__ = [
     "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
-    "cam_from_profile",
-    "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
     "curve_for_task",
@@ -191,7 +189,6 @@ __all__ = [
     "motor_and_gear",
     "motor_cycle",
     "pareto",
-    "read_band",
     "read_job",
     "read_target",
     "read_task",

@@ -53,34 +53,20 @@ def loopback(host: str) -> str:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a request is not answered.
-
-    Parameters
-    ----------
-    status
-        Of HTTP.
-    words
-        One sentence for whoever reads it.
-    """
+    """Why a request is not answered."""
 
     status: int
-    words: str
+    words: str  # one sentence for whoever reads it
 
 
 @dataclass(frozen=True)
 class Access:
-    """What a request must show.
+    """What a request must show."""
 
-    Parameters
-    ----------
-    host, port
-        Where the server listens; the host is a loopback address.
-    token
-        Random; part of the printed address only.
-    """
-
+    # host, port: where the server listens; the host is a loopback address
     host: str
     port: int
+    # token: random; part of the printed address only
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
 
     @property
@@ -108,7 +94,9 @@ class Access:
             return Refusal(405, "The live page knows GET and POST only.")
         if (socket or method == "POST") and headers.get("origin") not in self.origins:
             return Refusal(403, "Another page may not drive the live page.")
-        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and not _opened(headers):
+        # Somebody may follow a link to the page, which gives the place of the link nothing.
+        opened = headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
+        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and not opened:
             return Refusal(403, "Another page may not load parts of the live page.")
         if (socket or scope["path"].startswith("/api/")) and not self._shown(headers, socket=socket):
             return Refusal(
@@ -123,11 +111,6 @@ class Access:
         else:
             given = headers.get("authorization", "").removeprefix("Bearer ")
         return hmac.compare_digest(given.encode(), self.token.encode())
-
-
-def _opened(headers: dict[str, str]) -> bool:
-    """Tell whether somebody followed a link to the page, which gives the place of the link nothing."""
-    return headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
 
 
 def gate(application: Application, access: Access) -> Application:

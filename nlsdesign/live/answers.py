@@ -43,51 +43,31 @@ class WorkStage(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class LiveColumn:
-    """A row of numbers over the cam angle, in SI.
+    """A row of numbers over the cam angle, in SI."""
 
-    Parameters
-    ----------
-    name, unit, description
-        What it is.
-    values
-        Shape (n,).
-    """
-
+    # name, unit, description: what it is
     name: str
     unit: str
     description: str
-    values: Array
+    values: Array  # shape (n,)
 
 
 @dataclass(frozen=True)
 class LimitMargin:
-    """How a design stands to one side of a limit, in SI.
+    """How a design stands to one side of a limit, in SI."""
 
-    Parameters
-    ----------
-    limit, of
-        Name of the limit and what it bounds.
-    value, bound
-        The value that comes closest, and the bound.
-    margin
-        Distance to the bound in the unit; negative where the limit is broken.
-    unit, shown_unit
-        SI unit and that in which people read it.
-    upper
-        Whether the bound is the largest that is allowed.
-    active
-        Whether the design sits on it.
-    """
-
+    # limit, of: name of the limit and what it bounds
     limit: str
     of: str
+    # value, bound: the value that comes closest, and the bound
     value: float
     bound: float
-    margin: float
+    margin: float  # distance to the bound in the unit; negative where the limit is broken
+    # unit, shown_unit: SI unit and that in which people read it
     unit: str
     shown_unit: str
-    upper: bool
-    active: bool
+    upper: bool  # whether the bound is the largest that is allowed
+    active: bool  # whether the design sits on it
 
     def shown(self, value: float) -> str:
         """Return a number in the unit of the limit as text."""
@@ -96,109 +76,59 @@ class LimitMargin:
 
 @dataclass(frozen=True)
 class ShownNumber:
-    """A number of the design in SI.
-
-    Parameters
-    ----------
-    name, value, unit, shown_unit
-        As in the deck.
-    free
-        Whether the design chose it.
-    """
+    """A number of the design in SI."""
 
     name: str
     value: float
     unit: str
     shown_unit: str
-    free: bool
+    free: bool  # whether the design chose it
 
 
 @dataclass(frozen=True, eq=False)
 class LiveControls:
-    """What a designer can move, as it stands now; numbers in SI.
+    """What a designer can move, as it stands now; numbers in SI."""
 
-    Parameters
-    ----------
-    title, material
-        Of the actuator; the material is empty for that of the deck.
-    points
-        Rows (angle, torque) of the target.
-    limits
-        Rows (kind, words, value, unit, shown unit, upper, by default).
-    numbers
-        Rows (name, value, unit, shown unit, free, minimum, maximum, source); infinite where there is no end.
-    contour
-        Name of the contour.
-    contour_free
-        Whether it may change.
-    can_undo, can_redo
-        Whether there is a step back or forth.
-    """
-
+    # title, material: of the actuator; the material is empty for that of the deck
     title: str
     material: str
-    points: tuple[Any, ...]
-    limits: tuple[Any, ...]
+    points: tuple[Any, ...]  # rows (angle, torque) of the target
+    limits: tuple[Any, ...]  # rows (kind, words, value, unit, shown unit, upper, by default)
+    # numbers: rows (name, value, unit, shown unit, free, minimum, maximum, source); infinite where there is
+    # no end
     numbers: tuple[Any, ...]
-    contour: str
-    contour_free: bool
+    contour: str  # name of the contour
+    contour_free: bool  # whether it may change
+    # can_undo, can_redo: whether there is a step back or forth
     can_undo: bool
     can_redo: bool
 
 
 @dataclass(frozen=True, eq=False)
 class DesignView:
-    """One design over the angle.
+    """One design over the angle."""
 
-    Parameters
-    ----------
-    revision
-        Of the question that it answers.
-    checked
-        Whether the torque is that of the finished assembly, flattened anew; otherwise it is what the program
-        saw at the nodes of the contour.
-    columns
-        Torque, target, error, lever arm, stiffness, radius of curvature, extension, tension, and strain and
-        stress of each piece of rubber, all over ``columns[0]``, the angle.
-    rms_error, largest_error
-        Of the torque over the angle in N·m.
-    relative_error
-        Rms error over the largest torque of the target.
-    met
-        Whether that is within the 1 % that a design may miss.
-    margins
-        To each limit.
-    active
-        Names of the limits that the design sits on.
-    numbers
-        That the design chose or was given.
-    contour
-        Points of the lip in the frame of the cam, shape (n, 2), in m.
-    rubber_volume
-        In m³.
-    strain_end
-        Strain to which the rubber may be believed; infinite without rubber.
-    beyond
-        In words where it is stretched further, how far, and what to change.
-    made_error
-        Rms error in N·m that 95 % of the springs stay below whose numbers lie within their declared spreads;
-        ``None`` before the check, and where no number is spread.
-    """
-
-    revision: int
+    revision: int  # of the question that it answers
+    # checked: whether the torque is that of the finished assembly, flattened anew; otherwise it is what the
+    # program saw at the nodes of the contour
     checked: bool
+    # columns: torque, target, error, lever arm, stiffness, radius of curvature, extension, tension, and
+    # strain and stress of each piece of rubber, all over columns[0], the angle
     columns: tuple[LiveColumn, ...]
+    # rms_error, largest_error: of the torque over the angle in N·m
     rms_error: float
     largest_error: float
-    relative_error: float
-    met: bool
-    margins: tuple[LimitMargin, ...]
-    active: tuple[str, ...]
-    numbers: tuple[ShownNumber, ...]
-    contour: Array
-    rubber_volume: float
-    strain_end: float = math.inf
-    beyond: tuple[str, ...] = ()
+    relative_error: float  # rms error over the largest torque of the target
+    met: bool  # whether that is within the 1 % that a design may miss
+    margins: tuple[LimitMargin, ...]  # to each limit
+    active: tuple[str, ...]  # names of the limits that the design sits on
+    numbers: tuple[ShownNumber, ...]  # that the design chose or was given
+    contour: Array  # points of the lip in the frame of the cam, shape (n, 2), in m
+    rubber_volume: float  # in m³
+    strain_end: float = math.inf  # strain to which the rubber may be believed; infinite without rubber
+    beyond: tuple[str, ...] = ()  # in words where it is stretched further, how far, and what to change
+    # made_error: rms error in N·m that 95 % of the springs stay below whose numbers lie within their declared
+    # spreads; None before the check, and where no number is spread
     made_error: float | None = None
 
     def column(self, name: str) -> LiveColumn:
@@ -208,37 +138,18 @@ class DesignView:
 
 @dataclass(frozen=True, eq=False)
 class LiveAnswer:
-    """The answer to an edit.
+    """The answer to an edit."""
 
-    Parameters
-    ----------
-    revision
-        Number of the question; each edit, undo and redo makes a new one.
-    state
-        Whether there is a design of this question.
-    message
-        In words: why there is no design, or what to know of it.
-    source
-        How it was found.
-    design
-        The last good design; ``None`` before the first. Where its revision is not that of the answer it
-        belongs to an earlier question and must be shown as such.
-    controls
-        What can be moved.
-    seconds
-        It took to answer.
-    conflicts
-        Limits that contradict each other, where they do.
-    """
-
-    revision: int
-    state: AnswerState
-    message: str
-    source: AnswerSource
+    revision: int  # number of the question; each edit, undo and redo makes a new one
+    state: AnswerState  # whether there is a design of this question
+    message: str  # in words: why there is no design, or what to know of it
+    source: AnswerSource  # how it was found
+    # design: the last good design; None before the first. Where its revision is not that of the answer it
+    # belongs to an earlier question and must be shown as such.
     design: DesignView | None
-    controls: LiveControls
-    seconds: float
-    conflicts: tuple[str, ...] = ()
+    controls: LiveControls  # what can be moved
+    seconds: float  # that answering took
+    conflicts: tuple[str, ...] = ()  # limits that contradict each other, where they do
 
     @property
     def stale(self) -> bool:
@@ -248,148 +159,78 @@ class LiveAnswer:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """Cam, cable and rubber in the plane at one angle, in m; the cable pulls to the right.
+    """Cam, cable and rubber in the plane at one angle, in m; the cable pulls to the right."""
 
-    Parameters
-    ----------
-    angle
-        Of the cam in rad.
-    halves
-        Closed outlines of the cam, the right one and, for a cable through the centre, its twin.
-    cables
-        Lines from the cam to the rubber, one for each side.
-    contacts, guides
-        Where each cable leaves the cam, and the end of its free length as it is drawn.
-    rubbers
-        Corners of each piece of rubber (stretched to scale), shape (4, 2).
-    extent
-        Half the width and height of a frame that holds the mechanism at any angle.
-    remark
-        What is not to scale.
-    """
-
-    angle: float
+    angle: float  # of the cam in rad
+    # halves: closed outlines of the cam, the right one and, for a cable through the centre, its twin
     halves: tuple[Array, ...]
-    cables: tuple[Array, ...]
+    cables: tuple[Array, ...]  # lines from the cam to the rubber, one for each side
+    # contacts, guides: where each cable leaves the cam, and the end of its free length as it is drawn
     contacts: tuple[Array, ...]
     guides: tuple[Array, ...]
-    rubbers: tuple[Array, ...]
-    extent: tuple[float, float]
-    remark: str
+    rubbers: tuple[Array, ...]  # corners of each piece of rubber (stretched to scale), shape (4, 2)
+    extent: tuple[float, float]  # half the width and height of a frame that holds the mechanism at any angle
+    remark: str  # what is not to scale
 
 
 @dataclass(frozen=True, eq=False)
 class PoleGroup:
-    """Poles of the plant in one mode at one angle.
+    """Poles of the plant in one mode at one angle."""
 
-    Parameters
-    ----------
-    mode, words
-        Which mode of the dry friction, and what was linearised.
-    real, imaginary
-        In 1/s and rad/s, shape (n,).
-    """
-
+    # mode, words: which mode of the dry friction, and what was linearised
     mode: str
     words: str
+    # real, imaginary: in 1/s and rad/s, shape (n,)
     real: Array
     imaginary: Array
 
 
 @dataclass(frozen=True, eq=False)
 class SeenStates:
-    """What a sensor of the angle shows of the states at one angle.
+    """What a sensor of the angle shows of the states at one angle."""
 
-    Parameters
-    ----------
-    measured
-        Signal.
-    rank, states
-        Rank of the observability matrix and number of states.
-    condition
-        Of that matrix, scaled; infinite where the rank is not full.
-    verdict
-        In words.
-    """
-
-    measured: str
+    measured: str  # signal
+    # rank, states: rank of the observability matrix and number of states
     rank: int
     states: int
-    condition: float
-    verdict: str
+    condition: float  # of that matrix, scaled; infinite where the rank is not full
+    verdict: str  # in words
 
 
 @dataclass(frozen=True, eq=False)
 class LoopResponse:
-    """The torque loop at one angle, linearised between the counts.
+    """The torque loop at one angle, linearised between the counts."""
 
-    Parameters
-    ----------
-    frequencies
-        In Hz.
-    magnitude, phase
-        Of torque over wanted torque, in dB and degrees.
-    stable
-        Whether the loop is stable there.
-    mode
-        Of the plant's dry friction.
-    words
-        Which controller and observer, and what the response holds for.
-    """
-
-    frequencies: Array
+    frequencies: Array  # in Hz
+    # magnitude, phase: of torque over wanted torque, in dB and degrees
     magnitude: Array
     phase: Array
-    stable: bool
-    mode: str
-    words: str
+    stable: bool  # whether the loop is stable there
+    mode: str  # of the plant's dry friction
+    words: str  # which controller and observer, and what the response holds for
 
 
 @dataclass(frozen=True, eq=False)
 class Lazy:
-    """Something that is computed when asked for.
+    """Something that is computed when asked for."""
 
-    Parameters
-    ----------
-    state
-        How far it is.
-    revision
-        Of the design that it holds for.
-    value
-        Where it is done.
-    message
-        Why it failed, or how far it is.
-    """
-
-    state: WorkStage
-    revision: int
-    value: Any = None
-    message: str = ""
+    state: WorkStage  # how far it is
+    revision: int  # of the design that it holds for
+    value: Any = None  # where it is done
+    message: str = ""  # why it failed, or how far it is
 
 
 @dataclass(frozen=True, eq=False)
 class AngleAnswer:
-    """What holds at one angle.
+    """What holds at one angle."""
 
-    Parameters
-    ----------
-    angle
-        In rad.
-    revision
-        Of the design.
-    mechanism
-        Cam, cable and rubber to scale; ``None`` where the contour has no outline.
-    readings
-        The columns of the design at this angle, by interpolation; each with one value.
-    observability, poles, loop
-        Each with a state of its own; the value is :class:`SeenStates`, a tuple of :class:`PoleGroup`, and
-        :class:`LoopResponse`.
-    """
-
-    angle: float
+    angle: float  # in rad
     revision: int
-    mechanism: Mechanism | None
+    mechanism: Mechanism | None  # cam, cable and rubber to scale; None where the contour has no outline
+    # readings: the columns of the design at this angle, by interpolation; each with one value
     readings: tuple[LiveColumn, ...]
+    # observability, poles, loop: each with a state of its own; the value is SeenStates, a tuple of PoleGroup,
+    # and LoopResponse
     observability: Lazy
     poles: Lazy
     loop: Lazy

@@ -59,7 +59,9 @@ def mechanism_at(
     corners = np.array([clamp + up, [wall, end[1] + half], [wall, end[1] - half], clamp - up])
     cable = np.vstack([line, clamp])
     sides = (1.0, -1.0) if both else (1.0,)
-    outlines = contour.outlines(angle) if both else (_one_lip(contour, angle),)
+    # Of one lip the sector between it and the centre is drawn.
+    lip = np.vstack([[0.0, 0.0], contour.points, [0.0, 0.0]])
+    outlines = contour.outlines(angle) if both else (turn(lip, angle),)
     short = "; the rubber is drawn shorter than it is" if shown < rest_length + extensions[0] else ""
     return Mechanism(
         angle=angle,
@@ -85,13 +87,6 @@ def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Ar
     return np.vstack([wrapped, contact, end]), contact, end
 
 
-def _one_lip(contour: Contour, angle: float) -> Array:
-    """Return the sector between the lip and the centre, closed, in the resting frame."""
-    points = contour.points
-    result: Array = turn(np.vstack([[0.0, 0.0], points, [0.0, 0.0]]), angle)
-    return result
-
-
 _GRID = 21
 """Angles over which the typical sizes of states are taken, as observability is scaled by them."""
 _LOOP_ANGLES = 41
@@ -101,24 +96,12 @@ _SAMPLE_TIME = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class AngleView:
-    """A design that can be looked at angle by angle.
+    """A design that can be looked at angle by angle."""
 
-    Parameters
-    ----------
-    view
-        What is shown of it over the angle.
-    contour
-        Of its cam.
-    cam
-        Names around it.
-    make
-        Gives the changed assembly; asked when it is first needed.
-    """
-
-    view: DesignView
-    contour: Contour
-    cam: CamNames
-    make: Callable[[], Assembly]
+    view: DesignView  # what is shown of it over the angle
+    contour: Contour  # of its cam
+    cam: CamNames  # names around it
+    make: Callable[[], Assembly]  # gives the changed assembly; asked when it is first needed
 
     @cached_property
     def machine(self) -> Assembly:

@@ -26,45 +26,21 @@ _PATIENCE = 2.0
 
 @dataclass(frozen=True)
 class WorkState:
-    """How far a piece of work is.
-
-    Parameters
-    ----------
-    name
-        Of the work.
-    revision
-        Of the design that it is for.
-    state
-        How far it is.
-    message
-        Stage, or why it failed.
-    seconds
-        Since it began.
-    value
-        What came out.
-    """
+    """How far a piece of work is."""
 
     name: str
-    revision: int
-    state: WorkStage
-    message: str
-    seconds: float
-    value: Any = None
+    revision: int  # of the design that it is for
+    state: WorkStage  # how far it is
+    message: str  # stage, or why it failed
+    seconds: float  # since it began
+    value: Any = None  # what came out
 
 
 class BackgroundWork:
     """One call in a process of its own.
 
-    Parameters
-    ----------
-    name
-        Of the work, for people.
-    revision
-        Of the design that it is for.
-    work
-        Function of a module, called with a function that takes a stage in words, and with the arguments.
-    arguments
-        Picklable.
+    ``revision``: of the design that it is for. ``work``: function of a module, called with a function that
+    takes a stage in words, and with the arguments.
     """
 
     def __init__(

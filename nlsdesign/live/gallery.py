@@ -35,24 +35,12 @@ _ROOM = 2.0
 
 @dataclass(frozen=True)
 class GalleryCard:
-    """One actuator to begin from.
+    """One actuator to begin from."""
 
-    Parameters
-    ----------
-    name
-        By which it is chosen.
-    kind
-        ``"deck"`` or ``"template"``.
-    line
-        What it is, in one line.
-    reason
-        Why no cam can be designed for it; empty where it can.
-    """
-
-    name: str
-    kind: str
-    line: str
-    reason: str
+    name: str  # by which it is chosen
+    kind: str  # "deck" or "template"
+    line: str  # what it is, in one line
+    reason: str  # why no cam can be designed for it; empty where it can
 
 
 def gallery_cards() -> tuple[GalleryCard, ...]:

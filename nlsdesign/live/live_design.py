@@ -14,7 +14,7 @@ from .edits import LiveEdit
 from .question import LiveQuestion, finite_in
 from .saved import SavedDesign, saved
 from .views import controls_of, holding, not_kept, quick_view_of
-from .work import FullDesign, LiveTask, LiveWork, ToleranceCloud, angle_view_of, full_answer
+from .work import FullDesign, LiveTask, LiveWork, ToleranceCloud, full_answer
 
 MOST_SNAPSHOTS = 8
 """Designs that are kept side by side."""
@@ -56,41 +56,19 @@ class Snapshots(dict[str, Snapshot]):
 
 @dataclass(frozen=True, eq=False)
 class LiveMoment:
-    """A question with its answer, and the last good design, which may be that of an earlier question.
+    """A question with its answer, and the last good design, which may be that of an earlier question."""
 
-    Parameters
-    ----------
-    question
-        What was asked.
-    answer
-        What was answered.
-    solved
-        The last good design; ``None`` before the first, and where its program is not kept.
-    numbers
-        Its numbers, which stay without the program.
-    shown
-        That design angle by angle.
-    """
-
-    question: LiveQuestion
-    answer: LiveAnswer
+    question: LiveQuestion  # what was asked
+    answer: LiveAnswer  # what was answered
+    # solved: the last good design; None before the first, and where its program is not kept
     solved: ParametricDesign | None
-    numbers: DesignedNumbers | None
-    shown: AngleView | None
+    numbers: DesignedNumbers | None  # its numbers, which stay without the program
+    shown: AngleView | None  # that design angle by angle
 
     @property
     def values(self) -> dict[str, float]:
         """Numbers of that design in SI by name; empty without one."""
         return {} if self.numbers is None else self.numbers.values
-
-    def without_program(self) -> LiveMoment:
-        """Return the moment without the program of its design, which can be made again."""
-        return replace(self, solved=None)
-
-    def with_controls(self, *, can_undo: bool, can_redo: bool) -> LiveMoment:
-        """Return the moment with controls that offer the steps there are."""
-        controls = controls_of(self.question, can_undo=can_undo, can_redo=can_redo)
-        return replace(self, answer=replace(self.answer, controls=controls))
 
     def under_revision(self, revision: int) -> LiveMoment:
         """Return a moment of before as the present one."""
@@ -102,29 +80,6 @@ class LiveMoment:
         return replace(self, answer=answer, shown=shown)
 
 
-def first_moment(solver: ParametricSolver, question: LiveQuestion, values: dict[str, float]) -> LiveMoment:
-    """Return the moment with which a session begins.
-
-    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
-    """
-    return _answered(solver, question, None, None, values)
-
-
-def next_moment(solver: ParametricSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
-    """Return the moment of a changed question, answered from the design of the one before."""
-    return _answered(solver, question, before, before.solved, before.values)
-
-
-def opened_moment(
-    solver: ParametricSolver, question: LiveQuestion, before: LiveMoment, values: dict[str, float]
-) -> LiveMoment:
-    """Return the moment of a question that was opened, answered as if nothing had been before.
-
-    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
-    """
-    return _answered(solver, question, before, None, values)
-
-
 def settled_moment(solver: ParametricSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
     """Return the moment with the whole design as its answer, beside which the next drag begins."""
     question = moment.question
@@ -132,7 +87,9 @@ def settled_moment(solver: ParametricSolver, moment: LiveMoment, full: FullDesig
     answer = full_answer(full, question, moment.answer, quick)
     if full.design is None:
         return replace(moment, answer=answer)
-    shown = angle_view_of(answer.design, full.design, question) if answer.design else moment.shown
+    shown, finished = moment.shown, full.design
+    if answer.design:
+        shown = AngleView(answer.design, finished.contour, question.cam, lambda: finished.actuator)
     solved = solver.beside_design(question, full.design)
     numbers = moment.numbers if solved is None else solved.numbers
     return LiveMoment(question, answer, solved or moment.solved, numbers, shown)
@@ -145,6 +102,11 @@ def _answered(
     beside: ParametricDesign | None,
     values: dict[str, float],
 ) -> LiveMoment:
+    """Return the moment of a question.
+
+    ``beside``, or else ``values`` in SI by name, is the design from which it is answered; a question that was
+    opened, and the first one, are answered as if nothing had been before.
+    """
     began = time.perf_counter()
     revision = before.answer.revision + 1 if before else 1
     solved, outcome = solver.answer(question, beside, values)
@@ -182,12 +144,7 @@ MOST_UNDO = 200
 class LiveHistory:
     """The moments of one session; one whose program the solver has dropped goes on without it.
 
-    Parameters
-    ----------
-    question
-        With which it begins.
-    values
-        Numbers in SI of a design to begin beside, by name; empty without one.
+    ``values``: numbers in SI of a design to begin beside, by name; empty without one.
     """
 
     def __init__(self, question: LiveQuestion, values: dict[str, float]) -> None:
@@ -195,11 +152,11 @@ class LiveHistory:
         self._grip: str | None = None
         self.past: list[LiveMoment] = []
         self.future: list[LiveMoment] = []
-        self.now = first_moment(self._solver, question, values)
+        self.now = _answered(self._solver, question, None, None, values)
 
     def ask(self, question: LiveQuestion, drag: str | None, *, last: bool = False) -> None:
         """Make a changed question with its answer the present moment."""
-        moment = next_moment(self._solver, question, self.now)
+        moment = _answered(self._solver, question, self.now, self.now.solved, self.now.values)
         if drag is None or drag != self._grip:
             self.past = [*self.past, self.now][-MOST_UNDO:]
         self._grip, self.future = None if last else drag, []
@@ -210,7 +167,7 @@ class LiveHistory:
 
         ``values``: numbers in SI of a design to begin beside; empty without one.
         """
-        moment = opened_moment(self._solver, question, self.now, values)
+        moment = _answered(self._solver, question, self.now, None, values)
         self.past, self.future, self._grip = [*self.past, self.now][-MOST_UNDO:], [], None
         self._go_to(moment)
 
@@ -236,8 +193,9 @@ class LiveHistory:
         for row in (self.past, self.future):
             for k, each in enumerate(row):
                 if each.solved is not None and not self._solver.keeps(each.solved):
-                    row[k] = each.without_program()
-        self.now = moment.with_controls(can_undo=bool(self.past), can_redo=bool(self.future))
+                    row[k] = replace(each, solved=None)
+        controls = controls_of(moment.question, can_undo=bool(self.past), can_redo=bool(self.future))
+        self.now = replace(moment, answer=replace(moment.answer, controls=controls))
 
 
 _LARGEST_ANGLE = 6.3
@@ -250,12 +208,8 @@ class LiveDesign:
     (``SettleDesign()``) in a process of its own; its answer replaces the quick one when
     :meth:`poll` finds it done.
 
-    Parameters
-    ----------
-    question
-        With which it begins, for instance ``gallery_question("cam-actuator")``.
-    values
-        Numbers in SI of a design to begin beside, as :func:`~.saved.reopened` gives them.
+    ``question``: with which it begins, for instance ``gallery_question("cam-actuator")``. ``values``: numbers
+    in SI of a design to begin beside, as :func:`~.saved.reopened` gives them.
     """
 
     def __init__(self, question: LiveQuestion, values: dict[str, float] | None = None) -> None:

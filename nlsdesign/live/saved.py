@@ -36,21 +36,11 @@ _HEAD = "# Asked on the live page. `nlsdesign design --deck deck.toml --task des
 
 @dataclass(frozen=True)
 class SavedDesign:
-    """A live design as three TOML texts.
+    """A live design as three TOML texts."""
 
-    Parameters
-    ----------
-    deck
-        The actuator with the numbers that were given.
-    job
-        Target, limits and what is free: a design file.
-    begin
-        Title, points and the numbers at which the last design stood, so that it is found again.
-    """
-
-    deck: str
-    job: str
-    begin: str = ""
+    deck: str  # the actuator with the numbers that were given
+    job: str  # target, limits and what is free: a design file
+    begin: str = ""  # title, points and the numbers at which the last design stood, so that it is found again
 
 
 def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
@@ -64,7 +54,7 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
     lines += [f"TabulatedTorque = {{angles = {angles}, torques = {torques}}}", "", "[limits]"]
     for name, value in question.limits.items():
         kind = limit_kinds()[name]
-        lines.append(f'{name} = {{{kind.described.field} = "{float(value)!r} {kind.unit}"}}')
+        lines.append(f'{name} = {{{kind.field} = "{float(value)!r} {kind.unit}"}}')
     ranges = [
         f'{{name = {json.dumps(name)}, minimum = "{float(low)!r} {question.numbers[name].unit}", '
         f'maximum = "{float(high)!r} {question.numbers[name].unit}"}}'

@@ -29,10 +29,7 @@ Asked = Mapping[str, Any]
 class PageQuestions:
     """Does what a page asks.
 
-    Parameters
-    ----------
-    news
-        The design, and how the page is told of it.
+    ``news``: the design, and how the page is told of it.
     """
 
     def __init__(self, news: SessionNews) -> None:
@@ -128,14 +125,7 @@ _NEWS = 0.5
 class SessionDesign:
     """The design of one session.
 
-    Parameters
-    ----------
-    deck
-        Name or file of the deck that it begins with; empty for the first of the gallery.
-    folder
-        That holds what is uploaded.
-    outbox
-        To page and server.
+    ``deck``: name or file of the deck that it begins with; empty for the first of the gallery.
     """
 
     def __init__(self, deck: str, folder: str, outbox: Outbox) -> None:

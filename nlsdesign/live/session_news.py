@@ -131,12 +131,7 @@ _MOST_STAGES = 60
 class WorkNews:
     """News of the work of one design.
 
-    Parameters
-    ----------
-    live
-        The design.
-    records
-        Folder of the records that were uploaded.
+    ``records``: folder of the records that were uploaded.
     """
 
     def __init__(self, live: LiveDesign, records: Path) -> None:
@@ -248,16 +243,8 @@ _REST = 0.4
 class SessionNews:
     """The design of a session and what its page is told of it.
 
-    Parameters
-    ----------
-    live
-        The design.
-    records
-        Folder of the records that are uploaded.
-    outbox
-        To the page.
-    trouble
-        Why this is not the design that was asked for; empty if it is.
+    ``records``: folder of the records that are uploaded. ``trouble``: why this is not the design that was
+    asked for; empty if it is.
     """
 
     def __init__(self, live: LiveDesign, records: Path, outbox: Outbox, *, trouble: str = "") -> None:

@@ -34,12 +34,8 @@ _WAIT = 300.0
 class SessionProcess:
     """A process that holds the design of one session.
 
-    Parameters
-    ----------
-    deck
-        Name or file of the deck that it begins with; empty for the first of the gallery.
-    packages
-        What the program was extended by, as named on the command line.
+    ``deck``: name or file of the deck that it begins with; empty for the first of the gallery. ``packages``:
+    what the program was extended by, as named on the command line.
     """
 
     def __init__(self, deck: str, packages: tuple[str, ...] = ()) -> None:

@@ -126,23 +126,12 @@ QUIET = 10.0
 
 @dataclass(eq=False)
 class Session:
-    """The design of one tab.
+    """The design of one tab."""
 
-    Parameters
-    ----------
-    name
-        Random; the tab keeps it.
-    process
-        That computes.
-    shown
-        Number of the socket that shows it, zero for none.
-    touched
-        When something was last done with it, in seconds of a steady clock.
-    """
-
-    name: str
-    process: SessionProcess
-    shown: int = 0
+    name: str  # random; the tab keeps it
+    process: SessionProcess  # that computes
+    shown: int = 0  # number of the socket that shows it, zero for none
+    # touched: when something was last done with it, in seconds of a steady clock
     touched: float = field(default_factory=time.monotonic)
 
     def __post_init__(self) -> None:
@@ -152,12 +141,7 @@ class Session:
 class Sessions:
     """All sessions of one server.
 
-    Parameters
-    ----------
-    begin
-        Returns a process that is not started yet.
-    clock
-        Steady, in seconds.
+    ``begin``: returns a process that is not started yet.
     """
 
     def __init__(

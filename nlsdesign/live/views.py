@@ -50,11 +50,6 @@ def in_words(sentence: str, limits: Mapping[str, LimitNumber] = _NO_LIMITS) -> s
     return re.sub(rf"\b(?:{names})\b", read, stated)
 
 
-def shown_bound(margin: LimitMargin) -> str:
-    """Return a side of a limit in words: what it bounds, the side, the number with its unit."""
-    return f"{margin.of} {'≤' if margin.upper else '≥'} {shown_value(margin, margin.bound)}"
-
-
 def shown_value(margin: LimitMargin, value: float) -> str:
     """Return a number of a limit in the unit in which people read it."""
     return limit_kinds()[margin.limit].shown(value) if margin.limit in limit_kinds() else margin.shown(value)
@@ -62,7 +57,11 @@ def shown_value(margin: LimitMargin, value: float) -> str:
 
 def holding(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
     """Return what a design sits on in words, without limits that are shown and not kept."""
-    words = [shown_bound(each) for each in margins if each.active and question.keeps(each.limit)]
+    words = [
+        f"{each.of} {'≤' if each.upper else '≥'} {shown_value(each, each.bound)}"
+        for each in margins
+        if each.active and question.keeps(each.limit)
+    ]
     if question.contour not in question.free:
         words.append("the contour, which is held")
     return words

@@ -8,6 +8,7 @@ import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -115,15 +116,9 @@ class TorqueLoop(LiveTask):
 
 @dataclass(frozen=True)
 class DiagnoseRecords(LiveTask):
-    """What bench records say that the declared machine lacks: :class:`DiagnosisAnswer`.
+    """What bench records say that the declared machine lacks: :class:`DiagnosisAnswer`."""
 
-    Parameters
-    ----------
-    folder
-        Of the records, as for ``load_records``; bounded in number and size of files.
-    """
-
-    folder: Path
+    folder: Path  # of the records, as for load_records; bounded in number and size of files
 
     def call(
         self, question: LiveQuestion, shown: AngleView | None
@@ -200,27 +195,13 @@ class LiveWork:
 
 @dataclass(frozen=True, eq=False)
 class CloudAnswer:
-    """What the spreads of all numbers do to the torque.
+    """What the spreads of all numbers do to the torque."""
 
-    Parameters
-    ----------
-    angles
-        In rad.
-    nominal
-        Torque without deviations in N·m.
-    band
-        Torque below which 5, 50 and 95 % of the springs lie, shape (3, angles).
-    errors
-        Rms error of each draw in N·m.
-    rows
-        Summary: pairs of text.
-    """
-
-    angles: Array
-    nominal: Array
-    band: Array
-    errors: Array
-    rows: tuple[tuple[str, str], ...]
+    angles: Array  # in rad
+    nominal: Array  # torque without deviations in N·m
+    band: Array  # torque below which 5, 50 and 95 % of the springs lie, shape (3, angles)
+    errors: Array  # rms error of each draw in N·m
+    rows: tuple[tuple[str, str], ...]  # summary: pairs of text
 
 
 def tolerance_cloud(
@@ -234,30 +215,15 @@ def tolerance_cloud(
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisAnswer:
-    """What a diagnosis came to.
+    """What a diagnosis came to."""
 
-    Parameters
-    ----------
-    verdict
-        ``none``, ``named``, ``unknown``, ``undecidable`` or ``data_suspect``.
-    effects
-        What was named, in words.
-    gap
-        Block, role of the records, and error before and after with noise floor and signal, in the unit.
-    course
-        A held-out record over time: name, quantity, unit, time, measured, before, after.
-    words
-        The whole verdict as text.
-    deck
-        The better model as a deck.
-    """
-
-    verdict: str
-    effects: tuple[str, ...]
+    verdict: str  # none, named, unknown, undecidable or data_suspect
+    effects: tuple[str, ...]  # what was named, in words
+    # gap: block, role of the records, and error before and after with noise floor and signal, in the unit
     gap: dict[str, Any]
-    course: dict[str, Any]
-    words: str
-    deck: str
+    course: dict[str, Any]  # a held-out record over time: name, quantity, unit, time, measured, before, after
+    words: str  # the whole verdict as text
+    deck: str  # the better model as a deck
 
 
 def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) -> DiagnosisAnswer:
@@ -405,11 +371,6 @@ def _differences(design: CamDesign, solved: ParametricDesign, quick: DesignView)
     return sentences
 
 
-def angle_view_of(view: DesignView, design: CamDesign, question: LiveQuestion) -> AngleView:
-    """Return a finished design as it is looked at angle by angle."""
-    return AngleView(view, design.contour, question.cam, lambda: design.actuator)
-
-
 _SAMPLE_TIME = 1e-3
 _OLD = (1980, 1, 1, 0, 0, 0)
 """Date of files in an archive, so that the same design gives the same bytes."""
@@ -420,7 +381,6 @@ class ExportedDesign:
     """One file."""
 
     name: str
-    media_type: str
     content: bytes
 
 
@@ -435,18 +395,10 @@ class ShownDesign:
 
 @dataclass(frozen=True)
 class ExportDesign(LiveTask):
-    """The design as a file: :class:`ExportedDesign`.
+    """The design as a file: :class:`ExportedDesign`."""
 
-    Parameters
-    ----------
-    what
-        ``"deck"``, ``"svg"``, ``"dxf"``, ``"c"`` or ``"fmu"``.
-    note
-        What the head of the file says; empty for nothing.
-    """
-
-    what: str
-    note: str = ""
+    what: str  # "deck", "svg", "dxf", "c" or "fmu"
+    note: str = ""  # what the head of the file says; empty for nothing
 
     def call(
         self, question: LiveQuestion, shown: AngleView | None
@@ -462,17 +414,7 @@ class ExportDesign(LiveTask):
 def exported_deck(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
     """Return the machine as a deck."""
     text = f"# {design.note}\n{deck_text(design.machine)}" if design.note else deck_text(design.machine)
-    return ExportedDesign(f"{design.machine.name}.toml", "application/toml", text.encode())
-
-
-def exported_svg(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
-    """Return the drawing of the cam as SVG."""
-    return _drawing(design, "svg")
-
-
-def exported_dxf(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
-    """Return the drawing of the cam as DXF."""
-    return _drawing(design, "dxf")
+    return ExportedDesign(f"{design.machine.name}.toml", text.encode())
 
 
 def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
@@ -495,7 +437,7 @@ def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDes
             for file in [files.header, files.source, files.selftest]:
                 archive.writestr(zipfile.ZipInfo(file.name, _OLD), head.encode() + file.read_bytes())
         content = buffer.getvalue()
-    return ExportedDesign("observer_and_controller.zip", "application/zip", content)
+    return ExportedDesign("observer_and_controller.zip", content)
 
 
 def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
@@ -508,23 +450,11 @@ def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedD
         if design.note:
             plant = replace(plant, description=f"{design.note}. {plant.description}")
         file = export_fmu(plant, Path(folder) / "plant.fmu")
-        return ExportedDesign("plant.fmu", "application/zip", file.read_bytes())
+        return ExportedDesign("plant.fmu", file.read_bytes())
 
 
-EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {
-    "deck": exported_deck,
-    "svg": exported_svg,
-    "dxf": exported_dxf,
-    "c": exported_c,
-    "fmu": exported_fmu,
-}
-"""What a design can be saved as."""
-
-
-_MEDIA = {"svg": "image/svg+xml", "dxf": "image/vnd.dxf"}
-
-
-def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
+def exported_drawing(stage: Callable[[str], None], design: ShownDesign, *, ending: str) -> ExportedDesign:
+    """Return the drawing of the cam, without the edge where the cable is not declared."""
     kind, radius = declared_edge(design.machine, series_cam(flatten(design.machine)))
     machined = None if radius is None else kind(cable_radius=radius)
     centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
@@ -532,4 +462,14 @@ def _drawing(design: ShownDesign, ending: str) -> ExportedDesign:
     with tempfile.TemporaryDirectory() as folder:
         files = write_drawings(Path(folder), design.contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
-    return ExportedDesign(f"cam.{ending}", _MEDIA[ending], content)
+    return ExportedDesign(f"cam.{ending}", content)
+
+
+EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {
+    "deck": exported_deck,
+    "svg": partial(exported_drawing, ending="svg"),
+    "dxf": partial(exported_drawing, ending="dxf"),
+    "c": exported_c,
+    "fmu": exported_fmu,
+}
+"""What a design can be saved as."""

@@ -245,59 +245,55 @@ class Symbols(NamedTuple):
     residual: Expression
 
 
+INTERFACE = (["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"])
+"""Names of the arguments and of the results of the equations of a flat model."""
+_NONE = ca.SX(0, 1)
+
+
+def stated_equations(
+    state: Expression,
+    given: Expression,
+    *,
+    derivative: Expression,
+    output: Expression,
+    parameter: Expression = _NONE,
+    table: Expression = _NONE,
+    signal: Expression = _NONE,
+) -> ca.Function:
+    """Return equations of a flat model in which neither time nor a residual stands; ``given``: its inputs."""
+    arguments = [ca.SX.sym("time"), state, given, parameter, table]
+    return ca.Function("equations", arguments, [derivative, output, signal, _NONE], *INTERFACE)
+
+
 @dataclass(frozen=True)
 class Switch:
-    """A place at which the equations of a model are not smooth.
+    """A place at which the equations of a model are not smooth."""
 
-    Parameters
-    ----------
-    name
-        Full name of the element or sensor.
-    words
-        What has happened when a mode begins: pairs of mode (−1, 0, 1) and text; a rebound is at 2.
-    jumps
-        Whether the derivatives jump or a rate is held there, so that the equations can only be integrated by
-        a method that locates it. A mere corner costs other methods accuracy, but they get across.
-    """
-
-    name: str
+    name: str  # full name of the element or sensor
+    # words: what has happened when a mode begins: pairs of mode (−1, 0, 1) and text; a rebound is at 2
     words: tuple[tuple[int, str], ...]
+    # jumps: whether the derivatives jump or a rate is held there, so that the equations can only be
+    # integrated by a method that locates it. A mere corner costs other methods accuracy, but they get across.
     jumps: bool
-
-    def event_text(self, mode: int) -> str:
-        """Return what has happened when a mode begins."""
-        return dict(self.words)[mode]
 
 
 @dataclass(frozen=True, eq=False)
 class Switching:
-    """The switches of a model and its equations while their modes do not change.
+    """The switches of a model and its equations while their modes do not change."""
 
-    Parameters
-    ----------
-    switches
-        k of them.
-    branch
-        ``casadi.Function`` (t, x, u, p, m) -> (f, c, v): derivative with all modes held at m, for each
-        switch a number that is not negative as long as its mode lasts, and the rate that it may hold.
-    natural
-        (t, x, u, p) -> m: the modes at a state; the equations of the flat model are those of these modes.
-    landing
-        (t, x, u, p, m) -> (v, target, leads, reach, slope) for the switches that hold a rate: the rate,
-        shape (k,), what it is after landing, the mode that follows when it is let go, the change of all
-        derivatives per effort, shape (states, k), and ∂v/∂x, shape (k, states). Zero for the others.
-    holds
-        For each switch whether it holds a rate.
-    shown
-        (t, x, u, p, m) -> (y, s): outputs and signals with all modes held at m.
-    """
-
-    switches: tuple[Switch, ...]
+    switches: tuple[Switch, ...]  # k of them
+    # branch: casadi.Function (t, x, u, p, m) -> (f, c, v): derivative with all modes held at m, for each
+    # switch a number that is not negative as long as its mode lasts, and the rate that it may hold
     branch: ca.Function
+    # natural: (t, x, u, p) -> m: the modes at a state; the equations of the flat model are those of these
+    # modes
     natural: ca.Function
+    # landing: (t, x, u, p, m) -> (v, target, leads, reach, slope) for the switches that hold a rate: the
+    # rate, shape (k,), what it is after landing, the mode that follows when it is let go, the change of all
+    # derivatives per effort, shape (states, k), and ∂v/∂x, shape (k, states). Zero for the others.
     landing: ca.Function
-    holds: tuple[bool, ...]
-    shown: ca.Function
+    holds: tuple[bool, ...]  # for each switch whether it holds a rate
+    shown: ca.Function  # (t, x, u, p, m) -> (y, s): outputs and signals with all modes held at m
 
     @property
     def jumps(self) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from ..foundation.errors import ArrangementError, UnitError, nearest, unknown_na
 from ..foundation.quantity import typeset_unit
 from ..foundation.symbolic import Expression, depends
 from .equation_builder import EquationBuilder, PartScope
-from .flat import FlatModel, Switching, Variable
+from .flat import INTERFACE, FlatModel, Switching, Variable
 from .gear_train import balance_train, train_motions, trains
 from .origin import DeclaredOrigin
 from .readings import readings_of
@@ -236,9 +236,8 @@ def _equations(
         items = iter(ca.vertsplit(everything))
         rows = [[next(items) for _ in row] for row in rows]
     equations = ca.Function(
-        "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-    )  # fmt: skip
+        "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows], *INTERFACE
+    )
     return equations, switches
 
 

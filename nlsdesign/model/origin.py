@@ -83,12 +83,8 @@ class DeclaredOrigin(Origin):
     Fits and draws flatten and change models by the thousand, and ask none of them where it is from; to write
     and hash the parts takes milliseconds. So nothing is computed before it is wanted.
 
-    Parameters
-    ----------
-    assembly
-        What the model was flattened from.
-    values
-        Parameters that were changed since, in SI or as quantities, by full name; other names are passed over.
+    ``assembly``: what the model was flattened from. ``values``: parameters that were changed since, in SI or
+    as quantities, by full name; other names are passed over.
     """
 
     def __init__(self, assembly: Assembly, values: Mapping[str, float | Quantity] | None = None) -> None:

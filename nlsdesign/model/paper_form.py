@@ -14,7 +14,7 @@ import casadi as ca
 
 from ..foundation.errors import ArrangementError, unknown_name
 from ..foundation.symbolic import Expression, depends
-from .flat import FlatModel, Variable
+from .flat import FlatModel, Variable, stated_equations
 from .roles import driven_body, series_cam
 from .transform import cut, named, parts_of, with_parts
 
@@ -24,24 +24,15 @@ GEOMETRIC = "geometric"
 
 @dataclass(frozen=True)
 class PaperFormNames:
-    """Names of the variables that make the form of the paper; each is decided from the structure by default.
+    """Names of the variables that make the form of the paper; the structure decides those not given."""
 
-    Parameters
-    ----------
-    inner
-        State of the rubber that the force replaces: the only one of the element behind the cam.
-    force, extension
-        Signals of one element behind the cam.
-    rate
-        Name of the new input dδ/dt.
-    angle, speed
-        States of the driven body.
-    """
-
+    # inner: state of the rubber that the force replaces: the only one of the element behind the cam
     inner: str | None = None
+    # force, extension: signals of one element behind the cam
     force: str | None = None
     extension: str | None = None
-    rate: str | None = None
+    rate: str | None = None  # name of the new input dδ/dt
+    # angle, speed: states of the driven body
     angle: str | None = None
     speed: str | None = None
 
@@ -99,17 +90,11 @@ def paper_form(model: FlatModel, names: PaperFormNames | None = None) -> FlatMod
     signals = {drive.variable(name): value for name, value in others.items() if value is not None}
     signals[replace(extension, name=f"{n.extension}.{GEOMETRIC}")] = _required(model, known, n.extension)
     carried = (n.force, n.extension, n.angle, n.speed)
-    equations = ca.Function(
-        "equations",
-        [
-            ca.SX.sym("time"), _column([symbols[name] for name in carried]),
-            _column([symbols[n.rate], *outer.values()]), _column(list(parameters.values())), ca.SX(0, 1),
-        ],
-        [
-            _column([force_rate, symbols[n.rate], symbols[n.speed], pull]),
-            _column([symbols[n.extension], symbols[n.angle]]), _column(list(signals.values())), ca.SX(0, 1),
-        ],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    equations = stated_equations(
+        _column([symbols[name] for name in carried]), _column([symbols[n.rate], *outer.values()]),
+        derivative=_column([force_rate, symbols[n.rate], symbols[n.speed], pull]),
+        output=_column([symbols[n.extension], symbols[n.angle]]),
+        parameter=_column(list(parameters.values())), signal=_column(list(signals.values())),
     )  # fmt: skip
     start = model.evaluate([v.start for v in model.states])
     kept = [model.variable(name) for name in carried]

@@ -12,24 +12,12 @@ from ..foundation.symbolic import Expression
 
 @dataclass(frozen=True)
 class ReadingNames:
-    """What a measured signal shows, through which chain of sensors.
+    """What a measured signal shows, through which chain of sensors."""
 
-    Parameters
-    ----------
-    signal
-        Name of the reading; of a signal that is measured without a sensor, its own.
-    measured
-        Name of the state, input or signal that it shows.
-    sensors
-        Names of the sensors between, the one that gives the reading first.
-    laws
-        The sensors themselves, in the same order.
-    """
-
-    signal: str
-    measured: str
-    sensors: tuple[str, ...] = ()
-    laws: tuple[Sensor, ...] = ()
+    signal: str  # name of the reading; of a signal that is measured without a sensor, its own
+    measured: str  # name of the state, input or signal that it shows
+    sensors: tuple[str, ...] = ()  # names of the sensors between, the one that gives the reading first
+    laws: tuple[Sensor, ...] = ()  # the sensors themselves, in the same order
 
     @property
     def delays(self) -> tuple[str, ...]:

@@ -157,17 +157,10 @@ def _choice(examples: Sequence[str], otherwise: str) -> str:
 
 
 class DeclaredReading(NamedTuple):
-    """What is declared of the sensor that shows a motion.
+    """What is declared of the sensor that shows a motion."""
 
-    Parameters
-    ----------
-    quantum
-        One count, 0 where none is declared.
-    limits
-        Lowest and highest reading, largest rate and stale time; ``None`` where they are not declared.
-    """
-
-    quantum: float
+    quantum: float  # one count, 0 where none is declared
+    # limits: lowest and highest reading, largest rate and stale time; None where they are not declared
     limits: tuple[float, float, float, float] | None
 
 

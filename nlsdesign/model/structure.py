@@ -56,63 +56,36 @@ def number_names(path: str, part: Part, field: str) -> list[str]:
 
 @dataclass(frozen=True)
 class MotorNames:
-    """The names around a motor.
+    """The names around a motor."""
 
-    Parameters
-    ----------
-    command
-        Input: current, or wanted voltage. ``None`` where it is held at zero.
-    inertia, torque_constant, current_limit
-        Parameters.
-    gear_ratio
-        Parameter; ``None`` for a motor without a gear of its own.
-    """
-
-    command: str | None
+    command: str | None  # input: current, or wanted voltage. None where it is held at zero.
+    # inertia, torque_constant, current_limit: parameters
     inertia: str
     torque_constant: str
     current_limit: str
-    gear_ratio: str | None
+    gear_ratio: str | None  # parameter; None for a motor without a gear of its own
 
 
 @dataclass(frozen=True)
 class MovingBody:
-    """A body with a motion of its own.
+    """A body with a motion of its own."""
 
-    Parameters
-    ----------
-    name
-        Path of the body.
-    domain
-        Rotation or translation, with the units of motion, rate and effort.
-    motion, rate
-        Names of the two states, or of the two inputs where the motion is prescribed.
-    inertia
-        Name of the parameter or signal that says what is accelerated: with a gear train the inertia of all
-        that turns, seen from this body. ``None`` where the motion is prescribed.
-    drives
-        Names of the inputs that act on the body from outside, such as a current or a torque.
-    geared
-        Names of the bodies that move with it through rigid gears.
-    motor
-        The motor in it; ``None`` for a body without one.
-    commands
-        Names of the inputs and signals that command a drive in it, or in what is geared to it, such as a
-        voltage or current: whatever is not known of them was not zero. A load from outside is none.
-    goals
-        Names of the inputs that controllers in it follow.
-    """
-
-    name: str
-    domain: Domain
+    name: str  # path of the body
+    domain: Domain  # rotation or translation, with the units of motion, rate and effort
+    # motion, rate: names of the two states, or of the two inputs where the motion is prescribed
     motion: str
     rate: str
+    # inertia: name of the parameter or signal that says what is accelerated: with a gear train the inertia of
+    # all that turns, seen from this body. None where the motion is prescribed.
     inertia: str | None
+    # drives: names of the inputs that act on the body from outside, such as a current or a torque
     drives: tuple[str, ...]
-    geared: tuple[str, ...] = ()
-    motor: MotorNames | None = None
+    geared: tuple[str, ...] = ()  # names of the bodies that move with it through rigid gears
+    motor: MotorNames | None = None  # the motor in it; None for a body without one
+    # commands: names of the inputs and signals that command a drive in it, or in what is geared to it, such
+    # as a voltage or current: whatever is not known of them was not zero. A load from outside is none.
     commands: tuple[str, ...] = ()
-    goals: tuple[str, ...] = ()
+    goals: tuple[str, ...] = ()  # names of the inputs that controllers in it follow
 
     @property
     def acceleration(self) -> str:
@@ -140,111 +113,62 @@ class SpecimenNames:
 
 @dataclass(frozen=True)
 class CoilNames:
-    """The names around one coil.
+    """The names around one coil."""
 
-    Parameters
-    ----------
-    name
-        Path of the coil.
-    extension
-        Signal of its motion, whose range is its travel.
-    free_length
-        Parameter.
-    winding
-        Parameters of its wire: diameter, mean diameter of the coils, their number and the shear modulus; none
-        where the rate is stated.
-    idle
-        Parameters that do not enter the law.
-    shear_stress, tensile_strength, wire_volume
-        Signals; ``None`` where the wire is not known well enough.
-    index_range
-        Least and greatest spring index that can be made.
-    """
-
-    name: str
-    extension: str
-    free_length: str
+    name: str  # path of the coil
+    extension: str  # signal of its motion, whose range is its travel
+    free_length: str  # parameter
+    # winding: parameters of its wire: diameter, mean diameter of the coils, their number and the shear
+    # modulus; none where the rate is stated
     winding: tuple[str, ...]
-    idle: tuple[str, ...]
+    idle: tuple[str, ...]  # parameters that do not enter the law
+    # shear_stress, tensile_strength, wire_volume: signals; None where the wire is not known well enough
     shear_stress: str | None
     tensile_strength: str | None
     wire_volume: str | None
-    index_range: tuple[float, float] = INDEX
+    index_range: tuple[float, float] = INDEX  # least and greatest spring index that can be made
 
 
 @dataclass(frozen=True)
 class CableNames:
-    """The numbers of the cable of a cam, all parameters.
-
-    Parameters
-    ----------
-    diameter, breaking_force
-        Of the cable.
-    bend_ratio
-        Least diameter of a bend over the diameter of the cable.
-    """
+    """The numbers of the cable of a cam, all parameters."""
 
     diameter: str
     breaking_force: str
-    bend_ratio: str
+    bend_ratio: str  # least diameter of a bend over the diameter of the cable
 
 
 @dataclass(frozen=True)
 class CamNames:
-    """The names around one cam and what stands behind it.
+    """The names around one cam and what stands behind it."""
 
-    Parameters
-    ----------
-    name
-        Path of the cam.
-    drive
-        Path of the part that holds cam and element.
-    angle, torque, lever_arm
-        Signals: angle and torque of the drive, lever arm at that angle.
-    element
-        Path of what is stretched.
-    extension, force
-        Signals of what is stretched.
-    pretension, elements
-        Parameters: extension at angle zero, number of equal elements.
-    control_values
-        Parameters that shape the lever arm; none for a wheel.
-    anchor_distance, last_angle
-        Parameters: distance of the anchor from the centre, where the contour ends; ``None`` for a cam
-        without.
-    numbers
-        Parameters of the drive and the element that are single numbers and enter a law: no strength.
-    states
-        Inner states of the element.
-    specimens
-        The pieces of material in it.
-    cable
-        The declared cable; ``None`` where there is none.
-    guides
-        For each guide that bends its cable the parameters whose product is the exponent µφ of its friction.
-    coils
-        The coils in it.
-    """
-
-    name: str
-    drive: str
+    name: str  # path of the cam
+    drive: str  # path of the part that holds cam and element
+    # angle, torque, lever_arm: signals: angle and torque of the drive, lever arm at that angle
     angle: str
     torque: str
     lever_arm: str
-    element: str
+    element: str  # path of what is stretched
+    # extension, force: signals of what is stretched
     extension: str
     force: str
+    # pretension, elements: parameters: extension at angle zero, number of equal elements
     pretension: str
     elements: str
-    control_values: tuple[str, ...]
+    control_values: tuple[str, ...]  # parameters that shape the lever arm; none for a wheel
+    # anchor_distance, last_angle: parameters: distance of the anchor from the centre, where the contour ends;
+    # None for a cam without
     anchor_distance: str | None
     last_angle: str | None
+    # numbers: parameters of the drive and the element that are single numbers and enter a law: no strength
     numbers: tuple[str, ...]
-    states: tuple[str, ...]
-    specimens: tuple[SpecimenNames, ...]
-    cable: CableNames | None = None
+    states: tuple[str, ...]  # inner states of the element
+    specimens: tuple[SpecimenNames, ...]  # the pieces of material in it
+    cable: CableNames | None = None  # the declared cable; None where there is none
+    # guides: for each guide that bends its cable the parameters whose product is the exponent µφ of its
+    # friction
     guides: tuple[tuple[str, ...], ...] = ()
-    coils: tuple[CoilNames, ...] = ()
+    coils: tuple[CoilNames, ...] = ()  # the coils in it
 
     @property
     def contour(self) -> str:

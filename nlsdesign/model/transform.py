@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import casadi as ca
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..foundation.errors import ArrangementError, unknown_name
 from ..foundation.symbolic import Expression, dependence, depends
-from .flat import FlatModel, Switching, Symbols, Variable
+from .flat import INTERFACE, FlatModel, Switching, Symbols, Variable
 from .graph import applied
 from .structure import ModelParts
 
@@ -184,8 +184,7 @@ def parts_of(model: FlatModel) -> ModelParts:
 
 def with_parts(model: FlatModel, parts: ModelParts) -> FlatModel:
     """Return the model made of other parts; what has no variables in it is left out."""
-    groups = (model.states, model.inputs, model.outputs, model.signals)
-    names = {v.name for group in groups for v in group}
+    names = {v.name for v in (*model.states, *model.inputs, *model.outputs, *model.signals)}
     kept = parts.within(names, {v.name for v in model.inputs})
     return replace(model, bodies=kept.bodies, springs=kept.springs, readings=kept.readings)
 
@@ -215,14 +214,9 @@ def _rebuilt(
         )  # fmt: skip
     rows = [s.derivative, s.output, s.signal, s.residual]
     shared = ca.cse(ca.vertcat(*rows)) if any(r.numel() for r in rows) else ca.SX(0, 1)
-    ends = [0]
-    for row in rows:
-        ends.append(ends[-1] + row.shape[0])
-    equations = ca.Function(
-        "equations", [s.time, s.state, s.input, s.parameter, s.table],
-        [shared[a:b] for a, b in pairwise(ends)],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-    )  # fmt: skip
+    ends = accumulate((row.shape[0] for row in rows), initial=0)
+    given = [s.time, s.state, s.input, s.parameter, s.table]
+    equations = ca.Function("equations", given, [shared[a:b] for a, b in pairwise(ends)], *INTERFACE)
     changed = replace(
         model,
         equations=equations,

@@ -22,12 +22,7 @@ def as_it_is(function: ca.Function) -> ca.Function:
 class Buffered:
     """A function with dense results, with fixed arrays for its arguments and results.
 
-    Parameters
-    ----------
-    function
-        Its results must be dense.
-    arguments
-        Arrays that are read at each call; matrices column by column.
+    ``arguments``: arrays that are read at each call; matrices column by column.
     """
 
     def __init__(self, function: ca.Function, arguments: Sequence[Array]) -> None:

@@ -39,40 +39,20 @@ class NotByColumnsError(Exception):
 
 @dataclass(frozen=True)
 class Operation:
-    """One elementary operation.
+    """One elementary operation."""
 
-    Parameters
-    ----------
-    code
-        As CasADi numbers it, one of :data:`ARITHMETIC`.
-    operands
-        Numbers of values, one or two.
-    result
-        Number of the value.
-    """
-
-    code: int
-    operands: tuple[int, ...]
-    result: int
+    code: int  # as CasADi numbers it, one of ARITHMETIC
+    operands: tuple[int, ...]  # numbers of values, one or two
+    result: int  # number of the value
 
 
 @dataclass(frozen=True)
 class TableReading:
-    """A table is read: linear between its nodes, held at the ends.
+    """A table is read: linear between its nodes, held at the ends."""
 
-    Parameters
-    ----------
-    table
-        Number of the table in the graph.
-    at
-        Number of the value at which it is read.
-    results
-        Numbers of the values, one for each column of the table.
-    """
-
-    table: int
-    at: int
-    results: tuple[int, ...]
+    table: int  # number of the table in the graph
+    at: int  # number of the value at which it is read
+    results: tuple[int, ...]  # numbers of the values, one for each column of the table
 
     @property
     def operands(self) -> tuple[int, ...]:
@@ -82,22 +62,13 @@ class TableReading:
 
 @dataclass(frozen=True)
 class Call:
-    """Another graph is evaluated.
+    """Another graph is evaluated."""
 
-    Parameters
-    ----------
-    body
-        Number of the graph among the bodies.
-    operands, results
-        Numbers of values, in the order of its arguments and results.
-    once
-        Number of the set of its fixed values: calls with the same fixed arguments share them.
-    """
-
-    body: int
+    body: int  # number of the graph among the bodies
+    # operands, results: numbers of values, in the order of its arguments and results
     operands: tuple[int, ...]
     results: tuple[int, ...]
-    once: int
+    once: int  # number of the set of its fixed values: calls with the same fixed arguments share them
 
 
 Step: TypeAlias = Operation | TableReading | Call
@@ -105,39 +76,20 @@ Step: TypeAlias = Operation | TableReading | Call
 
 @dataclass(eq=False)
 class ColumnGraph:
-    """What a function computes, value by value; values are numbered from zero.
+    """What a function computes, value by value; values are numbered from zero."""
 
-    Parameters
-    ----------
-    arguments
-        Numbers of the values of each argument, in the order of the function.
-    results
-        Numbers of the values of each result.
-    constants
-        Constants by the number of their value.
-    fixed
-        Numbers of the values that depend on fixed arguments and constants only.
-    steps
-        In the order of computation.
-    count
-        How many values there are.
-    bodies
-        Graphs that are called.
-    onces
-        For each set of fixed values the number of the body and its fixed operands.
-    tables
-        Tables that are read.
-    """
-
+    # arguments: numbers of the values of each argument, in the order of the function
     arguments: tuple[tuple[int, ...], ...] = ()
-    results: tuple[tuple[int, ...], ...] = ()
-    constants: dict[int, float] = field(default_factory=dict)
+    results: tuple[tuple[int, ...], ...] = ()  # numbers of the values of each result
+    constants: dict[int, float] = field(default_factory=dict)  # constants by the number of their value
+    # fixed: numbers of the values that depend on fixed arguments and constants only
     fixed: set[int] = field(default_factory=set)
-    steps: list[Step] = field(default_factory=list)
-    count: int = 0
-    bodies: list[ColumnGraph] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)  # in the order of computation
+    count: int = 0  # how many values there are
+    bodies: list[ColumnGraph] = field(default_factory=list)  # graphs that are called
+    # onces: for each set of fixed values the number of the body and its fixed operands
     onces: list[tuple[int, tuple[int, ...]]] = field(default_factory=list)
-    tables: list[Table] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)  # tables that are read
 
     @cached_property
     def conditions(self) -> frozenset[int]:

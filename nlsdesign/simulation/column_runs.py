@@ -89,14 +89,7 @@ def _together(
 class ColumnEvaluator:
     """A function of matrices, evaluated for many columns of arguments.
 
-    Parameters
-    ----------
-    function
-        Its results must be dense.
-    fixed
-        Number of the argument that holds the parameters.
-    translate
-        For instance :data:`~nlsdesign.export.natively`.
+    ``fixed``: number of the argument that holds the parameters.
     """
 
     def __init__(self, function: ca.Function, fixed: int, *, translate: Translate) -> None:

@@ -23,18 +23,10 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True)
 class StepAt:
-    """Zero, and from a time on a constant.
+    """Zero, and from a time on a constant."""
 
-    Parameters
-    ----------
-    size
-        In the unit of the input.
-    begin
-        In s.
-    """
-
-    size: float
-    begin: float
+    size: float  # in the unit of the input
+    begin: float  # in s
 
     def __call__(self, time: float) -> float:
         """Return the value at a time."""

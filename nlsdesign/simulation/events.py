@@ -91,14 +91,7 @@ def _share(one: float, at_one: float, other: float, at_other: float, third: floa
 class EventLog:
     """The events so far; raises an error where they accumulate.
 
-    Parameters
-    ----------
-    model
-        Name, for messages.
-    switches
-        In the order of their numbers.
-    span
-        Simulated time in s.
+    ``switches``: in the order of their numbers.
     """
 
     def __init__(self, model: str, switches: Sequence[Switch], span: float) -> None:
@@ -109,7 +102,7 @@ class EventLog:
     def record(self, time: float, i: int, mode: int) -> None:
         """Record that a mode of a switch has begun."""
         switch = self._switches[i]
-        self.events.append(Event(time, switch.name, switch.event_text(mode)))
+        self.events.append(Event(time, switch.name, dict(switch.words)[mode]))
         self._recent.append(time)
         if len(self._recent) == MOST_EVENTS and time - self._recent[0] < self._window:
             raise self.accumulation(i, time)
@@ -132,15 +125,7 @@ class EventLog:
 
 
 class Modes:
-    """The modes of all switches, their changes and the events.
-
-    Parameters
-    ----------
-    model
-        With switches.
-    span
-        Simulated time in s.
-    """
+    """The modes of all switches, their changes and the events."""
 
     def __init__(self, model: FlatModel, span: float) -> None:
         if model.switching is None:

@@ -19,23 +19,12 @@ Drive: TypeAlias = Callable[[float], float] | Array | float
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """Inputs over time: linear between samples, or functions of time.
+    """Inputs over time: linear between samples, or functions of time."""
 
-    Parameters
-    ----------
-    times
-        Sample times, shape (n,).
-    samples
-        All inputs at the sample times, shape (inputs, n).
-    slopes
-        Their slopes from each sample to the next, shape (inputs, n − 1).
-    functions
-        Functions of time by the name and number of the input.
-    """
-
-    times: Array
-    samples: Array
-    slopes: Array
+    times: Array  # sample times, shape (n,)
+    samples: Array  # all inputs at the sample times, shape (inputs, n)
+    slopes: Array  # their slopes from each sample to the next, shape (inputs, n − 1)
+    # functions: functions of time by the name and number of the input
     functions: Mapping[tuple[str, int], Callable[[float], float]]
 
     def at(self, interval: int, moments: Array, out: Array | None = None) -> Array:

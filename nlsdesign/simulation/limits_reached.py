@@ -20,28 +20,14 @@ _AT = 1e-6
 
 
 class LimitReached(NamedTuple):
-    """A signal that goes beyond a declared number, or is held at it.
-
-    Parameters
-    ----------
-    name, unit
-        Of the signal.
-    time
-        Of the first sample beyond, in s.
-    furthest
-        Value furthest beyond.
-    limit
-        The declared number, with the sign of the side that is reached.
-    meaning
-        What the number is, and what holds beyond it.
-    """
+    """A signal that goes beyond a declared number, or is held at it."""
 
     name: str
     unit: str
-    time: float
-    furthest: float
-    limit: float
-    meaning: str
+    time: float  # of the first sample beyond, in s
+    furthest: float  # value furthest beyond
+    limit: float  # the declared number, with the sign of the side that is reached
+    meaning: str  # what the number is, and what holds beyond it
 
     def __str__(self) -> str:
         reached, limit = (with_unit(f"{each:.4g}", self.unit) for each in (self.furthest, self.limit))

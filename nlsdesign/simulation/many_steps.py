@@ -73,18 +73,10 @@ def _inputs(drives: Drives, intervals: Indices, moments: Array) -> Array:
 class ManySteps:
     """Integrates all columns from sample to sample.
 
-    Parameters
-    ----------
-    model
-        Continuous, with at least one state.
-    drives
-        Inputs, the same for all columns.
-    columns
-        Numbers and start values that differ, by name, each of shape (columns,).
-    tolerance
-        Error allowed per step, relative to the state and to its nominal size.
-    translate
-        Makes the function of a step a faster one.
+    ``model``: continuous, with at least one state. ``drives``: inputs, the same for all columns. ``columns``:
+    numbers and start values that differ, by name, each of shape (columns,). ``tolerance``: error allowed per
+    step, relative to the state and to its nominal size. ``translate``: makes the function of a step a faster
+    one.
     """
 
     def __init__(

@@ -63,10 +63,7 @@ _LOGICAL = frozenset([ca.OP_NOT, ca.OP_AND, ca.OP_OR])
 class NumpyColumns:
     """Runs samples of many columns.
 
-    Parameters
-    ----------
-    graph
-        (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
+    ``graph``: (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
     """
 
     def __init__(self, graph: ColumnGraph) -> None:

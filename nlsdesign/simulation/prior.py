@@ -88,8 +88,7 @@ class Prior:
     @property
     def deviations(self) -> Array:
         """Standard deviation of the coordinate of each number, shape (numbers,)."""
-        result: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return result
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def spread_of(self, name: str) -> Spread:
         """Return the spread of a number as a deck states it.

@@ -88,18 +88,8 @@ def step_function(branch: ca.Function) -> ca.Function:
 class Stepper:
     """One step at a time through fixed buffers, without allocation.
 
-    Parameters
-    ----------
-    model
-        Continuous, with at least one state.
-    drives
-        Inputs.
-    tolerance
-        Error allowed per step.
-    modes
-        Of all switches; read at each step.
-    translate
-        Makes the function of a step a faster one.
+    ``model``: continuous, with at least one state. ``modes``: of all switches; read at each step.
+    ``translate``: makes the function of a step a faster one.
     """
 
     def __init__(

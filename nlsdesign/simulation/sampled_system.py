@@ -83,13 +83,10 @@ class SampledSystem:
     def states(self) -> tuple[str, ...]:
         """Full names of all states, and of the values of the driven input that wait for their sample."""
         names = [f"{owner}.{v.name}" for owner, model in self.owners.items() for v in model.states]
-        return (*names, *(f"{PLANT}.{self.driven}.waiting[{i + 1}]" for i in range(self._waiting)))
+        waiting = self.delay if self.driven is not None else 0
+        return (*names, *(f"{PLANT}.{self.driven}.waiting[{i + 1}]" for i in range(waiting)))
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
         """Full names of all parameters."""
         return tuple(f"{owner}.{v.name}" for owner, model in self.owners.items() for v in model.parameters)
-
-    @property
-    def _waiting(self) -> int:
-        return self.delay if self.driven is not None else 0

@@ -44,8 +44,7 @@ class Sine:
             In s, any shape.
         """
         phase = 2.0 * math.pi * self.frequency * times + self.phase
-        result: Array = self.offset + self.amplitude * np.sin(phase)
-        return result
+        return self.offset + self.amplitude * np.sin(phase)
 
 
 def sine(name: str, amplitude: float, frequency: float, *, offset: float = 0.0) -> dict[str, Sine]:

@@ -26,27 +26,13 @@ _EVALUATED = 200
 
 @dataclass(frozen=True, eq=False)
 class SimulatedBatch:
-    """What many simulations of one model gave.
+    """What many simulations of one model gave."""
 
-    Parameters
-    ----------
-    time
-        In s, shape (T,).
-    signals
-        By name, shape (columns, T); not a number in columns that failed.
-    units
-        Of the signals.
-    failures
-        Why columns failed, by their numbers.
-    events
-        Of each column: sticking, slipping, impacts, slack.
-    """
-
-    time: Array
-    signals: Mapping[str, Array]
+    time: Array  # in s, shape (T,)
+    signals: Mapping[str, Array]  # by name, shape (columns, T); not a number in columns that failed
     units: Mapping[str, str]
-    failures: Mapping[int, str]
-    events: tuple[tuple[Event, ...], ...]
+    failures: Mapping[int, str]  # why columns failed, by their numbers
+    events: tuple[tuple[Event, ...], ...]  # of each column: sticking, slipping, impacts, slack
 
     @property
     def done(self) -> Mask:

@@ -4,7 +4,6 @@ The report of a sweep and the command import it. It decides no physics: question
 """
 
 from .axes import GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
-from .axis_values import Subject
 from .point_deck import point_deck_text as point_deck_text
 from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
 from .preferences import NotAbove as NotAbove
@@ -39,7 +38,6 @@ __all__ = [
     "SmallerIsBetter",
     "SobolSample",
     "SpreadQuestion",
-    "Subject",
     "SweepColumn",
     "SweepTable",
     "SweepTask",

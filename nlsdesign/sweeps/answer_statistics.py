@@ -20,20 +20,12 @@ CONFIDENCE = 0.95
 
 
 class BoundedQuantile(NamedTuple):
-    """A quantile with the bounds of its confidence.
+    """A quantile with the bounds of its confidence."""
 
-    Parameters
-    ----------
-    share
-        Of the values that lie at or below it.
-    value
-        Of the sample, one of its values.
-    lower, upper
-        Bounds, values of the sample; not a number where the sample is too small to bound that side.
-    """
-
-    share: float
-    value: float
+    share: float  # of the values that lie at or below it
+    value: float  # of the sample, one of its values
+    # lower, upper: bounds, values of the sample; not a number where the sample is too small to bound that
+    # side
     lower: float
     upper: float
 
@@ -68,32 +60,20 @@ _LEAST_EXPLAINED = 0.1
 
 @dataclass(frozen=True, eq=False)
 class AnswerSurface:
-    """An answer over two axes, and how well it predicts points that it has not seen.
+    """An answer over two axes, and how well it predicts points that it has not seen."""
 
-    Parameters
-    ----------
-    across, up
-        Nodes of the two axes, shapes (m,) and (n,), in SI.
-    values
-        Shape (n, m), in SI; not a number outside the points' convex hull, and where a point of a grid failed.
-    method
-        How it was made, as text.
-    error
-        Root mean square of what it predicts for points that were left out, minus their answers; not a number
-        where no point could be left out.
-    deviation
-        Standard deviation of the answers, which the mean alone would leave.
-    unpredicted
-        How many points that were left out lay outside the hull of the others.
-    """
-
+    # across, up: nodes of the two axes, shapes (m,) and (n,), in SI
     across: Array
     up: Array
+    # values: shape (n, m), in SI; not a number outside the points' convex hull, and where a point of a grid
+    # failed
     values: Array
-    method: str
+    method: str  # how it was made, as text
+    # error: root mean square of what it predicts for points that were left out, minus their answers; not a
+    # number where no point could be left out
     error: float
-    deviation: float
-    unpredicted: int
+    deviation: float  # standard deviation of the answers, which the mean alone would leave
+    unpredicted: int  # how many points that were left out lay outside the hull of the others
 
     @property
     def predicts(self) -> bool:

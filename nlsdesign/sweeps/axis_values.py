@@ -62,18 +62,10 @@ def si_unit(unit: str) -> str:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Subject:
-    """What axes change: the decks and the question.
+    """What axes change: the decks and the question."""
 
-    Parameters
-    ----------
-    assemblies
-        By the name of their deck; the first is the one that is swept.
-    question
-        A dataclass; its fields are named ``ask.FIELD``.
-    """
-
-    assemblies: Mapping[str, Assembly]
-    question: Any
+    assemblies: Mapping[str, Assembly]  # by the name of their deck; the first is the one that is swept
+    question: Any  # a dataclass; its fields are named ask.FIELD
 
     @property
     def base(self) -> Assembly:
@@ -90,23 +82,8 @@ class Subject:
     def column(self, name: str, values: Sequence[Given], kind: str) -> tuple[SweepColumn, tuple[Any, ...]]:
         """Return the column of an axis, and its values: words, or numbers in SI.
 
-        Parameters
-        ----------
-        name
-            Of a number, a piece of rubber, ``deck``, ``factor(NAME)`` or ``ask.FIELD``.
-        values
-            As given: words, numbers with unit, or numbers in SI.
-        kind
-            Of the axis.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such name, deck or rubber.
-        UnitError
-            If a value is of another dimension.
-        ValueRangeError
-            If a value is no finite number, or the question chooses the number itself.
+        ``name``: of a number, a piece of rubber, ``deck``, ``factor(NAME)`` or ``ask.FIELD``. ``values``: as
+        given: words, numbers with unit, or numbers in SI.
         """
         if self.is_chosen(name):  # its column would read as if the answers did not depend on it
             raise ValueRangeError(
@@ -130,13 +107,7 @@ class Subject:
         return SweepColumn(name, text, described, "axis", kind, min(numbers), max(numbers)), numbers
 
     def is_whole(self, name: str) -> bool:
-        """Return whether an axis takes whole numbers only.
-
-        Parameters
-        ----------
-        name
-            Of the axis.
-        """
+        """Return whether an axis takes whole numbers only."""
         if name not in question_settings(self.question):
             return False
         *path, last = name.split(".")[1:]
@@ -148,10 +119,7 @@ class Subject:
     def is_chosen(self, name: str) -> bool:
         """Return whether the question chooses a number itself, whatever it was before.
 
-        Parameters
-        ----------
-        name
-            Of a number, an item of a row, or ``factor(NAME)``.
+        ``name``: of a number, an item of a row, or ``factor(NAME)``.
         """
         return (row_of_factor(name) or name.partition("[")[0]) in self.question.chosen(self.base)
 

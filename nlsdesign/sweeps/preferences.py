@@ -139,32 +139,17 @@ class NotBelow(Requirement):
 
 @dataclass(frozen=True, eq=False)
 class RankedPoints:
-    """Which points are on the front, and which do not count.
-
-    Parameters
-    ----------
-    preferences, requirements
-        As given.
-    failed
-        Points without an answer, shape (n,).
-    missed
-        Points with an answer that does not keep a requirement.
-    incomplete
-        Points that keep all requirements, with an answer to compare that is no finite number.
-    front
-        Indices of the points that no other betters in all preferences, the best in the first one first; empty
-        without preferences.
-    misses
-        How many points miss each requirement, in their order.
-    """
+    """Which points are on the front, and which do not count."""
 
     preferences: tuple[Preference, ...]
     requirements: tuple[Requirement, ...]
-    failed: Mask
-    missed: Mask
-    incomplete: Mask
+    failed: Mask  # points without an answer, shape (n,)
+    missed: Mask  # points with an answer that does not keep a requirement
+    incomplete: Mask  # points that keep all requirements, with an answer to compare that is no finite number
+    # front: indices of the points that no other betters in all preferences, the best in the first one first;
+    # empty without preferences
     front: Indices
-    misses: tuple[int, ...]
+    misses: tuple[int, ...]  # how many points miss each requirement, in their order
 
     @property
     def judged(self) -> tuple[str, ...]:

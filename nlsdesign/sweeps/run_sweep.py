@@ -41,18 +41,10 @@ _MOST_ROWS: Final = 4096
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """What becomes of earlier results in the folder.
+    """What becomes of earlier results in the folder."""
 
-    Parameters
-    ----------
-    again
-        Whether they are thrown away; by default the run goes on where the last one ended.
-    retry_failed
-        Whether points that failed are computed again.
-    """
-
-    again: bool = False
-    retry_failed: bool = False
+    again: bool = False  # whether they are thrown away; by default the run goes on where the last one ended
+    retry_failed: bool = False  # whether points that failed are computed again
 
 
 _GO_ON: Final = SweepSettings()

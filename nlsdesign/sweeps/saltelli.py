@@ -16,22 +16,13 @@ from .sweep_columns import SALTELLI
 
 
 class SaltelliForm(NamedTuple):
-    """The form of a Saltelli plan.
+    """The form of a Saltelli plan."""
 
-    Parameters
-    ----------
-    blocks
-        Whole blocks.
-    rows
-        Points of a block: one of the first sample, one per axis with that axis from the second sample, with
-        second order also the reverse, and one of the second sample.
-    second_order
-        Whether blocks hold the reverse exchanges.
-    """
-
-    blocks: int
+    blocks: int  # whole blocks
+    # rows: points of a block: one of the first sample, one per axis with that axis from the second sample,
+    # with second order also the reverse, and one of the second sample
     rows: int
-    second_order: bool
+    second_order: bool  # whether blocks hold the reverse exchanges
 
 
 def saltelli_plan(points: Array) -> SaltelliForm | None:

@@ -33,53 +33,27 @@ _MOST_LEVELS, _DRAWS, _SEED = 20, 100, 1
 
 @dataclass(frozen=True)
 class SensitivityIndex:
-    """Share of the variance of one answer that one axis causes.
+    """Share of the variance of one answer that one axis causes."""
 
-    Parameters
-    ----------
-    axis
-        Its name.
-    first
-        Share caused by the axis alone; an estimate may lie a little outside 0 to 1.
-    first_error
-        Half the width of its 95 % interval; zero where it is exact.
-    total, total_error
-        The same with all interactions that the axis takes part in; not a number where the points do not say.
-    """
-
-    axis: str
-    first: float
-    first_error: float
+    axis: str  # its name
+    first: float  # share caused by the axis alone; an estimate may lie a little outside 0 to 1
+    first_error: float  # half the width of its 95 % interval; zero where it is exact
+    # total, total_error: the same with all interactions that the axis takes part in; not a number where the
+    # points do not say
     total: float = float("nan")
     total_error: float = float("nan")
 
 
 @dataclass(frozen=True)
 class AnswerSensitivity:
-    """Sensitivity of one answer.
+    """Sensitivity of one answer."""
 
-    Parameters
-    ----------
-    answer
-        Its name.
-    method
-        How the indices were found, as text; empty where they are refused.
-    points
-        How many points they rest on.
-    indices
-        One per axis that varies, largest first.
-    remarks
-        Conditions under which they hold.
-    refusal
-        Why there are none; else empty.
-    """
-
-    answer: str
-    method: str
-    points: int
-    indices: tuple[SensitivityIndex, ...] = ()
-    remarks: tuple[str, ...] = field(default_factory=tuple)
-    refusal: str = ""
+    answer: str  # its name
+    method: str  # how the indices were found, as text; empty where they are refused
+    points: int  # how many points they rest on
+    indices: tuple[SensitivityIndex, ...] = ()  # one per axis that varies, largest first
+    remarks: tuple[str, ...] = field(default_factory=tuple)  # conditions under which they hold
+    refusal: str = ""  # why there are none; else empty
 
 
 def sensitivity(

@@ -138,24 +138,12 @@ def answer(name: str, unit: str, description: str) -> SweepColumn:
 
 @dataclass(frozen=True)
 class PointWork:
-    """What a worker does with a point.
+    """What a worker does with a point."""
 
-    Parameters
-    ----------
-    assemblies
-        By the name of their deck.
-    question
-        What is asked.
-    axes
-        Names and units of the values of a point.
-    answers
-        Names of the answers.
-    """
-
-    assemblies: Mapping[str, Assembly]
-    question: SweepQuestion
-    axes: tuple[tuple[str, str], ...]
-    answers: tuple[str, ...]
+    assemblies: Mapping[str, Assembly]  # by the name of their deck
+    question: SweepQuestion  # what is asked
+    axes: tuple[tuple[str, str], ...]  # names and units of the values of a point
+    answers: tuple[str, ...]  # names of the answers
 
     def __call__(self, values: tuple[Any, ...]) -> tuple[float, ...]:
         """Return the answers of a point."""

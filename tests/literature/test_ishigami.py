@@ -13,7 +13,8 @@ pytest.importorskip("SALib")
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
-from nlsdesign.sweeps import FunctionQuestion, SaltelliSample, Subject
+from nlsdesign.sweeps import FunctionQuestion, SaltelliSample
+from nlsdesign.sweeps.axis_values import Subject
 from nlsdesign.sweeps.sensitivity import AnswerSensitivity, sensitivity
 from nlsdesign.sweeps.sweep_plan import PointPlan
 

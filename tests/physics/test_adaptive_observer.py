@@ -16,7 +16,6 @@ from nlsdesign.feedback.observer import (
     AdaptiveDesign,
     AdaptiveSettings,
     design_adaptive_observer,
-    estimator_bound,
 )
 from nlsdesign.feedback.observer.adaptive.adaptive_step import _matrices, _Side
 from nlsdesign.feedback.observer.adaptive.duty_and_directions import (
@@ -24,7 +23,7 @@ from nlsdesign.feedback.observer.adaptive.duty_and_directions import (
     UncertainDirections,
     uncertain_directions,
 )
-from nlsdesign.feedback.observer.adaptive.estimator_bound import SensedTorque
+from nlsdesign.feedback.observer.adaptive.estimator_bound import SensedTorque, estimator_bound
 from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, truncated_update
 from nlsdesign.feedback.observer.scheduling.angle_form import minimal_form
 from nlsdesign.foundation.deck import load_deck

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.design import CamDesign, contour_from_curvature, design_cam
+from nlsdesign.design import CamDesign, design_cam
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.design.statics.energy import energy_profile
 from tests.cam_cases import CONCAVE, CONTOUR, CONVEX, KEEP, PRETENSION, TARGET, actuator
 

@@ -8,8 +8,9 @@ from scipy.integrate import solve_ivp
 
 from nlsdesign.components import Assembly, Element, LinearElastic, StrainStiffening
 from nlsdesign.components.core.element import Scope
-from nlsdesign.design import PowerTorque, cam_from_profile, elastic_law, equilibrium_torque
+from nlsdesign.design import PowerTorque, elastic_law, equilibrium_torque
 from nlsdesign.design.optimisation.finish import torque_check
+from nlsdesign.design.statics.declared_cam import cam_from_profile
 from nlsdesign.design.statics.energy import CamProfile, energy_profile
 from nlsdesign.foundation.errors import InfeasibleError
 from nlsdesign.foundation.symbolic import Expression

@@ -10,11 +10,11 @@ from scipy.interpolate import make_interp_spline
 from nlsdesign.components import OneSidedCam
 from nlsdesign.design import (
     Contour,
-    cam_from_profile,
-    contour_from_curvature,
     contour_from_lever_arm,
     contour_of_cam,
 )
+from nlsdesign.design.statics.contour import contour_from_curvature
+from nlsdesign.design.statics.declared_cam import cam_from_profile
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
 from tests.cam_cases import CONCAVE, actuator
 

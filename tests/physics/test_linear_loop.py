@@ -25,11 +25,11 @@ from nlsdesign.feedback.control import (
     saturation_line,
     sine_response,
     torque_controller,
-    torque_resolution,
     with_fine_counts,
     zero_torque,
 )
 from nlsdesign.feedback.control.evaluation.linear_loop import linear_loop
+from nlsdesign.feedback.control.evaluation.responses import torque_resolution
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten

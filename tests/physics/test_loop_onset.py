@@ -80,7 +80,7 @@ def test_the_published_amplitudes_of_the_issue(loop: ClosedLoop) -> None:
     """Kp = 70 at 2.8 N·m held: the current swings between its limits at 40 Hz."""
     from dataclasses import replace
 
-    from nlsdesign.feedback.control import held_torque
+    from nlsdesign.feedback.control.evaluation.responses import held_torque
 
     hard = replace(loop, controller=loop.controller.with_values({GAIN: 70.0}))
     verdict = held_torque(hard, [2.8], translate=natively).verdicts[0]

@@ -20,10 +20,10 @@ from nlsdesign.design import (
     MachinedCam,
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
-    contour_from_curvature,
     contour_from_lever_arm,
     write_drawings,
 )
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.quantity import quantity
 from tests.dxf_reading import TautString, header_of, offset_points, polylines_of
 

@@ -22,7 +22,8 @@ from nlsdesign.foundation.spread import NormalSpread, RelativeSpread, Spread, Un
 from nlsdesign.model import FlatModel
 from nlsdesign.regeneration.regenerated_observer import DRAWS, _draws
 from nlsdesign.simulation.prior import declared_prior
-from nlsdesign.sweeps import AngleQuestion, RandomDraws, Subject
+from nlsdesign.sweeps import AngleQuestion, RandomDraws
+from nlsdesign.sweeps.axis_values import Subject
 
 AREA = "spring.rubber.area"
 DECK = load_deck("austin2015_figure_consistent")

@@ -21,9 +21,9 @@ from nlsdesign.design import (
     PretensionRange,
     RestLengthRange,
     TorqueError,
-    contour_from_curvature,
     pareto,
 )
+from nlsdesign.design.statics.contour import contour_from_curvature
 from tests.cam_cases import CONCAVE, RUBBER, TARGET, actuator
 
 KEEP = (

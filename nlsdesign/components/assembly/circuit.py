@@ -43,15 +43,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Stack:
-    """Circuits in parallel: extensions are equal, forces add.
+    """Circuits in parallel: extensions are equal, forces add."""
 
-    Parameters
-    ----------
-    items
-        From top to bottom, two at least.
-    """
-
-    items: tuple[Circuit, ...]
+    items: tuple[Circuit, ...]  # from top to bottom, two at least
 
 
 Circuit: TypeAlias = Leaf | Row | Stack

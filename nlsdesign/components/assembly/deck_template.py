@@ -37,18 +37,11 @@ class AskedNumber:
 
 @dataclass(frozen=True)
 class DeckTemplate:
-    """A deck to begin with.
+    """A deck to begin with."""
 
-    Parameters
-    ----------
-    name
-        For instance ``"cam-actuator"``.
-    text
-        TOML; a comment ``# Asked: ...`` stands above each number that is asked for, and ``# Ready for: ...``
-        names the commands that the template is meant for.
-    """
-
-    name: str
+    name: str  # for instance "cam-actuator"
+    # text: TOML; a comment # Asked: ... stands above each number that is asked for, and # Ready for: ...
+    # names the commands that the template is meant for.
     text: str
 
     @property
@@ -141,24 +134,12 @@ def load_template(name: str) -> DeckTemplate:
 
 @dataclass(frozen=True)
 class MotorInertia:
-    """Where a machine holds the inertia of its motor, and which gear lies between rotor and output.
+    """Where a machine holds the inertia of its motor, and which gear lies between rotor and output."""
 
-    Parameters
-    ----------
-    name
-        Full name of the inertia.
-    place
-        ``"rotor"`` or ``"output"``: where the component takes it.
-    ratio
-        Full name of the ratio of the gear.
-    counts
-        Full names of the counts of encoders that read the angle at the output.
-    """
-
-    name: str
-    place: str
-    ratio: str
-    counts: tuple[str, ...] = ()
+    name: str  # full name of the inertia
+    place: str  # "rotor" or "output": where the component takes it
+    ratio: str  # full name of the ratio of the gear
+    counts: tuple[str, ...] = ()  # full names of the counts of encoders that read the angle at the output
 
     def converted(self, given: Quantity, *, at: str, ratio: Quantity) -> Quantity:
         """Return an inertia as the component takes it; the source says how it was converted."""

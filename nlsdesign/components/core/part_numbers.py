@@ -25,31 +25,17 @@ PerDomain: TypeAlias = float | Mapping[Domain, float]
 
 @dataclass(frozen=True)
 class ParameterInfo:
-    """What a part says of one of its numbers.
+    """What a part says of one of its numbers."""
 
-    Parameters
-    ----------
-    unit
-        SI unit.
-    description
-        Meaning in words.
-    minimum, maximum
-        Range in which the law holds and beyond which a number is taken for a slip of units; inclusive.
-    row
-        Whether it may be a row of numbers.
-    domain
-        Name of the domain that the unit is of; empty where there is but one.
-    whole
-        Whether it counts something, so that only whole numbers make sense.
-    """
-
-    unit: str
-    description: str
+    unit: str  # SI unit
+    description: str  # meaning in words
+    # minimum, maximum: range in which the law holds and beyond which a number is taken for a slip of units;
+    # inclusive
     minimum: float
     maximum: float
-    row: bool = False
-    domain: str = ""
-    whole: bool = False
+    row: bool = False  # whether it may be a row of numbers
+    domain: str = ""  # name of the domain that the unit is of; empty where there is but one
+    whole: bool = False  # whether it counts something, so that only whole numbers make sense
 
     def checked(self, name: str, given: Given) -> Quantity:
         """Return the number as a quantity of the right dimension and size."""
@@ -111,17 +97,10 @@ class ParameterInfo:
 
 @dataclass(frozen=True)
 class Template:
-    """What a class says of one of its numbers, for every domain.
+    """What a class says of one of its numbers, for every domain."""
 
-    Parameters
-    ----------
-    unit
-        SI unit; ``{motion}``, ``{rate}``, ``{effort}`` and ``{inertia}`` in it stand for those of a domain.
-    description, minimum, maximum, row, whole
-        As in :class:`ParameterInfo`; the range may differ between domains.
-    """
-
-    unit: str
+    unit: str  # SI unit; {motion}, {rate}, {effort} and {inertia} in it stand for those of a domain
+    # description, minimum, maximum, row, whole: as in ParameterInfo; the range may differ between domains
     description: str
     minimum: PerDomain
     maximum: PerDomain

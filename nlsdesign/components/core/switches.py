@@ -19,80 +19,39 @@ from ...foundation.symbolic import Expression, symbol
 
 @dataclass(frozen=True)
 class Kink:
-    """A place at which an effort has a kink.
+    """A place at which an effort has a kink."""
 
-    Parameters
-    ----------
-    name
-        Full name, for messages and events.
-    value
-        Vanishes at the kink.
-    above, below
-        What has happened when the value has become positive, or negative.
-    """
-
-    name: str
-    value: Expression
+    name: str  # full name, for messages and events
+    value: Expression  # vanishes at the kink
+    # above, below: what has happened when the value has become positive, or negative
     above: str
     below: str
 
 
 @dataclass(frozen=True)
 class Jump(Kink):
-    """A place at which an effort jumps.
+    """A place at which an effort jumps."""
 
-    Parameters
-    ----------
-    mode
-        Symbol that is 1 where the value is positive and −1 where it is negative.
-    """
-
-    mode: Expression
+    mode: Expression  # symbol that is 1 where the value is positive and −1 where it is negative
 
 
 @dataclass(frozen=True)
 class StictionConstraint:
-    """An effort that keeps a rate at zero, and what acts while it does not.
+    """An effort that keeps a rate at zero, and what acts while it does not."""
 
-    Parameters
-    ----------
-    name
-        Full name, for messages and events.
-    effort
-        Symbol of the effort against the rate.
-    mode
-        Symbol that is 0 while the rate is held, otherwise 1 or −1.
-    rate
-        What is held at zero.
-    moving
-        Effort while the rate is not held.
-    stays
-        Not negative as long as the effort can hold.
-    lands
-        Not negative as long as the rate stays free.
-    leads
-        Mode that follows when the effort cannot hold any longer.
-    rebound
-        Rate after landing; zero where it is held from then on.
-    first
-        Mode before anything is known of the effort: 0 where it might hold.
-    words
-        What has happened when a mode begins: pairs of mode and text; the text of a rebound is at 2.
-    level
-        Largest effort of dry friction while it holds; several on one rate share the load in this ratio.
-    """
-
-    name: str
-    effort: Expression
-    mode: Expression
-    rate: Expression
-    moving: Expression
-    stays: Expression
-    lands: Expression
-    leads: Expression
-    rebound: Expression
-    first: Expression
+    name: str  # full name, for messages and events
+    effort: Expression  # symbol of the effort against the rate
+    mode: Expression  # symbol that is 0 while the rate is held, otherwise 1 or −1
+    rate: Expression  # what is held at zero
+    moving: Expression  # effort while the rate is not held
+    stays: Expression  # not negative as long as the effort can hold
+    lands: Expression  # not negative as long as the rate stays free
+    leads: Expression  # mode that follows when the effort cannot hold any longer
+    rebound: Expression  # rate after landing; zero where it is held from then on
+    first: Expression  # mode before anything is known of the effort: 0 where it might hold
+    # words: what has happened when a mode begins: pairs of mode and text; the text of a rebound is at 2
     words: tuple[tuple[int, str], ...]
+    # level: largest effort of dry friction while it holds; several on one rate share the load in this ratio
     level: Expression | None = None
 
 

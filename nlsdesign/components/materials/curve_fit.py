@@ -33,17 +33,10 @@ _DENSE = 400
 
 @dataclass(frozen=True)
 class CurveFit:
-    """A law and how far it is from the curve that it was fitted to.
+    """A law and how far it is from the curve that it was fitted to."""
 
-    Parameters
-    ----------
-    law
-        With the range of the curve.
-    rms_error, worst_error
-        Of the stress, relative to the measured one, over the points.
-    """
-
-    law: FittedLaw
+    law: FittedLaw  # with the range of the curve
+    # rms_error, worst_error: of the stress, relative to the measured one, over the points
     rms_error: float
     worst_error: float
 
@@ -122,8 +115,7 @@ def _engaging(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[Fi
 
 
 def _positive(value: Array, width: float) -> Array:
-    softened: Array = width * np.logaddexp(0.0, value / width)
-    return softened
+    return width * np.logaddexp(0.0, value / width)
 
 
 def _fewest(columns: Array, stress: Array, *, first: tuple[int, ...]) -> tuple[list[int], Array]:

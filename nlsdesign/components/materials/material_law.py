@@ -24,27 +24,17 @@ _CURVE, _ENGAGING, _OGDEN, _GAUSS = "nominal_stress", "engaging_moduli", "ogden_
 
 @dataclass(frozen=True)
 class MaterialLaw:
-    """The laws of a rubber of the library, and what it bears.
-
-    Parameters
-    ----------
-    material
-        Of the library.
-    using
-        Name of the property that the elastic law comes from.
-    members
-        Laws of stress and strain that act in parallel: ``stiff``, and ``relaxing`` where it is known.
-    strength
-        Tensile strength and elongation at break; where the library does not have them, the end of the
-        measured curve, which the rubber bears at least; not declared where there is no curve.
-    rms_error, worst_error
-        Of the stress over the points of the curve, relative; ``None`` where no curve was fitted.
-    """
+    """The laws of a rubber of the library, and what it bears."""
 
     material: Material
-    using: str
+    using: str  # name of the property that the elastic law comes from
+    # members: laws of stress and strain that act in parallel: stiff, and relaxing where it is known
     members: tuple[tuple[str, Element], ...]
+    # strength: tensile strength and elongation at break; where the library does not have them, the end of the
+    # measured curve, which the rubber bears at least; not declared where there is no curve
     strength: Reading
+    # rms_error, worst_error: of the stress over the points of the curve, relative; None where no curve was
+    # fitted
     rms_error: float | None = None
     worst_error: float | None = None
 

@@ -87,10 +87,9 @@ class Springpot(Element):
         """
         numbers = {name: quantity.number for name, quantity in self.parameters().items()}
         s = 2j * math.pi * frequency
-        result: NDArray[np.complex128] = sum(
+        return sum(
             (modulus * s / (s + rate) for modulus, rate in _branches(**numbers)), start=np.zeros_like(s)
         )
-        return result
 
     def title(self) -> str:
         """Return one line that names the law, its numbers and what the approximation costs."""

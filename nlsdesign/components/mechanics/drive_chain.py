@@ -17,18 +17,12 @@ from ..core.part_numbers import parameter
 
 
 class DriveCommand(NamedTuple):
-    """What comes into a part of a drive.
+    """What comes into a part of a drive."""
 
-    Parameters
-    ----------
-    value, unit
-        For instance a current in A, or the goal of a position controller in rad.
-    motion, rate
-        Of the body that is driven.
-    """
-
+    # value, unit: for instance a current in A, or the goal of a position controller in rad
     value: Expression
     unit: str
+    # motion, rate: of the body that is driven
     motion: Expression
     rate: Expression
 

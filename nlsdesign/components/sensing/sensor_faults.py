@@ -45,8 +45,7 @@ class TransportDelay(Sensor):
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return what was there τ before."""
-        earlier: Array = np.interp(times - self.delay.number, times, values)
-        return earlier
+        return np.interp(times - self.delay.number, times, values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,8 +112,7 @@ class LoadNonlinearity(Sensor):
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return F·(1 + n·|F|/F_fs)."""
         share = np.abs(values) / self.full_scale.number
-        result: Array = values * (1.0 + self.nonlinearity.number * share)
-        return result
+        return values * (1.0 + self.nonlinearity.number * share)
 
     def infer(self, numbers: Numbers, reading: Expression) -> Expression:
         """Return 2·R/(1 + √(1 + 4·n·|R|/F_fs)), the load behind a reading R."""

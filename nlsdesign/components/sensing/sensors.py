@@ -221,8 +221,7 @@ class Encoder(Sensor):
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return the motion rounded to whole counts."""
         quantum = self.quantum.number
-        rounded: Array = quantum * np.floor(values / quantum + 0.5)
-        return rounded
+        return quantum * np.floor(values / quantum + 0.5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,8 +242,7 @@ class _Transducer(Sensor):
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return gain·x + bias + noise."""
         scatter = self.noise.number * noise.standard_normal(len(values))
-        line: Array = self.gain.number * values + self.bias.number + scatter
-        return line
+        return self.gain.number * values + self.bias.number + scatter
 
     def infer(self, numbers: Numbers, reading: Expression) -> Expression:
         """Return (reading − bias)/gain."""
@@ -292,8 +290,7 @@ class CurrentSensor(Sensor):
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return I + bias + noise."""
-        line: Array = values + self.bias.number + self.noise.number * noise.standard_normal(len(values))
-        return line
+        return values + self.bias.number + self.noise.number * noise.standard_normal(len(values))
 
     def infer(self, numbers: Numbers, reading: Expression) -> Expression:
         """Return reading − bias."""

@@ -20,18 +20,12 @@ class ComplianceSpline:
     """Compliance dδ/dτ as a quadratic B-spline in the torque: positive where its coefficients are.
 
     The deflection δ(τ) is its exact integral from zero torque, twice continuously differentiable.
-
-    Parameters
-    ----------
-    low, high
-        Range of torque in N·m, which holds zero.
-    pieces
-        Number of equal pieces.
     """
 
+    # low, high: range of torque in N·m, which holds zero
     low: float
     high: float
-    pieces: int
+    pieces: int  # number of equal pieces
 
     @property
     def knots(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...foundation.errors import UnitError, ValueRangeError
-from ...foundation.quantity import Quantity, degrees, same_dimension, with_unit
+from ...foundation.quantity import Quantity, degrees, parse_unit, same_dimension, with_unit
 
 _SLIPS = {
     "m": (("mm", 1e-3), ("cm", 1e-2)),
@@ -55,3 +55,8 @@ def _slip(value: float, unit: str, minimum: float, maximum: float) -> str | None
 def plain(given: Quantity | float) -> float:
     """Return the number in SI of a field that :func:`in_si` has checked."""
     return given.number if isinstance(given, Quantity) else given
+
+
+def in_unit(value: float, unit: str, digits: int = 4) -> str:
+    """Return a number in SI as text in another unit, for people."""
+    return with_unit(f"{value / parse_unit(unit).factor:.{digits}g}", unit)

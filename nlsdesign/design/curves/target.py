@@ -346,8 +346,7 @@ def _over(law: Callable[[Expression], Expression], angle: Expression | ArrayLike
     given = np.asarray(angle, dtype=float)
     symbol = ca.SX.sym("angle")
     function = ca.Function("law", [symbol], [law(symbol)])
-    result: Array = np.array(function(given.reshape(1, -1)), dtype=float).reshape(given.shape)
-    return result
+    return np.array(function(given.reshape(1, -1)), dtype=float).reshape(given.shape)
 
 
 @dataclass(frozen=True, kw_only=True)

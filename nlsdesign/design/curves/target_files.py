@@ -18,24 +18,12 @@ from .target import TabulatedStiffness, TabulatedTorque, Target, TorqueBand
 
 @dataclass(frozen=True, eq=False)
 class ReadColumns:
-    """Columns of one table in SI.
+    """Columns of one table in SI."""
 
-    Parameters
-    ----------
-    file
-        Name of the file, for messages.
-    values
-        By name, shape (n,).
-    units
-        As the heads give them, by name.
-    lines
-        Number of the line of each row.
-    """
-
-    file: str
-    values: Mapping[str, Array]
-    units: Mapping[str, str]
-    lines: tuple[int, ...]
+    file: str  # name of the file, for messages
+    values: Mapping[str, Array]  # by name, shape (n,)
+    units: Mapping[str, str]  # as the heads give them, by name
+    lines: tuple[int, ...]  # number of the line of each row
 
     def cell(self, row: int, name: str) -> str:
         """Return where a number stands: file, line and column."""
@@ -181,19 +169,7 @@ def read_target(path: Path | str) -> Target:
 def read_band(path: Path | str) -> TorqueBand:
     """Read a band of torques from a CSV file with the columns ``angle``, ``lower`` and ``upper``.
 
-    Parameters
-    ----------
-    path
-        Of the file; its heads are those of :func:`read_target`.
-
-    Raises
-    ------
-    MeasurementError
-        If the file cannot be read, or a column or a cell is missing, unknown or no number.
-    UnitError
-        If a unit is missing or of another dimension.
-    ValueRangeError
-        If the angles do not ascend from zero, or the lower torque is not below the upper.
+    Heads and errors are those of :func:`read_target`; the lower torque must lie below the upper.
     """
     table = read_columns(path, _COLUMNS)
     for name in ("angle", "lower", "upper"):

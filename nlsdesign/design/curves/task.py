@@ -22,28 +22,18 @@ _WALKING = "bovi2011"
 
 @dataclass(frozen=True, eq=False)
 class TaskCycle:
-    """A task at equally spaced times of one period; arrays of shape (n,), with exact derivatives.
+    """A task at equally spaced times of one period; arrays of shape (n,), with exact derivatives."""
 
-    Parameters
-    ----------
-    time
-        In s, from zero; the period's end is left out, it is the start of the next one.
-    angle, speed, acceleration
-        Of the joint, in rad, rad/s and rad/s².
-    torque, torque_rate, torque_acceleration
-        On the joint, in N·m, N·m/s and N·m/s².
-    period
-        In s.
-    """
-
-    time: Array
+    time: Array  # in s, from zero; the period's end is left out, it is the start of the next one
+    # angle, speed, acceleration: of the joint, in rad, rad/s and rad/s²
     angle: Array
     speed: Array
     acceleration: Array
+    # torque, torque_rate, torque_acceleration: on the joint, in N·m, N·m/s and N·m/s²
     torque: Array
     torque_rate: Array
     torque_acceleration: Array
-    period: float
+    period: float  # in s
 
     def over_period(self, values: Array) -> float:
         """Return the integral over the period; exact to rounding for smooth periodic values."""

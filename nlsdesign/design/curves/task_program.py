@@ -28,49 +28,30 @@ _THIN = 4
 
 @dataclass(frozen=True, eq=False)
 class LimitRows:
-    """Rows of one limit: offset + matrix·y lies between −largest and largest.
+    """Rows of one limit: offset + matrix·y lies between −largest and largest."""
 
-    Parameters
-    ----------
-    name, unit
-        What is limited, for messages.
-    matrix, offset
-        Shape (n, m) and (n,).
-    largest
-        In ``unit``; infinite for none.
-    """
-
+    # name, unit: what is limited, for messages
     name: str
     unit: str
+    # matrix, offset: shape (n, m) and (n,)
     matrix: Array
     offset: Array
-    largest: float
+    largest: float  # in unit; infinite for none
 
 
 @dataclass(frozen=True, eq=False)
 class TaskProgram:
-    """A task, a drive and a spring with unknown compliances y ≥ floor.
+    """A task, a drive and a spring with unknown compliances y ≥ floor."""
 
-    Parameters
-    ----------
-    cycle, drive
-        What is asked for and what drives.
-    spline
-        Compliance over torque.
-    freedom, offset
-        Coefficients of the spline are offset + freedom·y.
-    floor
-        Smallest compliance in rad/(N·m).
-    largest_deflection, largest_speed
-        In rad, and of the motor in rad/s; infinite for none.
-    """
-
+    # cycle, drive: what is asked for and what drives
     cycle: TaskCycle
     drive: MotorAndGear
-    spline: ComplianceSpline
+    spline: ComplianceSpline  # compliance over torque
+    # freedom, offset: coefficients of the spline are offset + freedom·y
     freedom: Array
     offset: Array
-    floor: float
+    floor: float  # smallest compliance in rad/(N·m)
+    # largest_deflection, largest_speed: in rad, and of the motor in rad/s; infinite for none
     largest_deflection: float
     largest_speed: float
 
@@ -142,18 +123,10 @@ class TaskProgram:
 
 @dataclass(frozen=True, eq=False)
 class TaskOptimum:
-    """Solution of a program.
+    """Solution of a program."""
 
-    Parameters
-    ----------
-    unknowns
-        y, shape (m,).
-    bound
-        What no spring can go below, from the dual; ``None`` where the problem is not convex.
-    """
-
-    unknowns: Array
-    bound: float | None
+    unknowns: Array  # y, shape (m,)
+    bound: float | None  # what no spring can go below, from the dual; None where the problem is not convex
 
 
 def least_energy(program: TaskProgram) -> TaskOptimum:

@@ -19,20 +19,11 @@ class ArcPath:
 
     A bulge of zero is a straight line, a positive one an arc to the left (anticlockwise). From the last point
     of a closed path an arc leads to the first.
-
-    Parameters
-    ----------
-    points
-        Shape (n, 2), in m.
-    bulges
-        Shape (n,); of an open path the last is not used.
-    closed
-        Whether the path returns to its first point.
     """
 
-    points: Array
-    bulges: Array
-    closed: bool = False
+    points: Array  # shape (n, 2), in m
+    bulges: Array  # shape (n,); of an open path the last is not used
+    closed: bool = False  # whether the path returns to its first point
 
     @cached_property
     def ends(self) -> tuple[Array, Array, Array]:
@@ -221,7 +212,6 @@ def crossing(polygon: Array) -> Array | None:
 
 def _side(a: Array, b: Array, c: Array) -> Array:
     """Return which side of the line from a to b the point c lies on, for one or many lines or points."""
-    result: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
+    return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
         c[..., 0] - a[..., 0]
     )
-    return result

@@ -24,25 +24,14 @@ _CHECKED = 33
 
 @dataclass(frozen=True, eq=False)
 class LipEdge:
-    """Edge under the cable from the channel to the end of the run-out, clockwise, as arcs.
+    """Edge under the cable from the channel to the end of the run-out, clockwise, as arcs."""
 
-    Parameters
-    ----------
-    path
-        Open path in the frame of the cam, in m.
-    deviation
-        Largest distance between the arcs and the contour less the radius of the cable, in m.
-    first_direction, last_direction
-        φ at both ends in rad: the outward normal is (sin φ, cos φ).
-    last_support
-        Distance of the last tangent from the centre in m.
-    """
-
-    path: ArcPath
-    deviation: float
+    path: ArcPath  # open path in the frame of the cam, in m
+    deviation: float  # largest distance between the arcs and the contour less the radius of the cable, in m
+    # first_direction, last_direction: φ at both ends in rad: the outward normal is (sin φ, cos φ)
     first_direction: float
     last_direction: float
-    last_support: float
+    last_support: float  # distance of the last tangent from the centre in m
 
 
 def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> LipEdge:
@@ -99,12 +88,6 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
         )
 
 
-def _point(support: BPoly, direction: float, cable_radius: float) -> Array:
-    p, slope = float(support(direction)), float(support(direction, 1))
-    result: Array = (p - cable_radius) * _normal(direction) + slope * _tangent(direction)
-    return result
-
-
 def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, float]:
     """Return as few biarcs as the accuracy allows, and their deviation."""
     share = np.arange(_REFINE) / _REFINE
@@ -129,7 +112,10 @@ def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, flo
 
 
 def _biarc_over(support: BPoly, first: float, last: float, cable_radius: float) -> tuple[ArcPath, float]:
-    start, end = (_point(support, direction, cable_radius) for direction in (first, last))
+    start, end = (
+        (float(support(phi)) - cable_radius) * _normal(phi) + float(support(phi, 1)) * _tangent(phi)
+        for phi in (first, last)
+    )
     path = biarc(start, end, first=_tangent(first), last=_tangent(last))
     phi = np.linspace(first, last, _CHECKED)
     normals = np.column_stack([np.sin(phi), np.cos(phi)])

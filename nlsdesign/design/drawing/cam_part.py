@@ -18,24 +18,12 @@ from .arc_path import ArcPath, crossing, distance_to, inside_of
 
 @dataclass(frozen=True, eq=False)
 class Hole:
-    """A round hole.
+    """A round hole."""
 
-    Parameters
-    ----------
-    name
-        What it is for.
-    centre
-        Shape (2,), in m.
-    diameter
-        In m.
-    base_only
-        Whether it goes through the base plate alone, under cable and lips.
-    """
-
-    name: str
-    centre: Array
-    diameter: float
-    base_only: bool = False
+    name: str  # what it is for
+    centre: Array  # shape (2,), in m
+    diameter: float  # in m
+    base_only: bool = False  # whether it goes through the base plate alone, under cable and lips
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,8 +94,7 @@ class BoltCircle:
         # Half a step off the y axis where a hole would else lie on the x axis.
         first = math.pi / 2 + (step / 2 if self.count % 4 == 0 else 0.0)
         angles = first + step * np.arange(self.count)
-        result: Array = plain(self.circle) / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
-        return result
+        return plain(self.circle) / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -431,8 +430,7 @@ def _cable(contour: Contour, angle: float, beyond: float) -> Array:
     away = min(float(contour.free_lengths[last]), beyond + (0.0 if last else float(contour.radii.max())))
     direction = float(contour.directions[last])
     leaving = contour.points[last] + away * np.array([math.cos(direction), -math.sin(direction)])
-    result: Array = np.vstack([contour.points[: last + 1], leaving])
-    return result
+    return np.vstack([contour.points[: last + 1], leaving])
 
 
 def as_quantity(given: Quantity | float, unit: str = "m") -> Quantity:

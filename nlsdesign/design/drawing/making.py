@@ -66,22 +66,13 @@ def process_of(part: CamPart) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Mounting:
-    """A part on its shaft: what carries the largest torque of a curve from one to the other.
+    """A part on its shaft: what carries the largest torque of a curve from one to the other."""
 
-    Parameters
-    ----------
-    machined, contour
-        Sizes of the part, and the curve that it is made for.
-    part
-        Made of both.
-    torque
-        In N·m.
-    """
-
+    # machined, contour: sizes of the part, and the curve that it is made for
     machined: MachinedCam
     contour: Contour
-    part: CamPart
-    torque: float
+    part: CamPart  # made of both
+    torque: float  # in N·m
 
     def remarks(self) -> Iterator[str]:
         """Yield the process of the part, where nothing carries the torque, and bolts that would."""

@@ -14,6 +14,7 @@ from ...foundation.errors import DeckError, NlsError
 from ...foundation.quantity import Quantity, parse_unit, with_unit
 from ...foundation.text_files import discard, make_folder, write_text
 from ...model.structure import CamNames
+from ..curves.numbers import in_unit
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
@@ -82,18 +83,10 @@ class PicturesOfDesign(Protocol):
 
 @dataclass(frozen=True)
 class WrittenDesign:
-    """The files of a design.
+    """The files of a design."""
 
-    Parameters
-    ----------
-    files
-        In the order in which they were written.
-    remarks
-        What a designer should know before a part is made.
-    """
-
-    files: tuple[Path, ...]
-    remarks: tuple[str, ...]
+    files: tuple[Path, ...]  # in the order in which they were written
+    remarks: tuple[str, ...]  # what a designer should know before a part is made
 
 
 def write_design(
@@ -231,10 +224,10 @@ def trim_remarks(design: CamDesign) -> Iterator[str]:
             if state.of == trim.name and (high > state.bound if state.upper else low < state.bound):
                 factor = parse_unit(state.unit).factor
                 needed = with_unit(f"{low / factor:.4g} to {high / factor:.4g}", state.unit)
-                bound = with_unit(f"{state.bound / factor:.4g}", state.unit)
                 yield (
                     f"{state.limit} holds for the nominal spring: to trim 95 % of the made ones, {trim.name} "
-                    f"is set from {needed}, beyond {bound} -> leave it that travel, or narrow the spreads"
+                    f"is set from {needed}, beyond {in_unit(state.bound, state.unit)} -> leave it that "
+                    "travel, or narrow the spreads"
                 )
 
 

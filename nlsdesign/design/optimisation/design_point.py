@@ -48,65 +48,36 @@ class CoilColumns(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class DesignPoint:
-    """A cam with its rubber at nodes over the angle; columns of shape (n,), all in SI.
+    """A cam with its rubber at nodes over the angle; columns of shape (n,), all in SI."""
 
-    Parameters
-    ----------
-    cam
-        Names around the cam.
-    target
-        Torque curve.
-    angles
-        θ at the nodes, from zero to the last angle of the target.
-    lever_arms, lever_arm_slopes
-        h and dh/dθ.
-    radii_of_curvature, radii
-        Of the contour: ρ and the distance from the centre.
-    directions
-        φ, the direction of the cable seen from the cam.
-    extensions, forces, stiffnesses
-        e₀ + δ, F and dF/de of one element.
-    strains, stresses
-        Nominal strain and nominal stress by path of the piece of rubber.
-    coil_rows
-        Four rows for each coil: the columns of :class:`CoilColumns`.
-    torque_errors
-        N·h·F minus target.
-    parameters
-        All parameters of the flat model by name; symbols where they are free.
-    element
-        What one element does at an extension in m.
-    through_centre
-        Whether the cable passes through the centre, so that both signs of the angle stretch the rubber alike.
-    shown_units
-        Unit in which each parameter is shown.
-    model
-        Flat model of the actuator, with its numbers as they are declared.
-    law
-        Equilibrium law of one element.
-    """
-
-    cam: CamNames
-    target: Target
-    angles: Expression
+    cam: CamNames  # names around the cam
+    target: Target  # torque curve
+    angles: Expression  # θ at the nodes, from zero to the last angle of the target
+    # lever_arms, lever_arm_slopes: h and dh/dθ
     lever_arms: Expression
     lever_arm_slopes: Expression
+    # radii_of_curvature, radii: of the contour: ρ and the distance from the centre
     radii_of_curvature: Expression
     radii: Expression
-    directions: Expression
+    directions: Expression  # φ, the direction of the cable seen from the cam
+    # extensions, forces, stiffnesses: e₀ + δ, F and dF/de of one element
     extensions: Expression
     forces: Expression
     stiffnesses: Expression
+    # strains, stresses: nominal strain and nominal stress by path of the piece of rubber
     strains: Mapping[str, Expression]
     stresses: Mapping[str, Expression]
-    coil_rows: Expression
-    torque_errors: Expression
+    coil_rows: Expression  # four rows for each coil: the columns of CoilColumns
+    torque_errors: Expression  # N·h·F minus target
+    # parameters: all parameters of the flat model by name; symbols where they are free
     parameters: Mapping[str, Expression]
-    element: Callable[[Expression], Stretched]
+    element: Callable[[Expression], Stretched]  # what one element does at an extension in m
+    # through_centre: whether the cable passes through the centre, so that both signs of the angle stretch the
+    # rubber alike
     through_centre: bool
-    shown_units: Mapping[str, str]
-    model: FlatModel
-    law: ElasticLaw
+    shown_units: Mapping[str, str]  # unit in which each parameter is shown
+    model: FlatModel  # flat model of the actuator, with its numbers as they are declared
+    law: ElasticLaw  # equilibrium law of one element
 
     @cached_property
     def relaxing(self) -> RelaxingLaw:

@@ -37,36 +37,16 @@ ANCHOR = "AnchorClearance"
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is asked for, apart from what is free.
+    """What is asked for, apart from what is free."""
 
-    Parameters
-    ----------
-    machine
-        The actuator as it is declared.
-    model
-        It, flattened with smooth cables.
-    cam
-        Its declared cam.
-    drive
-        Path of the part that holds the cam.
-    target
-        Torque curve.
-    keep
-        All limits, defaults included.
-    goals
-        What is made small, as a sum.
-    settings
-        How the search is carried out.
-    """
-
-    machine: Assembly
-    model: FlatModel
-    cam: object
-    drive: str
-    target: Target
-    keep: tuple[Limit, ...]
-    goals: tuple[Goal, ...]
-    settings: DesignSettings
+    machine: Assembly  # the actuator as it is declared
+    model: FlatModel  # it, flattened with smooth cables
+    cam: object  # its declared cam
+    drive: str  # path of the part that holds the cam
+    target: Target  # torque curve
+    keep: tuple[Limit, ...]  # all limits, defaults included
+    goals: tuple[Goal, ...]  # what is made small, as a sum
+    settings: DesignSettings  # how the search is carried out
 
     def search(self, free: Sequence[str], rounding: float | None = None) -> Search:
         """Return the search in which these numbers may change.

@@ -50,30 +50,14 @@ largest torque, from which the rounding of knots is narrowed."""
 
 @dataclass(frozen=True, eq=False)
 class SolvedSearch:
-    """A search with its outcomes, the one that was taken, and the assembly that follows from it.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    search
-        That was solved.
-    free
-        What may change in it.
-    outcomes
-        From each start.
-    taken
-        Number of the best of them.
-    best
-        That one, or what followed from it with knots rounded less.
-    """
+    """A search with its outcomes, the one that was taken, and the assembly that follows from it."""
 
     actuator: Assembly
-    search: Search
-    free: tuple[str, ...]
+    search: Search  # that was solved
+    free: tuple[str, ...]  # what may change in it
     outcomes: Sequence[Solution]
-    taken: int
-    best: Solution
+    taken: int  # number of the best of them
+    best: Solution  # that one, or what followed from it with knots rounded less
 
     @cached_property
     def predicted_rms(self) -> float:

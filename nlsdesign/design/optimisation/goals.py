@@ -71,8 +71,9 @@ class SquaredTorqueGoal(Goal):
         return self.mean_square(design) / (1e-3 * design.target.largest) ** 2
 
     def measured(self, design: DesignPoint) -> GoalMeasure:
-        """Return the root of the mean square."""
-        return rms_of_mean_square(self.what, self.mean_square(design), design)
+        """Return the root of the mean square, smooth where it vanishes."""
+        floor = (_FLOOR * design.target.largest) ** 2
+        return GoalMeasure(self.what, ca.sqrt(self.mean_square(design) + floor), "mN*m")
 
 
 @dataclass(frozen=True)
@@ -135,11 +136,6 @@ class LeastRubber(Goal):
         """Return weight · volume / typical volume."""
         needed = design.target.energy(design.target.last_angle) / self.energy_density
         return self.weight * design.rubber_volume / needed
-
-
-def rms_of_mean_square(what: str, mean_square: Expression, design: DesignPoint) -> GoalMeasure:
-    """Return a mean square torque as its root, smooth where it vanishes."""
-    return GoalMeasure(what, ca.sqrt(mean_square + (_FLOOR * design.target.largest) ** 2), "mN*m")
 
 
 _RADIUS = 0.01

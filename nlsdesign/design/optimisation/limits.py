@@ -10,9 +10,9 @@ from typing import ClassVar
 import casadi as ca
 
 from ...foundation.errors import UnitError, ValueRangeError, unknown_name
-from ...foundation.quantity import Quantity, parse_unit, same_dimension, typeset_unit, with_unit
+from ...foundation.quantity import Quantity, same_dimension, typeset_unit
 from ...foundation.symbolic import Expression
-from ..curves.numbers import in_si, plain
+from ..curves.numbers import in_si, in_unit, plain
 from ..curves.target import TorqueBand
 from .design_point import DesignPoint, anchor_of
 from .goals import Goal
@@ -32,7 +32,7 @@ class Bound:
 
     def shown(self, value: float) -> str:
         """Return a number in the unit of the limit as text."""
-        return with_unit(f"{value / parse_unit(self.unit).factor:.4g}", self.unit)
+        return in_unit(value, self.unit)
 
     def __str__(self) -> str:
         return f"{self.limit}: {self.of} {'<=' if self.upper else '>='} {self.shown(self.value)}"
@@ -659,45 +659,11 @@ class AtMost(Limit):
         yield self.bound(measure.what, measure.expression, plain(self.value), upper=True, unit=measure.unit)
 
 
-@dataclass(frozen=True)
-class LimitKind:
-    """A limit with one number.
-
-    Parameters
-    ----------
-    kind
-        Its class.
-    described
-        What the class says of its number.
-    """
+@dataclass(frozen=True, kw_only=True)
+class LimitKind(OneNumber):
+    """A limit with one number: what its class says of the number, and the class."""
 
     kind: type[Limit]
-    described: OneNumber
-
-    @property
-    def words(self) -> str:
-        """What is limited."""
-        return self.described.words
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the number."""
-        return self.described.unit
-
-    @property
-    def shown_unit(self) -> str:
-        """Unit in which people read it."""
-        return self.described.shown_unit
-
-    @property
-    def upper(self) -> bool:
-        """Whether the number is the largest that is allowed, or the least."""
-        return self.described.upper
-
-    @property
-    def of_shape(self) -> bool:
-        """Whether the contour alone decides it."""
-        return self.described.of_shape
 
     @property
     def name(self) -> str:
@@ -711,9 +677,7 @@ class LimitKind:
 
     def shown(self, value: float) -> str:
         """Return a number in the unit in which people read it."""
-        if self.shown_unit == "%":
-            return f"{100.0 * value:.4g} %"
-        return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
+        return f"{100.0 * value:.4g} %" if self.shown_unit == "%" else in_unit(value, self.shown_unit)
 
     @property
     def read_unit(self) -> str:
@@ -724,11 +688,11 @@ class LimitKind:
         """Return the limit."""
         if not abs(value) < float("inf"):
             raise ValueRangeError(f"{self.title} = {value:g}", "is no finite number")
-        return self.kind(**{self.described.field: value})
+        return self.kind(**{self.field: value})
 
     def value_of(self, limit: Limit) -> float:
         """Return the number of a limit of this kind in SI: what is allowed, with its safety factor."""
-        return plain(getattr(limit, self.described.field)) / float(getattr(limit, "safety_factor", 1.0))
+        return plain(getattr(limit, self.field)) / float(getattr(limit, "safety_factor", 1.0))
 
 
 def limit_kinds() -> dict[str, LimitKind]:
@@ -738,6 +702,6 @@ def limit_kinds() -> dict[str, LimitKind]:
     while classes:
         kind = classes.pop(0)
         if kind.described is not None:
-            known[kind.__name__] = LimitKind(kind, kind.described)
+            known[kind.__name__] = LimitKind(kind=kind, **vars(kind.described))
         classes += kind.__subclasses__()
     return known

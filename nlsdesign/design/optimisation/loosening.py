@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...foundation.quantity import parse_unit, with_unit
 from ...foundation.work_sharing import parallel_map
+from ..curves.numbers import in_unit
 from .defaults import BREAKS
 from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
@@ -71,28 +71,16 @@ class Give:
 
 @dataclass(frozen=True)
 class Freed:
-    """Numbers that are held now, and where they go when they are freed.
+    """Numbers that are held now, and where they go when they are freed."""
 
-    Parameters
-    ----------
-    names
-        Full names.
-    values
-        In SI.
-    units
-        In which each is shown.
-    error
-        Rms torque error in N·m that is then left.
-    """
-
-    names: tuple[str, ...]
-    values: tuple[float, ...]
-    units: tuple[str, ...]
-    error: float
+    names: tuple[str, ...]  # full names
+    values: tuple[float, ...]  # in SI
+    units: tuple[str, ...]  # in which each is shown
+    error: float  # rms torque error in N·m that is then left
 
     def __str__(self) -> str:
         shown = [
-            f"{name} (to {with_unit(f'{value / parse_unit(unit).factor:.4g}', unit)})"
+            f"{name} (to {in_unit(value, unit)})"
             for name, value, unit in zip(self.names, self.values, self.units, strict=True)
         ]
         return "free " + " and ".join(shown)
@@ -100,36 +88,20 @@ class Freed:
 
 @dataclass(frozen=True)
 class SizesTried:
-    """What freeing sizes came to.
+    """What freeing sizes came to."""
 
-    Parameters
-    ----------
-    enough
-        Single names that are enough alone, or else the smallest set that was found.
-    better
-        Single names with the error that is then left, where the solver came to a solution.
-    everything
-        All sizes freed at once; ``None`` where one alone is enough, or none is left to free.
-    """
-
-    enough: tuple[Freed, ...]
+    enough: tuple[Freed, ...]  # single names that are enough alone, or else the smallest set that was found
+    # better: single names with the error that is then left, where the solver came to a solution
     better: tuple[Freed, ...]
+    # everything: all sizes freed at once; None where one alone is enough, or none is left to free
     everything: Solution | None
 
 
 class Loosened:
     """The program of all that could give.
 
-    Parameters
-    ----------
-    search
-        The search that failed or missed.
-    free
-        What was free in it.
-    largest_error
-        Rms torque error in N·m that is asked for; ``None`` if the error does not matter.
-    best
-        Where the search came to.
+    ``search``: the search that failed or missed. ``largest_error``: rms torque error in N·m that is asked
+    for; ``None`` if the error does not matter.
     """
 
     def __init__(

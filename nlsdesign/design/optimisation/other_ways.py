@@ -27,21 +27,11 @@ _SHOWS = 0.01
 
 @dataclass(frozen=True)
 class OtherSpring:
-    """Another spring that was tried with the same free numbers and limits.
+    """Another spring that was tried with the same free numbers and limits."""
 
-    Parameters
-    ----------
-    words
-        What it is.
-    machine
-        The actuator with it, not designed yet.
-    error
-        Rms torque error in N·m that is then left.
-    """
-
-    words: str
-    machine: Assembly
-    error: float
+    words: str  # what it is
+    machine: Assembly  # the actuator with it, not designed yet
+    error: float  # rms torque error in N·m that is then left
 
     def __str__(self) -> str:
         return f"take {self.words}"
@@ -88,21 +78,11 @@ def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
 
 @dataclass(frozen=True)
 class Hollow:
-    """Where a contour would have to be hollow for all limits to be kept.
+    """Where a contour would have to be hollow for all limits to be kept."""
 
-    Parameters
-    ----------
-    spans
-        In words, over the angle.
-    deepest
-        Least radius of curvature in m, below zero.
-    freed
-        What has to be freed besides; ``None`` for nothing.
-    """
-
-    spans: str
-    deepest: float
-    freed: Freed | None
+    spans: str  # in words, over the angle
+    deepest: float  # least radius of curvature in m, below zero
+    freed: Freed | None  # what has to be freed besides; None for nothing
 
     def __str__(self) -> str:
         besides = "" if self.freed is None else f" ({self.freed} besides)"

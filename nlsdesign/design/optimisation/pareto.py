@@ -23,9 +23,10 @@ from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
 from ...foundation.errors import ConvergenceError, ValueRangeError
-from ...foundation.quantity import parse_unit, typeset_unit, with_unit
+from ...foundation.quantity import parse_unit, typeset_unit
 from ...foundation.text_files import write_table
 from ...foundation.work_sharing import parallel_map
+from ..curves.numbers import in_unit
 from ..curves.target import Target
 from .conflict import feasible_point
 from .design_search import Search
@@ -42,24 +43,12 @@ _SHOWN_IN = {"m": "mm", "m^2": "mm^2"}
 
 
 class FrontPoint(NamedTuple):
-    """One design of a front.
+    """One design of a front."""
 
-    Parameters
-    ----------
-    values
-        The goals, in SI.
-    numbers
-        Free numbers in SI by full name, besides the contour.
-    units
-        SI units of these.
-    binding
-        Names of the limits on which the design sits.
-    """
-
-    values: tuple[float, ...]
-    numbers: tuple[tuple[str, float], ...]
-    units: tuple[str, ...]
-    binding: tuple[str, ...]
+    values: tuple[float, ...]  # the goals, in SI
+    numbers: tuple[tuple[str, float], ...]  # free numbers in SI by full name, besides the contour
+    units: tuple[str, ...]  # SI units of these
+    binding: tuple[str, ...]  # names of the limits on which the design sits
 
 
 class LeftOut(NamedTuple):
@@ -421,8 +410,13 @@ def _front(actuator: Assembly, ladder: _Ladder, reached: Sequence[_Tried]) -> Pa
     scale = np.ptp([each.values for each in solved], axis=0)
     for each in solved:
         # The last digits of two solutions of the same design differ.
-        better = [other for other in solved if _betters(other.values, each.values, 1e-5 * scale)]
-        same = [other for other in kept if np.all(np.abs(other.values - each.values) <= 1e-5 * scale)]
+        digits, values = 1e-5 * scale, each.values
+        better = [
+            other
+            for other in solved
+            if np.all(other.values <= values + digits) and np.any(other.values < values - 10.0 * digits)
+        ]
+        same = [other for other in kept if np.all(np.abs(other.values - values) <= digits)]
         if better or same:
             why = "another point betters it" if better else "it is the same design as another point"
             left_out.append(LeftOut(_bounds_text(measures, each.bounds), why))
@@ -438,10 +432,6 @@ def _front(actuator: Assembly, ladder: _Ladder, reached: Sequence[_Tried]) -> Pa
             SolvedSearch(actuator, search, ladder.free, [each.outcome], 0, each.outcome) for each in kept
         ),
     )
-
-
-def _betters(one: Array, other: Array, digits: Array) -> bool:
-    return bool(np.all(one <= other + digits) and np.any(one < other - 10.0 * digits))
 
 
 def _point(search: Search, tried: _Tried) -> FrontPoint:
@@ -461,7 +451,6 @@ def _bounds_text(measures: Sequence[GoalMeasure], bounds: Sequence[float]) -> st
     def parts() -> Iterator[str]:
         for measure, bound in zip(measures[1:], bounds, strict=True):
             if np.isfinite(bound):
-                shown = f"{bound / parse_unit(measure.unit).factor:.4g}"
-                yield f"{measure.what} ≤ {with_unit(shown, measure.unit)}"
+                yield f"{measure.what} ≤ {in_unit(float(bound), measure.unit)}"
 
     return " and ".join(parts()) or "a goal alone"

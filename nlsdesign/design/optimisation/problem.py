@@ -42,35 +42,17 @@ class SymbolicTarget(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class DesignProblem:
-    """Variables and what follows from them.
+    """Variables and what follows from them."""
 
-    Parameters
-    ----------
-    law
-        Equilibrium law of the element behind the cam.
-    variables
-        All, in the order of the vector: single numbers, contour, states, torque errors.
-    design
-        The design in symbols.
-    structure
-        Rows that hold for any cam; no limit of the designer.
-    scalars
-        The single numbers that are free.
-    contour
-        The variables of the contour; ``None`` where it is given.
-    sizes
-        What starts are relative to.
-    states
-        Scaled values of the unknowns that the structure ties to the contour; they follow its variables.
-    """
-
-    law: ElasticLaw
+    law: ElasticLaw  # equilibrium law of the element behind the cam
+    # variables: all, in the order of the vector: single numbers, contour, states, torque errors
     variables: tuple[DesignVariable, ...]
-    design: DesignPoint
-    structure: tuple[Rows, ...]
-    scalars: tuple[DesignVariable, ...]
-    contour: ContourVariables | None
-    sizes: StartSizes
+    design: DesignPoint  # the design in symbols
+    structure: tuple[Rows, ...]  # rows that hold for any cam; no limit of the designer
+    scalars: tuple[DesignVariable, ...]  # the single numbers that are free
+    contour: ContourVariables | None  # the variables of the contour; None where it is given
+    sizes: StartSizes  # what starts are relative to
+    # states: scaled values of the unknowns that the structure ties to the contour; they follow its variables
     states: Expression
 
     @property
@@ -95,10 +77,7 @@ class DesignProblem:
 
     def evaluate(self, expression: Expression, point: Array) -> Array:
         """Return the value of an expression of the variables."""
-        result: Array = np.array(
-            ca.Function("value", [self.vector], [expression])(point), dtype=float
-        ).ravel()
-        return result
+        return np.array(ca.Function("value", [self.vector], [expression])(point), dtype=float).ravel()
 
     def rms(self, point: Array) -> float:
         """Return the rms torque error in N·m at a point."""

@@ -109,62 +109,29 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the solver stopped.
+    """Where the solver stopped."""
 
-    Parameters
-    ----------
-    solved
-        Whether it says that this is a solution.
-    status
-        Status in the words of IPOPT.
-    point
-        Unknowns, shape (unknowns,).
-    cost
-        Value of the cost.
-    iterations
-        Number of iterations.
-    prices
-        Multiplier of each group of rows, the largest magnitude in it.
-    multipliers
-        Of the bounds of the unknowns, and of all rows.
-    """
-
-    solved: bool
-    status: str
-    point: Array
-    cost: float
-    iterations: int
-    prices: tuple[float, ...]
-    multipliers: tuple[Array, Array]
+    solved: bool  # whether it says that this is a solution
+    status: str  # status in the words of IPOPT
+    point: Array  # unknowns, shape (unknowns,)
+    cost: float  # value of the cost
+    iterations: int  # number of iterations
+    prices: tuple[float, ...]  # multiplier of each group of rows, the largest magnitude in it
+    multipliers: tuple[Array, Array]  # of the bounds of the unknowns, and of all rows
 
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Minimise a cost over unknowns between bounds, subject to rows.
+    """Minimise a cost over unknowns between bounds, subject to rows."""
 
-    Parameters
-    ----------
-    unknowns
-        Symbols, shape (n,), scaled to about 1.
-    lower, upper
-        Their bounds, shape (n,).
-    cost
-        Scalar.
-    rows
-        Constraints.
-    parameters
-        Symbols that get numbers at each solution; none for ``None``.
-    iterations
-        At which the solver gives up.
-    """
-
-    unknowns: Expression
+    unknowns: Expression  # symbols, shape (n,), scaled to about 1
+    # lower, upper: their bounds, shape (n,)
     lower: Array
     upper: Array
-    cost: Expression
-    rows: tuple[Rows, ...]
-    parameters: Expression | None = None
-    iterations: int = 300
+    cost: Expression  # scalar
+    rows: tuple[Rows, ...]  # constraints
+    parameters: Expression | None = None  # symbols that get numbers at each solution; none for None
+    iterations: int = 300  # at which the solver gives up
 
     def with_unknowns(self, symbols: Expression, lower: float, upper: float) -> Program:
         """Return a copy with more unknowns at the end, all between the same bounds."""

@@ -16,29 +16,18 @@ _LESS = 0.98
 
 @dataclass(frozen=True)
 class Remedies:
-    """What was tried against a miss; each entry was solved for, not estimated.
+    """What was tried against a miss; each entry was solved for, not estimated."""
 
-    Parameters
-    ----------
-    enough
-        Smallest sets of names that, freed, bring the error within what is allowed.
-    better
-        Single names that, freed, lower the error, best first.
-    gives
-        Limits that would have to move, each with what has to be freed as well (nothing, for the first kind).
-    everything
-        Error with all sizes free at once.
-    others
-        Other springs that were tried, where neither sizes nor one limit are enough.
-    hollow
-        Where the contour would have to be hollow; ``None`` where that is not enough either, or was not asked.
-    """
-
-    enough: tuple[Freed, ...]
-    better: tuple[Freed, ...]
+    enough: tuple[Freed, ...]  # smallest sets of names that, freed, bring the error within what is allowed
+    better: tuple[Freed, ...]  # single names that, freed, lower the error, best first
+    # gives: limits that would have to move, each with what has to be freed as well (nothing, for the first
+    # kind)
     gives: tuple[tuple[Give, Freed | None], ...]
-    everything: Freed | None
+    everything: Freed | None  # error with all sizes free at once
+    # others: other springs that were tried, where neither sizes nor one limit are enough
     others: tuple[OtherSpring, ...] = ()
+    # hollow: where the contour would have to be hollow; None where that is not enough either, or was not
+    # asked
     hollow: Hollow | None = None
 
     def sentences(self, largest: float, allowed: float) -> list[str]:

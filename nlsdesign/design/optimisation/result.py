@@ -11,9 +11,10 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
-from ...foundation.quantity import Quantity, parse_unit, with_unit
+from ...foundation.quantity import Quantity, parse_unit
 from ...foundation.written_numbers import prefixed, without_power
 from ...model.structure import CamNames
+from ..curves.numbers import in_unit
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
@@ -55,29 +56,21 @@ class LimitState:
     where: str = ""
 
     def __str__(self) -> str:
-        factor = parse_unit(self.unit).factor
         sign = "<=" if self.upper else ">="
         mark = f"  ACTIVE {self.where}".rstrip() if self.active else ""
-        value, bound = (with_unit(f"{number / factor:.4g}", self.unit) for number in (self.value, self.bound))
+        value, bound = in_unit(self.value, self.unit), in_unit(self.bound, self.unit)
         return f"{self.limit}: {self.of} {value} {sign} {bound}{mark}"
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueCheck:
-    """Torque of the changed assembly against the target, from a model flattened anew.
+    """Torque of the changed assembly against the target, from a model flattened anew."""
 
-    Parameters
-    ----------
-    angles, torques, targets
-        Shape (n,), in rad and N·m.
-    weights
-        Of the squared error, shape (n,); all alike for ``None``.
-    """
-
+    # angles, torques, targets: shape (n,), in rad and N·m
     angles: Array
     torques: Array
     targets: Array
-    weights: Array | None = None
+    weights: Array | None = None  # of the squared error, shape (n,); all alike for None
 
     @property
     def errors(self) -> Array:
@@ -99,26 +92,20 @@ class TorqueCheck:
 
 @dataclass(frozen=True, eq=False)
 class DesignCurves:
-    """What cam and rubber do over the angle, as the optimiser sees it; columns of shape (n,), in SI.
+    """What cam and rubber do over the angle, as the optimiser sees it; columns of shape (n,), in SI."""
 
-    Parameters
-    ----------
-    angles, lever_arms, radii_of_curvature, radii, torques, stiffnesses
-        Of the cam; the stiffness is the slope of the torque.
-    extensions, forces
-        Of one element with its cable.
-    strains, stresses
-        Of each piece of rubber by path.
-    """
-
+    # angles, lever_arms, radii_of_curvature, radii, torques, stiffnesses: of the cam; the stiffness is the
+    # slope of the torque
     angles: Array
     lever_arms: Array
     radii_of_curvature: Array
     radii: Array
     torques: Array
     stiffnesses: Array
+    # extensions, forces: of one element with its cable
     extensions: Array
     forces: Array
+    # strains, stresses: of each piece of rubber by path
     strains: Mapping[str, Array]
     stresses: Mapping[str, Array]
 
@@ -130,81 +117,44 @@ class DesignCurves:
 
 @dataclass(frozen=True)
 class StartOutcome:
-    """Where the search from one start came to.
+    """Where the search from one start came to."""
 
-    Parameters
-    ----------
-    solved, status
-        Whether the solver says that it is a solution, and its words.
-    iterations
-        It took.
-    cost, rms
-        Sum of the goals, and torque error in N·m.
-    same
-        Whether it is the design that was taken, by cost and shape.
-    """
-
+    # solved, status: whether the solver says that it is a solution, and its words
     solved: bool
     status: str
-    iterations: int
+    iterations: int  # of the solver
+    # cost, rms: sum of the goals, and torque error in N·m
     cost: float
     rms: float
-    same: bool = False
+    same: bool = False  # whether it is the design that was taken, by cost and shape
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """What became of one combination of a stock.
+    """What became of one combination of a stock."""
 
-    Parameters
-    ----------
-    choice
-        In words.
-    cost, rms
-        Sum of the goals and torque error in N·m; ``None`` where there is no design.
-    met
-        Whether it meets the target.
-    reason
-        Why not.
-    rubber_volume
-        Volume of rubber or wire in m³; ``None`` where there is no design.
-    """
-
-    choice: str
+    choice: str  # in words
+    # cost, rms: sum of the goals and torque error in N·m; None where there is no design
     cost: float | None
     rms: float | None
-    met: bool
-    reason: str
-    rubber_volume: float | None = None
+    met: bool  # whether it meets the target
+    reason: str  # why not
+    rubber_volume: float | None = None  # volume of rubber or wire in m³; None where there is no design
 
 
 @dataclass(frozen=True)
 class Miss:
-    """Why a design is not a success.
+    """Why a design is not a success."""
 
-    Parameters
-    ----------
-    error
-        Rms torque error relative to the largest torque.
-    allowed
-        What it may be.
-    worst_angle, worst_error
-        Where the torque is furthest from the target, in rad, and by how much there, in N·m.
-    binding
-        Limits that the design sits on.
-    remedies
-        What would help; ``None`` where it was not looked for.
-    advice
-        The same as sentences.
-    """
-
-    error: float
-    allowed: float
+    error: float  # rms torque error relative to the largest torque
+    allowed: float  # what it may be
+    # worst_angle, worst_error: where the torque is furthest from the target, in rad, and by how much there,
+    # in N·m
     worst_angle: float
     worst_error: float
-    binding: tuple[str, ...]
-    remedies: Remedies | None
-    advice: tuple[str, ...]
+    binding: tuple[str, ...]  # limits that the design sits on
+    remedies: Remedies | None  # what would help; None where it was not looked for
+    advice: tuple[str, ...]  # the same as sentences
 
     @property
     def words(self) -> str:

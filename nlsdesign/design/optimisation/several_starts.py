@@ -51,15 +51,9 @@ def times_found(problem: DesignProblem, outcomes: Sequence[Solution]) -> int:
 
 @dataclass(frozen=True, eq=False)
 class SeveralStarts:
-    """A search from several starts.
+    """A search from several starts."""
 
-    Parameters
-    ----------
-    search
-        That is to be solved.
-    """
-
-    search: Search
+    search: Search  # that is to be solved
 
     @cached_property
     def rounded(self) -> Program | None:

@@ -191,24 +191,12 @@ _SIZES = 0.7
 
 
 class Start(NamedTuple):
-    """Where a search begins.
+    """Where a search begins."""
 
-    Parameters
-    ----------
-    slope_share
-        First slope of the contour relative to its size.
-    tight
-        Pretension relative to the stretch of the closed form.
-    factors
-        Of the other sizes by name, relative to what they are now.
-    contour_size
-        Relative to the size of the closed form.
-    """
-
-    slope_share: float
-    tight: float
-    factors: dict[str, float]
-    contour_size: float = 1.0
+    slope_share: float  # first slope of the contour relative to its size
+    tight: float  # pretension relative to the stretch of the closed form
+    factors: dict[str, float]  # of the other sizes by name, relative to what they are now
+    contour_size: float = 1.0  # relative to the size of the closed form
 
 
 def starts(count: int, seed: int, sizes: Sequence[str]) -> Iterator[Start]:

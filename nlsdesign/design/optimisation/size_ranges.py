@@ -26,29 +26,16 @@ _ITERATIONS = 100
 
 @dataclass(frozen=True)
 class SizeRange:
-    """Range of one size over which the target is still met; all other free numbers follow.
+    """Range of one size over which the target is still met; all other free numbers follow."""
 
-    Parameters
-    ----------
-    name
-        Full name.
-    lowest, highest
-        Ends in SI, ``None`` where the solver did not find that end; a third and three times the size of the
-        design stand for as far as was looked.
-    value
-        Of the design.
-    unit
-        In which they are shown.
-    error
-        Rms torque error in N·m that is allowed on the way.
-    """
-
-    name: str
+    name: str  # full name
+    # lowest, highest: ends in SI, None where the solver did not find that end; a third and three times the
+    # size of the design stand for as far as was looked
     lowest: float | None
     highest: float | None
     value: float
-    unit: str
-    error: float
+    unit: str  # in which they are shown
+    error: float  # rms torque error in N·m that is allowed on the way
 
     def __str__(self) -> str:
         ends = f"{self._end(self.lowest)} to {self._end(self.highest)}"

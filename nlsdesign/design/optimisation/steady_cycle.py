@@ -58,26 +58,14 @@ class _Interval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SteadyCycle:
-    """One steady cycle; each sum over intervals is Simpson's rule over the phase.
+    """One steady cycle; each sum over intervals is Simpson's rule over the phase."""
 
-    Parameters
-    ----------
-    design
-        The design in symbols.
-    amplitude
-        A in rad.
-    intervals
-        From angle zero to the amplitude.
-    static
-        Force of one element in equilibrium at begin, middle and end of each interval.
-    up, down
-        What is added to it on the way up and on the way down.
-    """
-
-    design: DesignPoint
-    amplitude: float
-    intervals: tuple[_Interval, ...]
+    design: DesignPoint  # the design in symbols
+    amplitude: float  # a in rad
+    intervals: tuple[_Interval, ...]  # from angle zero to the amplitude
+    # static: force of one element in equilibrium at begin, middle and end of each interval
     static: tuple[Expression, ...]
+    # up, down: what is added to it on the way up and on the way down
     up: tuple[Expression, ...]
     down: tuple[Expression, ...]
 
@@ -223,7 +211,8 @@ def _forces(
         k: int, direction: float, ends: tuple[Expression, Expression], laws: list[Affine]
     ) -> Expression:
         first, last = ends
-        middle = _middle(laws, (first, last), direction * times[k])
+        slopes = [ca.mtimes(a, x) + b for (a, b), x in ((laws[0], first), (laws[2], last))]
+        middle = (first + last) / 2 + direction * times[k] / 8 * (slopes[0] - slopes[1])
         places = zip(intervals[k].places, (first, middle, last), strict=True)
         arguments = [
             [at.extension, direction * speed * at.progress * at.lever_arm, x, parameters] for at, x in places
@@ -261,12 +250,6 @@ def _step(laws: Sequence[Affine], time: Expression) -> Affine:
     behind = one + h * (2 * am + a0 + time / 2 * ca.mtimes(am, a0))
     given = h * (b0 + 4 * bm + b1 + time / 2 * ca.mtimes(am, b0 - b1))
     return ca.solve(ahead, behind), ca.solve(ahead, given)
-
-
-def _middle(laws: Sequence[Affine], ends: tuple[Expression, Expression], time: Expression) -> Expression:
-    """Return the states in the middle of an interval."""
-    slopes = [ca.mtimes(a, x) + b for (a, b), x in zip((laws[0], laws[2]), ends, strict=True)]
-    return (ends[0] + ends[1]) / 2 + time / 8 * (slopes[0] - slopes[1])
 
 
 def _periodic(steps: Sequence[Affine], count: int) -> list[Expression]:

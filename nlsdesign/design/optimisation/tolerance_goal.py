@@ -114,7 +114,9 @@ class ToleranceQuantile(Goal):
         mean = ca.dot(weights, errors**2) + ca.trace(gram)
         peaked = ca.DM([cause.spread.fourth_moment - 3.0 for cause, _ in rows])
         variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + ca.dot(peaked, ca.diag(gram) ** 2)
-        return _quantile(mean, variance + least**2, float(ndtri(self.share)))
+        # The quantile of a multiple of χ² of which mean and variance are known.
+        ratio = (variance + least**2) / (9.0 * mean**2)
+        return mean * (1.0 - ratio + float(ndtri(self.share)) * ca.sqrt(ratio)) ** 3
 
 
 @dataclass(frozen=True)
@@ -196,12 +198,6 @@ def _weights(design: DesignPoint) -> Expression:
     importance = [design.target.weight_law(design.angles[i]) for i in range(design.angles.shape[0])]
     sizes = ca.vertcat(*importance) * (ca.vertcat(steps, 0.0) + ca.vertcat(0.0, steps))
     return sizes / ca.sum1(sizes)
-
-
-def _quantile(mean: Expression, variance: Expression, normal: float) -> Expression:
-    """Return the quantile of a multiple of χ² of which mean and variance are known."""
-    ratio = variance / (9.0 * mean**2)
-    return mean * (1.0 - ratio + normal * ca.sqrt(ratio)) ** 3
 
 
 def _orthogonal(columns: Sequence[Expression], weights: Expression) -> list[Expression]:

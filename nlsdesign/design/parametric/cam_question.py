@@ -52,21 +52,11 @@ class LimitNumber(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ChosenMachine:
-    """An actuator with the rubber that was chosen; questions about it share what follows from its structure.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    material
-        Rubber of the library; empty for that of the deck.
-    designed
-        Contour to which its cam was fitted, where it was designed here.
-    """
+    """An actuator with the chosen rubber; questions about it share what follows from its structure."""
 
     assembly: Assembly
-    material: str = ""
-    designed: Contour | None = None
+    material: str = ""  # rubber of the library; empty for that of the deck
+    designed: Contour | None = None  # contour to which its cam was fitted, where it was designed here
 
     @cached_property
     def model(self) -> FlatModel:
@@ -103,31 +93,19 @@ class ChosenMachine:
 
 @dataclass(frozen=True, eq=False)
 class CamQuestion:
-    """What is asked of a design; each change gives a new one.
+    """What is asked of a design; each change gives a new one."""
 
-    Parameters
-    ----------
-    machine
-        Actuator and rubber.
-    points
-        Of the target, ascending; the first is angle zero without torque. The curve between them is the
-        monotone cubic of :class:`~nlsdesign.design.TabulatedTorque`, C¹ and without bumps of its own;
-        through two points it is a straight line.
-    limits
-        Numbers in SI of the limits that were set, by name of their kind.
-    free
-        Names of what may change.
-    ranges
-        Between which numbers in SI a free number may move, by name.
-    given
-        Numbers in SI in place of those of the machine, by name.
-    """
-
-    machine: ChosenMachine
+    machine: ChosenMachine  # actuator and rubber
+    # points: of the target, ascending; the first is angle zero without torque. The curve between them is the
+    # monotone cubic of TabulatedTorque, C¹ and without bumps of its own; through two points it is a straight
+    # line.
     points: tuple[TargetPoint, ...]
+    # limits: numbers in SI of the limits that were set, by name of their kind
     limits: Mapping[str, float] = field(default_factory=dict)
-    free: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()  # names of what may change
+    # ranges: between which numbers in SI a free number may move, by name
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # given: numbers in SI in place of those of the machine, by name
     given: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property

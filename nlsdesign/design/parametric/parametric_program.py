@@ -36,12 +36,8 @@ class MovableTarget:
 
     It has what the design problem asks of a target, and is none itself: it has no numbers.
 
-    Parameters
-    ----------
-    pieces
-        Number of pieces between the points.
-    last_angle
-        In rad, from which bounds and starts of variables follow.
+    ``pieces``: number of pieces between the points. ``last_angle``: in rad, from which bounds and starts of
+    variables follow.
     """
 
     def __init__(self, pieces: int, last_angle: float) -> None:
@@ -100,10 +96,7 @@ _RESCALED = 8.0
 class ProgramRows:
     """Unknowns, rows and parameters of one structure: see :func:`structure_of`.
 
-    Parameters
-    ----------
-    question
-        One of its questions, whose sizes scale the variables.
+    ``question``: one of its questions, whose sizes scale the variables.
     """
 
     def __init__(self, question: CamQuestion) -> None:
@@ -272,30 +265,15 @@ class SearchPoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SearchOutcome:
-    """What a search came to.
+    """What a search came to."""
 
-    Parameters
-    ----------
-    state
-        ``"solved"``, ``"infeasible"`` or ``"not solved"``.
-    words
-        Of the solver, or what is in conflict.
-    point
-        Where it is solved.
-    cost
-        Sum of the goals.
-    conflicts
-        Names of the limits that contradict each other.
-    room
-        What each row of a limit gave where all limits count as kept: rounding leaves a limit that binds at a
-        held contour beyond its number by some parts in a thousand million.
-    """
-
-    state: str
-    words: str
-    point: SearchPoint | None = None
-    cost: float = math.inf
-    conflicts: tuple[str, ...] = ()
+    state: str  # "solved", "infeasible" or "not solved"
+    words: str  # of the solver, or what is in conflict
+    point: SearchPoint | None = None  # where it is solved
+    cost: float = math.inf  # sum of the goals
+    conflicts: tuple[str, ...] = ()  # names of the limits that contradict each other
+    # room: what each row of a limit gave where all limits count as kept: rounding leaves a limit that binds
+    # at a held contour beyond its number by some parts in a thousand million
     room: Array | float = 0.0
 
 
@@ -453,10 +431,7 @@ _BESIDE: dict[str, Any] = {
 class ParametricProgram:
     """The program of one structure: see :func:`~.quick_rows.structure_of`.
 
-    Parameters
-    ----------
-    question
-        One of its questions, whose sizes scale the variables.
+    ``question``: one of its questions, whose sizes scale the variables.
     """
 
     def __init__(self, question: CamQuestion) -> None:

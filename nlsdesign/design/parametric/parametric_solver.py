@@ -33,24 +33,12 @@ _PER_INTERVAL = 8
 
 @dataclass(frozen=True, eq=False)
 class DesignedNumbers:
-    """The numbers of a quick design, without the program that they were found with.
+    """The numbers of a quick design, without the program that they were found with."""
 
-    Parameters
-    ----------
-    question
-        That was asked.
-    values
-        Sizes and variables of the contour in SI by name, to begin another search with.
-    contour
-        Of the cam.
-    shaped
-        Whether the contour was designed; otherwise it is that of the machine.
-    """
-
-    question: CamQuestion
-    values: dict[str, float]
+    question: CamQuestion  # that was asked
+    values: dict[str, float]  # sizes and variables of the contour in SI by name, to begin another search with
     contour: Contour
-    shaped: bool
+    shaped: bool  # whether the contour was designed; otherwise it is that of the machine
 
     def machine(self) -> Assembly:
         """Return the changed assembly: the numbers of the design, and a cam fitted to its contour."""
@@ -76,24 +64,12 @@ class DesignedNumbers:
 
 @dataclass(frozen=True, eq=False)
 class ParametricDesign:
-    """A solved question.
+    """A solved question."""
 
-    Parameters
-    ----------
-    program
-        Of its structure.
-    question
-        That was asked.
-    point
-        Where the program was solved.
-    cost
-        Sum of the goals there.
-    """
-
-    program: ParametricProgram
-    question: CamQuestion
-    point: SearchPoint
-    cost: float
+    program: ParametricProgram  # of its structure
+    question: CamQuestion  # that was asked
+    point: SearchPoint  # where the program was solved
+    cost: float  # sum of the goals there
 
     @cached_property
     def _numbers(self) -> dict[str, Array]:

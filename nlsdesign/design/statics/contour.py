@@ -196,20 +196,9 @@ def contour_from_curvature(
 ) -> Contour:
     """Return the contour of a radius of curvature that is linear between nodes; p'' + p = ρ solved exactly.
 
-    Parameters
-    ----------
-    nodes
-        φ from zero, shape (n,).
-    radii_of_curvature
-        ρ at the nodes, shape (n,), in m.
-    first_slope
-        p'(0): where the cable leaves the cam at angle zero, in m.
-    anchor_distance
-        D in m; infinite for a cable that stays parallel.
-    first_lever_arm
-        p(0) in m; zero for a cable through the centre.
-    refine
-        Points per interval.
+    ``nodes`` are φ from zero, ``radii_of_curvature`` ρ there in m; ``first_slope`` is p'(0) in m, where the
+    cable leaves the cam at angle zero, ``first_lever_arm`` p(0) in m, zero for a cable through the centre;
+    ``anchor_distance`` is D in m, infinite for a cable that stays parallel.
     """
     phi, rho = np.asarray(nodes, dtype=float), np.asarray(radii_of_curvature, dtype=float)
     value, slope = first_lever_arm, first_slope

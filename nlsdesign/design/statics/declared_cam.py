@@ -33,20 +33,11 @@ _SOURCE = "designed: fitted to a lever arm over the angle"
 
 @dataclass(frozen=True)
 class CamFit:
-    """A declared cam and how well it holds the lever arm that it was made for.
-
-    Parameters
-    ----------
-    cam
-        The cam.
-    error
-        Largest deviation of its lever arm in m, outside the change of sides or the onset.
-    changed
-        Names of the numbers of the cam that the fit has set.
-    """
+    """A declared cam and how well it holds the lever arm that it was made for."""
 
     cam: Cam
-    error: float
+    error: float  # largest deviation of its lever arm in m, outside the change of sides or the onset
+    # changed: names of the numbers of the cam that the fit has set
     changed: tuple[str, ...] = ("lever_arm", "last_angle")
 
     def changes(self) -> dict[str, Quantity]:
@@ -314,25 +305,8 @@ def cam_from_profile(
     The control values are fitted to h(θ) through the law of the cam, with its change of sides or onset. A
     jump of h at zero is rounded over the width of those.
 
-    Parameters
-    ----------
-    angles
-        θ from zero, ascending, shape (n,), n ≥ 4.
-    lever_arms
-        h, shape (n,), in m.
-    like
-        A cam as for :func:`contour_of_cam`; all but its contour is kept.
-    count
-        Number of control values.
-    anchor_distance
-        Of the new cam in m; that of ``like`` if it is left out.
-
-    Raises
-    ------
-    ValueRangeError
-        If the table does not ascend from zero.
-    ArrangementError
-        If ``like`` has no contour.
+    ``angles`` are four or more θ that ascend from zero, ``lever_arms`` h there in m; of ``like``, a cam as
+    for :func:`contour_of_cam`, all but its contour is kept, the anchor distance too where none is given.
     """
     made = declared_cam(like)
     theta, arm = np.asarray(angles, dtype=float), np.asarray(lever_arms, dtype=float)
@@ -374,8 +348,7 @@ def _lever_arms(row: Quantity, last: Quantity, at: Array) -> Array:
     end, values = last.number, np.array(row.values)
     first = np.linspace(0.0, end / (len(values) - 3), 4)
     start = np.polynomial.Polynomial.fit(first, spline_basis(first, end, len(values)) @ values, 3)
-    result: Array = np.where(at < 0.0, start(at), spline_basis(at, end, len(values)) @ values)
-    return result
+    return np.where(at < 0.0, start(at), spline_basis(at, end, len(values)) @ values)
 
 
 def _dense(angles: Array, lever_arms: Array, count: int) -> tuple[Array, Array]:

@@ -153,19 +153,12 @@ _JUMP = 1e-3
 
 @dataclass(frozen=True)
 class UnmakeablePart:
-    """A range of angles over which a closed-form cam has no contour that a taut cable can lie on.
+    """A range of angles over which a closed-form cam has no contour that a taut cable can lie on."""
 
-    Parameters
-    ----------
-    first, last
-        Angles in rad; equal for a jump.
-    reason
-        In words.
-    """
-
+    # first, last: angles in rad; equal for a jump
     first: float
     last: float
-    reason: str
+    reason: str  # in words
 
     def __str__(self) -> str:
         ends = (

@@ -81,22 +81,13 @@ def _rewritten(
 
 @dataclass(frozen=True, eq=False)
 class ElasticLaw:
-    """Force of the element behind a cam over its extension, in equilibrium.
+    """Force of the element behind a cam over its extension, in equilibrium."""
 
-    Parameters
-    ----------
-    cam
-        Names around the cam, and of the pieces of rubber behind it.
-    parameters
-        All parameters of the flat model, in its order.
-    function
-        ``casadi.Function`` (extension, parameters) -> (force, stiffness, strains, stresses, coils); one
-        strain and one nominal stress for each specimen; extension, shear stress, tensile strength and volume
-        of wire of each coil, zero where they are not known.
-    """
-
-    cam: CamNames
-    parameters: tuple[Variable, ...]
+    cam: CamNames  # names around the cam, and of the pieces of rubber behind it
+    parameters: tuple[Variable, ...]  # all parameters of the flat model, in its order
+    # function: casadi.Function (extension, parameters) -> (force, stiffness, strains, stresses, coils); one
+    # strain and one nominal stress for each specimen; extension, shear stress, tensile strength and volume of
+    # wire of each coil, zero where they are not known
     function: ca.Function
 
     @property
@@ -143,8 +134,7 @@ class ElasticLaw:
     def _evaluated(self, extension: ArrayLike, which: int) -> Array:
         given = np.asarray(extension, dtype=float)
         values = self._with_numbers(given.reshape(1, -1))[which]
-        result: Array = np.array(values, dtype=float).reshape(given.shape)
-        return result
+        return np.array(values, dtype=float).reshape(given.shape)
 
     @cached_property
     def _with_numbers(self) -> ca.Function:
@@ -254,8 +244,7 @@ def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) 
     """
     given = np.asarray(angles, dtype=float)
     torque = torque_function(model, spring)(given.reshape(1, -1), model.start(model.parameters))
-    result: Array = np.array(torque, dtype=float).reshape(given.shape)
-    return result
+    return np.array(torque, dtype=float).reshape(given.shape)
 
 
 def _at_rest(
@@ -335,22 +324,13 @@ _ANGLE = 0.2
 
 @dataclass(frozen=True, eq=False)
 class RelaxingLaw:
-    """Force of the element behind a cam above that of equilibrium, over extension, rate and inner states.
+    """Force of the element behind a cam above that of equilibrium, over extension, rate and inner states."""
 
-    Parameters
-    ----------
-    element
-        Path of the element.
-    states
-        Names of the inner states.
-    function
-        ``casadi.Function`` (extension, rate, states, parameters) -> (excess force, derivatives of the
-        states); parameters are all those of the flat model, in its order. The derivatives are affine in the
-        states.
-    """
-
-    element: str
-    states: tuple[str, ...]
+    element: str  # path of the element
+    states: tuple[str, ...]  # names of the inner states
+    # function: casadi.Function (extension, rate, states, parameters) -> (excess force, derivatives of the
+    # states); parameters are all those of the flat model, in its order. The derivatives are affine in the
+    # states.
     function: ca.Function
 
 
@@ -430,5 +410,4 @@ def _moved(
     others = [i for i, name in enumerate(names) if name not in cam.states]
     old = ca.vertcat(*[movable[i] for i in others])
     new = ca.vertcat(*[values.get(names[i], ca.SX(0)) for i in others])
-    result: Expression = ca.substitute(cut, old, new)
-    return result
+    return ca.substitute(cut, old, new)

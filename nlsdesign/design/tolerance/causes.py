@@ -17,12 +17,12 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import unknown_name
-from ...foundation.quantity import Quantity, parse_unit, with_unit
+from ...foundation.quantity import Quantity
 from ...foundation.spread import EXACT, NormalSpread, RelativeSpread, Spread
 from ...model import FlatModel, Variable
 from ...model.roles import series_cam
 from ...model.structure import CamNames
-from ..curves.numbers import in_si
+from ..curves.numbers import in_si, in_unit
 
 
 def shown_unit(unit: str) -> str:
@@ -70,7 +70,7 @@ class Cause(ABC):
         """The standard deviation as text, in per cent where it is relative."""
         if self.unit == "1":
             return f"{100 * self.deviation:.3g} %"
-        return with_unit(f"{self.deviation / parse_unit(self.unit).factor:.3g}", self.unit)
+        return in_unit(self.deviation, self.unit, digits=3)
 
     def __str__(self) -> str:
         return f"{self.name} ± {self.size} ({self.source})"
@@ -78,14 +78,9 @@ class Cause(ABC):
 
 @dataclass(frozen=True)
 class NumberCause(Cause):
-    """Numbers behind the cam that move together.
+    """Numbers behind the cam that move together."""
 
-    Parameters
-    ----------
-    numbers
-        Pairs of parameter name and its deviation in SI per standard deviation of the cause.
-    """
-
+    # numbers: pairs of parameter name and its deviation in SI per standard deviation of the cause
     numbers: tuple[tuple[str, float], ...]
 
 
@@ -106,14 +101,9 @@ class WaveCause(Cause):
 
 @dataclass(frozen=True)
 class ProfileCause(Cause):
-    """Declared numbers of the cam: the contour deviates as the lever arm changes with them.
+    """Declared numbers of the cam: the contour deviates as the lever arm changes with them."""
 
-    Parameters
-    ----------
-    numbers
-        Pairs of parameter name and its deviation in SI per standard deviation of the cause.
-    """
-
+    # numbers: pairs of parameter name and its deviation in SI per standard deviation of the cause
     numbers: tuple[tuple[str, float], ...]
 
 

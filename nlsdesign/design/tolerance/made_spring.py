@@ -54,27 +54,15 @@ _CLEARANCE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class MadeCam:
-    """The contour of a declared cam over the angle u at which the cable should touch each point.
+    """The contour of a declared cam over the angle u at which the cable should touch each point."""
 
-    Parameters
-    ----------
-    angles
-        θ in rad, ascending from zero, shape (n,).
-    anchor
-        D in m; infinite for a cable that stays parallel.
-    table
-        Splines of the lever arm over u.
-    profiles
-        For each cause of declared numbers of the cam the change of the lever arm per standard deviation.
-    extensions
-        δ at the angles without errors, shape (n,), in m.
-    """
-
-    angles: Array
-    anchor: float
-    table: CubicHermiteSpline
+    angles: Array  # θ in rad, ascending from zero, shape (n,)
+    anchor: float  # D in m; infinite for a cable that stays parallel
+    table: CubicHermiteSpline  # splines of the lever arm over u
+    # profiles: for each cause of declared numbers of the cam the change of the lever arm per standard
+    # deviation
     profiles: dict[str, CubicHermiteSpline]
-    extensions: Array
+    extensions: Array  # δ at the angles without errors, shape (n,), in m
 
     @cached_property
     def lever_arms(self) -> Array:
@@ -252,41 +240,19 @@ class MadeSpring:
 
     Columns are the angles, and where guides of the cable have friction the angles twice: pulling in, with
     T·e^(µφ), then letting out, with T·e^(−µφ).
-
-    Parameters
-    ----------
-    cam
-        Names around the cam.
-    causes
-        What deviates, and what may be trimmed.
-    angles
-        θ in rad, ascending from zero, shape (n,).
-    targets
-        Torque that is asked for, shape (n,), in N·m.
-    importance
-        Weight of the error that the target gives each angle, shape (n,).
-    contour
-        The made cam.
-    force
-        ``casadi.Function`` (extension, moved numbers) -> force of one element.
-    moved
-        Names of the moved numbers.
-    numbers
-        Their values without deviations.
-    ranges
-        Their least and largest values, shape (moved, 2).
     """
 
-    cam: CamNames
-    causes: tuple[Cause, ...]
-    angles: Array
-    targets: Array
-    importance: Array
-    contour: MadeCam
+    cam: CamNames  # names around the cam
+    causes: tuple[Cause, ...]  # what deviates, and what may be trimmed
+    angles: Array  # θ in rad, ascending from zero, shape (n,)
+    targets: Array  # torque that is asked for, shape (n,), in N·m
+    importance: Array  # weight of the error that the target gives each angle, shape (n,)
+    contour: MadeCam  # the made cam
+    # force: casadi.Function (extension, moved numbers) -> force of one element
     force: ca.Function = field(repr=False)
-    moved: tuple[str, ...]
-    numbers: Array
-    ranges: Array
+    moved: tuple[str, ...]  # names of the moved numbers
+    numbers: Array  # their values without deviations
+    ranges: Array  # their least and largest values, shape (moved, 2)
 
     @property
     def rubs(self) -> bool:
@@ -304,8 +270,7 @@ class MadeSpring:
         steps = np.diff(self.angles)
         weights = self.importance * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
         weights = weights / np.sum(weights)
-        result: Array = np.tile(weights / 2, 2) if self.rubs else weights
-        return result
+        return np.tile(weights / 2, 2) if self.rubs else weights
 
     @cached_property
     def nominal(self) -> Array:
@@ -336,8 +301,7 @@ class MadeSpring:
 
         ``torques``: shape (draws, columns), in N·m.
         """
-        result: Array = np.sqrt((torques - self.wanted) ** 2 @ self.weights)
-        return result
+        return np.sqrt((torques - self.wanted) ** 2 @ self.weights)
 
     def held(self, deviations: Array) -> int:
         """Return in how many draws a number had to be held at the end of its range.

@@ -224,7 +224,12 @@ class _WithLess:
 def _effects(made: MadeSpring, with_less: _WithLess, acting: Sequence[int]) -> list[CauseEffect]:
     rows = made.sensitivities
     best = with_less.best
-    left = rows if best is None else _without(rows, rows[best.column], made.weights)
+    left = rows
+    if best is not None:
+        # Without their part along the trim, in the mean over angle and stroke.
+        trim = rows[best.column]
+        along = (rows * trim) @ made.weights / (trim**2 @ made.weights)
+        left = rows - along[:, None] * trim
     sizes, sizes_left = ((part[list(acting)] ** 2 @ made.weights) for part in (rows, left))
     totals = [float(np.sum(each)) or 1.0 for each in (sizes, sizes_left)]
 
@@ -247,13 +252,6 @@ def _effects(made: MadeSpring, with_less: _WithLess, acting: Sequence[int]) -> l
         )
 
     return list(parallel_map(effect, len(acting)))
-
-
-def _without(rows: Array, tangent: Array, weights: Array) -> Array:
-    """Return rows without their part along a tangent, in the mean over angle and stroke."""
-    along = (rows * tangent) @ weights / (tangent**2 @ weights)
-    result: Array = rows - along[:, None] * tangent
-    return result
 
 
 def _alone(made: MadeSpring, column: int) -> float:

@@ -23,21 +23,12 @@ _CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class QuantileEstimate:
-    """The error that a share of the made springs stays below, from a number of draws.
-
-    Parameters
-    ----------
-    share
-        Of the springs.
-    value
-        In N·m.
-    lower, upper
-        Ends of its 95 % confidence interval in N·m, by order statistics, for any distribution; infinite above
-        where there are too few draws to tell.
-    """
+    """The error that a share of the made springs stays below, from a number of draws."""
 
     share: float
-    value: float
+    value: float  # in N·m
+    # lower, upper: ends of its 95 % confidence interval in N·m, by order statistics, for any distribution;
+    # infinite above where there are too few draws to tell
     lower: float
     upper: float
 
@@ -63,58 +54,34 @@ def quantile(errors: Array, share: float) -> QuantileEstimate:
 
 @dataclass(frozen=True)
 class CauseEffect:
-    """What one cause does to the torque error.
+    """What one cause does to the torque error."""
 
-    Parameters
-    ----------
-    cause
-        What deviates.
-    share, share_after_trim
-        Its part of the variance of the torque that all causes together have to first order, as built and
-        after the best trim.
-    alone
-        95 % quantile of the rms error in N·m if nothing else deviated; as built.
-    halved, measured
-        95 % quantile if its deviation were half as large, and if it were known before the cam is made; as
-        built.
-    halved_after_trim, measured_after_trim
-        The same after the best trim.
-    """
-
-    cause: Cause
+    cause: Cause  # what deviates
+    # share, share_after_trim: its part of the variance of the torque that all causes together have to first
+    # order, as built and after the best trim
     share: float
     share_after_trim: float
-    alone: float
+    alone: float  # 95 % quantile of the rms error in N·m if nothing else deviated; as built
+    # halved, measured: 95 % quantile if its deviation were half as large, and if it were known before the cam
+    # is made; as built
     halved: float
     measured: float
+    # halved_after_trim, measured_after_trim: the same after the best trim
     halved_after_trim: float
     measured_after_trim: float
 
 
 @dataclass(frozen=True, eq=False)
 class TrimEffect:
-    """What a trim after assembly recovers.
+    """What a trim after assembly recovers."""
 
-    Parameters
-    ----------
-    name, unit
-        Of the number that is set, and the unit in which it is shown.
-    quantiles
-        Of the rms error after the trim.
-    errors
-        Rms error of each draw after the trim, shape (draws,), in N·m.
-    settings
-        The number as set in each draw, shape (draws,), in SI.
-    band
-        Torque below which 5, 50 and 95 % of the springs lie, shape (3, angles), in N·m.
-    """
-
+    # name, unit: of the number that is set, and the unit in which it is shown
     name: str
     unit: str
-    quantiles: tuple[QuantileEstimate, ...]
-    errors: Array
-    settings: Array
-    band: Array
+    quantiles: tuple[QuantileEstimate, ...]  # of the rms error after the trim
+    errors: Array  # rms error of each draw after the trim, shape (draws,), in N·m
+    settings: Array  # the number as set in each draw, shape (draws,), in SI
+    band: Array  # torque below which 5, 50 and 95 % of the springs lie, shape (3, angles), in N·m
 
     @property
     def needed(self) -> tuple[float, float]:

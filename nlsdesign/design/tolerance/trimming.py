@@ -87,27 +87,14 @@ class Trim:
 
 @dataclass(frozen=True, eq=False)
 class Trimmed:
-    """Springs after their trim.
+    """Springs after their trim."""
 
-    Parameters
-    ----------
-    settings
-        The number as set, shape (draws,), in SI.
-    places
-        The trim itself in units of its cause, shape (draws,).
-    torques
-        Shape (draws, columns), in N·m.
-    tangents
-        Change of the torque per unit of the trim in its last step, shape (draws, columns), in N·m.
-    rms
-        Shape (draws,), in N·m.
-    """
-
-    settings: Array
-    places: Array
-    torques: Array
+    settings: Array  # the number as set, shape (draws,), in SI
+    places: Array  # the trim itself in units of its cause, shape (draws,)
+    torques: Array  # shape (draws, columns), in N·m
+    # tangents: change of the torque per unit of the trim in its last step, shape (draws, columns), in N·m
     tangents: Array
-    rms: Array
+    rms: Array  # shape (draws,), in N·m
 
 
 def trimmed(

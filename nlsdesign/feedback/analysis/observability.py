@@ -343,25 +343,15 @@ _NO_ARM = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class RankDrop:
-    """An angle, or a range of angles, at which something is not seen.
+    """An angle, or a range of angles, at which something is not seen."""
 
-    Parameters
-    ----------
-    first, last
-        In rad; equal for a single angle.
-    unseen
-        What is not seen there, with its eigenvalues; in the middle of a range.
-    cause
-        What vanishes there, by name, where the structure says it: the lever arm of a cam; else empty.
-    open_ended
-        Whether a range goes on beyond the angles that were looked at.
-    """
-
+    # first, last: in rad; equal for a single angle
     first: float
     last: float
-    unseen: Unseen
+    unseen: Unseen  # what is not seen there, with its eigenvalues; in the middle of a range
+    # cause: what vanishes there, by name, where the structure says it: the lever arm of a cam; else empty
     cause: str = ""
-    open_ended: bool = False
+    open_ended: bool = False  # whether a range goes on beyond the angles that were looked at
 
     @property
     def isolated(self) -> bool:
@@ -566,16 +556,14 @@ class _Search:
         # The determinant is a straight line over so little: where it changes its sign, it says where.
         line = ends[0] * ends[1] < 0.0
         share = np.where(line, ends[0] / np.where(line, ends[0] - ends[1], 1.0), 0.5)
-        angles: Array = low + share * (high - low)
-        return angles
+        return low + share * (high - low)
 
     def _are_zeros(self, at: Array) -> Mask:
         """Tell at which angles the smallest singular value falls to nothing, and is not only low."""
         if not len(at):
             return np.zeros(0, dtype=bool)
         here, near = (self._numbers(self.points(each))[1] for each in (at, at + 1e4 * REFINED))
-        zero: Mask = here <= np.maximum(self.view.tolerance, 1e-3 * near)
-        return zero
+        return here <= np.maximum(self.view.tolerance, 1e-3 * near)
 
     def _run(self, at: Array, rows: list[int]) -> RankDrop:
         """Return the range around angles of lost rank; one angle where it is narrower than 1e-6 rad."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,7 +13,9 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ConvergenceError, unknown_name
 from ...foundation.quantity import with_unit
+from ...foundation.symbolic import Expression
 from ...model import FlatModel
+from ...model.flat import Symbols
 from ...model.roles import measured_motion
 from ...model.transform import named
 
@@ -54,12 +56,7 @@ def rest_states(
 class RestSolver:
     """Finds rest states of one model with many sets of numbers; its functions are built once.
 
-    Parameters
-    ----------
-    model
-        Continuous; inputs are at their start values.
-    angle, consistent
-        As for :func:`rest_states`.
+    ``model``: continuous; inputs are at their start values.
     """
 
     def __init__(
@@ -107,13 +104,8 @@ def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) 
     rest = rest_states(model, grid, angle=angle)
     s = model.symbols()
     column = s.state[names.index(speed)]
-    probe = ca.Function(
-        "probe", [s.time, s.state, s.input, s.parameter],
-        [s.derivative, ca.jacobian(s.derivative, column), s.output],
-    )  # fmt: skip
-    rates, driven, outputs = evaluate_rows(
-        probe, rest, model.start(model.inputs), model.start(model.parameters)
-    )
+    wanted = [s.derivative, ca.jacobian(s.derivative, column), s.output]
+    rates, driven, outputs = evaluate_at(model, s, wanted, rest)
     steps = np.diff(grid)[:, None]
     jump = np.abs(np.cumsum((driven[1:] + driven[:-1]) / 2 * steps, axis=0)[-1])
     sizes = np.maximum(np.max(np.abs(rest), axis=0), jump)
@@ -125,6 +117,13 @@ def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) 
         size = float(np.max(np.abs(outputs[:, i])))
         result.setdefault(v.name, size if size > 0.0 else 1.0)
     return result
+
+
+def evaluate_at(model: FlatModel, s: Symbols, wanted: Sequence[Expression], states: Array) -> list[Array]:
+    """Evaluate expressions in symbols of a model at many states; all else is at its start value."""
+    dense = [ca.densify(each) for each in wanted]
+    function = ca.Function("wanted", [s.time, s.state, s.input, s.parameter], dense)
+    return evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
 
 
 def evaluate_rows(function: ca.Function, x: Array, u: Array, p: Array) -> list[Array]:
@@ -238,9 +237,7 @@ def ranges_at_rest(model: FlatModel, angles: Array, *, angle: str) -> tuple[Rang
         return ()
     s = model.symbols()
     watched = ca.vertcat(*[s.signal[i] for i, _ in bounded])
-    function = ca.Function("watched", [s.time, s.state, s.input, s.parameter], [ca.densify(watched)])
-    states = rest_states(model, angles, angle=angle)
-    (values,) = evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
+    (values,) = evaluate_at(model, s, [watched], rest_states(model, angles, angle=angle))
     result = []
     for (_, v), row in zip(bounded, values.T, strict=True):
         over = np.maximum(v.minimum - row, row - v.maximum)

@@ -29,7 +29,7 @@ from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.flat import Switching
 from ...model.linear import LinearModel
-from .rest import evaluate_rows, rate_state, rest_states, typical_sizes
+from .rest import evaluate_at, evaluate_rows, rate_state, rest_states, typical_sizes
 
 JUMP = 1e-6
 """Accelerations that jump by less than this share of the largest one have no dry friction behind them."""
@@ -43,36 +43,22 @@ _TO_ZERO = (8.0 / 3.0, -2.0, 1.0 / 3.0)
 
 @dataclass(frozen=True, eq=False)
 class PlantMode:
-    """The linear plant in one mode, at N angles.
+    """The linear plant in one mode, at N angles."""
 
-    Parameters
-    ----------
-    name
-        ``"free"`` without dry friction, else ``"sliding"``, or ``"sliding_forward"`` and
-        ``"sliding_backward"`` where these differ, and ``"stuck"``.
-    words
-        What is linearised, in words.
-    a, b
-        Slopes of the rates of the states in states and inputs, shapes (N, n, n) and (N, n, m).
-    c
-        Slopes of the outputs in the states, shape (N, r, n).
-    rates
-        What the states would do if the angle were let go, in the mean of both directions, so without dry
-        friction; shape (N, n).
-    held
-        Number of rates that are held: as many motions stand still.
-    allowed
-        Projection onto the states in which nothing that is held moves, shape (N, n, n); ``None`` where
-        nothing is held.
-    """
-
+    # name: "free" without dry friction, else "sliding", or "sliding_forward" and "sliding_backward" where
+    # these differ, and "stuck"
     name: str
-    words: str
+    words: str  # what is linearised, in words
+    # a, b: slopes of the rates of the states in states and inputs, shapes (N, n, n) and (N, n, m)
     a: Array
     b: Array
-    c: Array
+    c: Array  # slopes of the outputs in the states, shape (N, r, n)
+    # rates: what the states would do if the angle were let go, in the mean of both directions, so without dry
+    # friction; shape (N, n)
     rates: Array
-    held: int = 0
+    held: int = 0  # number of rates that are held: as many motions stand still
+    # allowed: projection onto the states in which nothing that is held moves, shape (N, n, n); None where
+    # nothing is held
     allowed: Array | None = None
 
     @property
@@ -80,8 +66,7 @@ class PlantMode:
         """Eigenvalues, shape (N, n − 2·held): without those of what is held and of where it stands."""
         eigenvalues = np.linalg.eigvals(self.a).astype(complex)
         order = np.argsort(np.abs(eigenvalues), axis=-1)
-        kept: NDArray[np.complex128] = np.take_along_axis(eigenvalues, order, axis=-1)[:, 2 * self.held :]
-        return kept
+        return np.take_along_axis(eigenvalues, order, axis=-1)[:, 2 * self.held :]
 
 
 class _Side(NamedTuple):
@@ -250,34 +235,20 @@ def _extrapolated(values: list[Array]) -> Array:
     """Return the limit at zero speed; exactly what they are where all are equal."""
     limit = sum((weight * value for weight, value in zip(_TO_ZERO, values, strict=True)), np.zeros(1))
     same = (values[0] == values[1]) & (values[1] == values[2])
-    result: Array = np.where(same, values[0], limit)
-    return result
+    return np.where(same, values[0], limit)
 
 
 @dataclass(frozen=True, eq=False)
 class RestPoint:
-    """The model at rest at one angle.
+    """The model at rest at one angle."""
 
-    Parameters
-    ----------
-    model
-        Whole model.
-    angle
-        Name of the state that is swept.
-    state
-        Rest state, shape (states,).
-    linear
-        Exact linearisation there. Where dry friction is smoothed, it is that of its corner; see
-        :class:`~nlsdesign.feedback.analysis.rest_points.PlantMode` for the machine that slides or sticks.
-    sizes
-        Typical size of states and outputs over the sweep.
-    """
-
-    model: FlatModel
-    angle: str
-    state: Array
+    model: FlatModel  # whole model
+    angle: str  # name of the state that is swept
+    state: Array  # rest state, shape (states,)
+    # linear: exact linearisation there. Where dry friction is smoothed, it is that of its corner; see
+    # PlantMode for the machine that slides or sticks.
     linear: LinearModel
-    sizes: Mapping[str, float]
+    sizes: Mapping[str, float]  # typical size of states and outputs over the sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -406,12 +377,7 @@ def rest_points(
         sizes = _sizes(model, states) if consistent else typical_sizes(model, at, angle=angle)
     s = model.symbols()
     slopes = [ca.jacobian(of, by) for of in (s.derivative, s.output) for by in (s.state, s.input)]
-    function = ca.Function(
-        "slopes",
-        [s.time, s.state, s.input, s.parameter],
-        [ca.densify(each) for each in (s.derivative, s.output, *slopes)],
-    )
-    results = evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
+    results = evaluate_at(model, s, [s.derivative, s.output, *slopes], states)
     broken = np.flatnonzero(~np.all([np.all(np.isfinite(each), axis=1) for each in results[2:]], axis=0))
     if len(broken):
         raise ValueRangeError(

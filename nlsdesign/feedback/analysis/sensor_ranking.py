@@ -63,21 +63,12 @@ class SensorCandidate:
 
 @dataclass(frozen=True)
 class SensorGain:
-    """What a candidate makes of the estimate: standard deviations of the torque, in its unit.
+    """What a candidate makes of the estimate: standard deviations of the torque, in its unit."""
 
-    Parameters
-    ----------
-    candidate
-        What is changed.
-    exact
-        Median and largest over the angles, every number exactly known; infinite without a steady state.
-    spread
-        The same over the spread of the declared numbers.
-    """
-
-    candidate: SensorCandidate
+    candidate: SensorCandidate  # what is changed
+    # exact: median and largest over the angles, every number exactly known; infinite without a steady state
     exact: tuple[float, float]
-    spread: tuple[float, float]
+    spread: tuple[float, float]  # the same over the spread of the declared numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +97,11 @@ class SensorRanking:
 
     def rows(self) -> list[list[str]]:
         """Return the table as text: name, gain over the spread, four deviations."""
-        unit = self.unit
+        factor = 1e3 if self.unit == "N*m" else 1.0
         rows = []
         for gain in (*self.gains, self.present):
             share = _share(self.present.spread[0], gain.spread[0])
-            numbers = [_shown(value, unit) for value in (*gain.spread, *gain.exact)]
+            numbers = [f"{factor * value:.3g}" for value in (*gain.spread, *gain.exact)]
             rows.append([gain.candidate.name, share, *numbers])
         return rows
 
@@ -135,28 +126,16 @@ class SensorRanking:
 
 @dataclass(frozen=True)
 class RankingAssumptions:
-    """What is taken of a machine of which nothing more is known; shares are of its own sizes.
-
-    Parameters
-    ----------
-    noise
-        Of the process.
-    wander
-        Time in s over which the declared numbers may wander within their spread.
-    current_error
-        Standard deviation of the error of the drive's current, as a share of the largest current that holds
-        the spring.
-    current_time
-        Time in s over which that error changes.
-    torque_sensor, current_sensor, tachometer
-        Noise of such a sensor, as a share of the largest torque, of the largest holding current, of the speed
-        of a swing over the whole range.
-    """
+    """What is taken of a machine of which nothing more is known; shares are of its own sizes."""
 
     noise: NoiseAssumptions = field(default_factory=NoiseAssumptions)
-    wander: float = 100.0
+    wander: float = 100.0  # time in s over which the declared numbers may wander within their spread
+    # current_error: standard deviation of the error of the drive's current, as a share of the largest current
+    # that holds the spring
     current_error: float = 0.02
-    current_time: float = 0.01
+    current_time: float = 0.01  # time in s over which that error changes
+    # torque_sensor, current_sensor, tachometer: noise of such a sensor, as a share of the largest torque, of
+    # the largest holding current, of the speed of a swing over the whole range
     torque_sensor: float = 0.005
     current_sensor: float = 0.005
     tachometer: float = 0.01
@@ -416,7 +395,3 @@ def _share(present: float, now: float) -> str:
     if not np.isfinite(now):
         return "no steady state"
     return f"{present / now:.3g}" if now > 0.0 else "exact"
-
-
-def _shown(value: float, unit: str) -> str:
-    return f"{1e3 * value:.3g}" if unit == "N*m" else f"{value:.3g}"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError, unknown_name
-from ...model import FlatModel, Variable
+from ...model import Variable
 from ...model.roles import spring_torque
 from .rest_points import PlantMode, RestPoints
 from .sweep import Columns, View
@@ -50,7 +50,8 @@ class Stability(View):
         torque = spring_torque(points.model, self.torque)
         if torque not in points.output_names:
             raise unknown_name("output", torque, points.output_names)
-        unit = _stiffness_unit(points.model, torque)
+        domains = [spring.domain for spring in points.model.springs if spring.effort == torque]
+        unit = f"{domains[0].effort_unit}/{domains[0].motion_unit}" if domains else "N*m/rad"
         columns: list[Variable] = []
         values: list[Array] = []
         for mode in points.modes:
@@ -138,8 +139,3 @@ def _stiffness(points: RestPoints, torque: str) -> tuple[Array, Array]:
     own = np.linalg.pinv(points.a[:, inner][:, :, inner])
     relaxed = np.einsum("Nij,Nj->Ni", own, points.a[:, inner, angle])
     return row[:, angle] - np.einsum("Ni,Ni->N", row[:, inner], relaxed), jump
-
-
-def _stiffness_unit(model: FlatModel, torque: str) -> str:
-    domains = [spring.domain for spring in model.springs if spring.effort == torque]
-    return f"{domains[0].effort_unit}/{domains[0].motion_unit}" if domains else "N*m/rad"

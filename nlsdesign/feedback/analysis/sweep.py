@@ -104,8 +104,7 @@ class Chart:
         names = [v.name for v in self.columns]
         if name not in names:
             raise unknown_name("column", name, names)
-        column: Array = self.values[:, names.index(name)]
-        return column
+        return self.values[:, names.index(name)]
 
     def to_frame(self) -> Any:
         """Return a ``pandas.DataFrame`` indexed by the argument; units are in its ``attrs``; needs pandas."""
@@ -212,8 +211,7 @@ def symmetric(a: Array) -> Array:
 
     ``a``: shape (N, n, n).
     """
-    half: Array = (a + transposed(a)) / 2.0
-    return half
+    return (a + transposed(a)) / 2.0
 
 
 def exponential_and_gramian(a: Array, weight: Array, horizon: float) -> tuple[Array, Array]:

@@ -22,21 +22,19 @@ from .evaluation.responses import (
     SineResponse,
     Tracking,
     ZeroTorque,
-    held_torque,
     sine_response,
-    torque_resolution,
     tracking,
     zero_torque,
 )
 from .evaluation.whole_evaluation import BIAS as BIAS
 from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, cascade_loops, evaluate_loop
 from .evaluation.whole_evaluation import with_margin as with_margin
-from .laws.known_drive import check_torque, largest_torque, only_side
+from .laws.known_drive import check_torque, largest_torque
 from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
 from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
 from .laws.torque_loop import REPRODUCED_GAINS, TorqueGains, torque_controller
 from .laws.velocity_loop import DisturbanceObserver, FrictionCompensation, VelocityLoop
-from .tuning import LoopChoice, LoopLimits, TunedLoop, bandwidth_against_impedance, best_choices, largest_gain
+from .tuning import LoopChoice, LoopLimits, bandwidth_against_impedance, best_choices, largest_gain
 
 __all__ = [
     "REPRODUCED_GAINS",
@@ -70,7 +68,6 @@ __all__ = [
     "TorqueGains",
     "TorqueLaw",
     "Tracking",
-    "TunedLoop",
     "VelocityLoop",
     "ZeroTorque",
     "bandwidth_against_impedance",
@@ -80,19 +77,16 @@ __all__ = [
     "coupled_stability",
     "encoder_loop",
     "evaluate_loop",
-    "held_torque",
     "joined",
     "largest_gain",
     "largest_torque",
     "loop_margins",
     "loop_over_spread",
-    "only_side",
     "onset_of_limit_cycling",
     "output_impedance",
     "saturation_line",
     "sine_response",
     "torque_controller",
-    "torque_resolution",
     "tracking",
     "with_fine_counts",
     "zero_torque",

@@ -12,6 +12,7 @@ import numpy as np
 from ...foundation.errors import ArrangementError, ConvergenceError, ValueRangeError, nearest, unknown_name
 from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
+from ...model.flat import stated_equations
 from ...model.origin import common_origin
 from ...model.roles import moved_load, series_spring
 from ...model.transform import with_signal
@@ -74,6 +75,7 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
     for group in ((*states, *inputs), parameters, outputs):
         _check_names(group)
     _check_tables(controller, {v.name for v in (*states, *inputs)})
+    joint = _Joint(wiring, inputs, delay)
     return FlatModel(
         name=f"{observer.name}_and_controller",
         description=f"{observer.description}; {controller.description}",
@@ -82,12 +84,12 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
         parameters=parameters,
         outputs=outputs,
         signals=(*observer.signals, *controller.signals),
-        equations=_Joint(wiring, inputs, delay).equations(),
+        equations=joint.equations(),
         sample_time=observer.sample_time,
         tables=tables,
         bodies=observer.bodies,
-        begin=_Joint(wiring, inputs, delay).begin(),
-        expected=_Joint(wiring, inputs, delay).expected(),
+        begin=joint.begin(),
+        expected=joint.expected(),
         origin=common_origin(observer.origin, controller.origin),
     )
 
@@ -143,10 +145,7 @@ class _Joint:
     def __init__(self, wiring: _Wiring, inputs: Sequence[Variable], delay: int) -> None:
         self.wiring, self.observer, self.controller = wiring, wiring.observer, wiring.controller
         self.inputs = {v.name: ca.SX.sym(v.name) for v in inputs}
-        self.seen, self.heard = (
-            _ModelSymbols(*(ca.SX.sym(name, count) for name, count in zip("xpw", _sizes(model), strict=True)))
-            for model in (self.observer, self.controller)
-        )
+        self.seen, self.heard = self.observer.symbols(), self.controller.symbols()
         self.waiting = ca.SX.sym("waiting", delay)
 
     def _arguments(self) -> list[Expression]:
@@ -186,12 +185,10 @@ class _Joint:
         place = [v.name for v in self.controller.outputs].index(self.wiring.driven.name)
         later = [self.waiting[i] for i in range(1, self.waiting.numel())]
         states = ca.vertcat(following, after, *later, command[place])
-        return ca.Function(
-            "equations",
-            [ca.SX.sym("time"), *self._arguments()],
-            [ca.densify(states), ca.densify(ca.vertcat(estimates, command)),
-             ca.densify(ca.vertcat(shown, signals)), ca.SX(0, 1)],
-            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+        x, u, p, w = self._arguments()
+        return stated_equations(
+            x, u, derivative=ca.densify(states), output=ca.densify(ca.vertcat(estimates, command)),
+            parameter=p, table=w, signal=ca.densify(ca.vertcat(shown, signals)),
         )  # fmt: skip
 
     def begin(self) -> ca.Function:
@@ -219,17 +216,6 @@ class _Joint:
             v.name: values[i] for i, v in enumerate(self.observer.inputs) if v.name in self.inputs
         }
         return ca.Function("expected", self._arguments(), [ca.vertcat(*known.values())])
-
-
-@dataclass(frozen=True, eq=False)
-class _ModelSymbols:
-    state: Expression
-    parameter: Expression
-    table: Expression
-
-
-def _sizes(model: FlatModel) -> tuple[int, int, int]:
-    return len(model.states), len(model.parameters), sum(len(table.columns) for table in model.tables)
 
 
 def _driven(observer: FlatModel, controller: FlatModel) -> Variable:
@@ -448,7 +434,9 @@ class ClosedLoop:
                 raise unknown_name("input of the loop", name, known)
 
     def _check_sources(self, sources: Mapping[str, str]) -> None:
-        known = {f"{PLANT}.{name}" for name in _names(self.plant)}
+        plant = self.plant
+        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
+        known = {f"{PLANT}.{v.name}" for group in groups for v in group}
         known |= {f"{OBSERVER}.{v.name}" for v in self.observer.outputs}
         for name, source in sources.items():
             if source in known or source == name:
@@ -459,11 +447,6 @@ class ClosedLoop:
                 f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
                 next_step="give it in inputs or in wires",
             )  # fmt: skip
-
-
-def _names(model: FlatModel) -> set[str]:
-    groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
-    return {v.name for group in groups for v in group}
 
 
 def _kept(loop: ClosedLoop) -> list[str]:

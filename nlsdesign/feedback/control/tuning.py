@@ -47,23 +47,13 @@ class LoopLimits:
 
 @dataclass(frozen=True, eq=False)
 class TunedLoop:
-    """A loop with the largest gain that keeps its limits.
+    """A loop with the largest gain that keeps its limits."""
 
-    Parameters
-    ----------
-    loop
-        With that gain.
-    gain
-        Name of the parameter.
-    value
-        Of the gain.
-    limited_by
-        What a slightly larger gain would break, in words; empty where the end of the range was reached.
-    """
-
-    loop: ClosedLoop
-    gain: str
+    loop: ClosedLoop  # with that gain
+    gain: str  # name of the parameter
     value: float
+    # limited_by: what a slightly larger gain would break, in words; empty where the end of the range was
+    # reached
     limited_by: str
 
 

@@ -3,7 +3,6 @@
 from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
 from .adaptive.corrected_cascade import CorrectedDesign, design_corrected_observer
 from .adaptive.duty_and_directions import AdaptiveSettings, Trust
-from .adaptive.estimator_bound import estimator_bound
 from .certificates import (
     Assumptions,
     Certificate,
@@ -78,7 +77,6 @@ __all__ = [
     "design_observer_with_details",
     "designed_observer",
     "errors_beside",
-    "estimator_bound",
     "least_torque_error",
     "observe",
     "observer_bench",

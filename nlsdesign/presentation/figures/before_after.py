@@ -142,30 +142,19 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """One record: measured and predicted, filtered alike; arrays of shape (n,).
+    """One record: measured and predicted, filtered alike; arrays of shape (n,)."""
 
-    Parameters
-    ----------
-    time
-        In s.
-    measured, before, after
-        The quantity as measured, from the model as declared, and from the model with the added effects.
-    quantity, unit
-        Name and unit, for the axes.
-    noise
-        Standard deviation of the noise that passes the filter.
-    title
-        Above the upper panel.
-    """
-
-    time: Array
+    time: Array  # in s
+    # measured, before, after: the quantity as measured, from the model as declared, and from the model with
+    # the added effects
     measured: Array
     before: Array
     after: Array
+    # quantity, unit: name and unit, for the axes
     quantity: str
     unit: str
-    noise: float = 0.0
-    title: str = "Held-out record"
+    noise: float = 0.0  # standard deviation of the noise that passes the filter
+    title: str = "Held-out record"  # above the upper panel
 
 
 @styled
@@ -245,21 +234,11 @@ def binned_errors(before: Curve, after: Curve, *, across: str, unit: str, name: 
 
 @dataclass(frozen=True)
 class CandidateShare:
-    """Share of the excess over the noise floor that one candidate explains.
-
-    Parameters
-    ----------
-    name
-        Of the effect.
-    share
-        Between zero and one; below zero where the error grew.
-    chosen
-        Whether it was added to the model.
-    """
+    """Share of the excess over the noise floor that one candidate explains."""
 
     name: str
-    share: float
-    chosen: bool = False
+    share: float  # between zero and one; below zero where the error grew
+    chosen: bool = False  # whether it was added to the model
 
 
 @styled

@@ -40,33 +40,15 @@ _THICKNESS = 9e-3
 
 @dataclass(frozen=True, eq=False)
 class CamMotion:
-    """A cam with cable and rubber at a row of angles; arrays of shape (n,), in SI.
+    """A cam with cable and rubber at a row of angles; arrays of shape (n,), in SI."""
 
-    Parameters
-    ----------
-    contour
-        Lower right lip; the other three are its mirror images.
-    angles
-        Cam angles in rad, ascending, within the contour on both sides.
-    extensions
-        Extension of one element since angle zero in m.
-    forces
-        Force of one element in N.
-    torques
-        Torque of the spring in N·m.
-    rest_length
-        Length of the rubber without force in m.
-    pretension
-        Extension in m at angle zero.
-    """
-
-    contour: Contour
-    angles: Array
-    extensions: Array
-    forces: Array
-    torques: Array
-    rest_length: float
-    pretension: float = 0.0
+    contour: Contour  # lower right lip; the other three are its mirror images
+    angles: Array  # cam angles in rad, ascending, within the contour on both sides
+    extensions: Array  # extension of one element since angle zero in m
+    forces: Array  # force of one element in N
+    torques: Array  # torque of the spring in N·m
+    rest_length: float  # length of the rubber without force in m
+    pretension: float = 0.0  # extension in m at angle zero
 
     def __post_init__(self) -> None:
         rows = (self.angles, self.extensions, self.forces, self.torques)
@@ -84,8 +66,7 @@ class CamMotion:
     def lever_arms(self) -> Array:
         """Lever arm in m at each angle; odd like the torque."""
         arms = np.interp(np.abs(self.angles), self.contour.angles, self.contour.lever_arms)
-        result: Array = np.sign(self.angles) * arms
-        return result
+        return np.sign(self.angles) * arms
 
     @property
     def guide(self) -> float:
@@ -294,31 +275,16 @@ MARKER = "now"
 
 @dataclass(frozen=True, eq=False)
 class CamPicture:
-    """A cam as lengths in mm, y upwards, and the frames of its motion.
+    """A cam as lengths in mm, y upwards, and the frames of its motion."""
 
-    Parameters
-    ----------
-    halves
-        Outlines of the lower and upper half at angle zero as SVG paths.
-    width, height
-        Half the width and height of the picture.
-    wall
-        Distance of the rubber's resting end from the centre.
-    frames
-        One for each angle: numbers and paths by name, see :func:`cam_picture`.
-    start
-        Number of the frame that is shown first.
-    curve
-        Torque over angle with a marker named :data:`MARKER` at the first frame.
-    """
-
-    halves: tuple[str, str]
+    halves: tuple[str, str]  # outlines of the lower and upper half at angle zero as SVG paths
+    # width, height: half the width and height of the picture
     width: float
     height: float
-    wall: float
-    frames: tuple[dict[str, Any], ...]
-    start: int
-    curve: Figure
+    wall: float  # distance of the rubber's resting end from the centre
+    frames: tuple[dict[str, Any], ...]  # one for each angle: numbers and paths by name, see cam_picture
+    start: int  # number of the frame that is shown first
+    curve: Figure  # torque over angle with a marker named MARKER at the first frame
 
 
 def cam_picture(motion: CamMotion, *, start: float | None = None) -> CamPicture:
@@ -369,8 +335,7 @@ def torque_curve(motion: CamMotion, *, at: int) -> Figure:
         [degrees[at]], [motion.torques[at]], marker="o", color=VERMILLION.light, markersize=7, gid=MARKER
     )
     axes.margins(x=0.03)
-    axes.set_xlabel("angle in degrees")
-    axes.set_ylabel("torque in N·m")
+    axes.set(xlabel="angle in degrees", ylabel="torque in N·m")
     top = typeset_number(float(np.max(motion.torques)))
     return described(
         figure,

@@ -20,6 +20,7 @@ from .style import (
     GRID,
     INK,
     MUTED,
+    crosses,
     described,
     label_panel,
     legend,
@@ -65,8 +66,7 @@ def curves(
         axes.plot(*thinned(x, y), color=tone, linestyle=dash, marker=marker, label=label, linewidth=1.4)
     if logarithmic:
         log_axis(axes, abscissa=True)
-    axes.set_xlabel(across)
-    axes.set_ylabel(up)
+    axes.set(xlabel=across, ylabel=up)
     axes.margins(x=0.02)
     legend(axes, columns=3)
     return described(figure, words)
@@ -141,17 +141,12 @@ def curves_beside_points(shown: Sequence[PointPanel], *, across: str, words: str
             axis.plot(
                 x, y, color=tone, linestyle=dash, label=label, linewidth=1.4, markersize=2.0, marker="."
             )
-            lost = x[~np.isfinite(y)]
-            axis.plot(
-                lost, np.full(len(lost), 0.04 + 0.06 * number), transform=axis.get_xaxis_transform(),
-                color=tone, linestyle="none", marker="x", markeredgewidth=1.6,
-            )  # fmt: skip
+            crosses(axis, x[~np.isfinite(y)], 0.04 + 0.06 * number, tone)
             if label in panel.points:
                 axis.plot(*panel.points[label], color=tone, linestyle="none", marker=point, fillstyle="none")
         if panel.logarithmic:
             log_axis(axis)
-        axis.set_title(panel.title)
-        axis.set_ylabel(panel.up)
+        axis.set(title=panel.title, ylabel=panel.up)
         axis.margins(x=0.03)
         log_axis(axis, abscissa=True)
     for axis in axes[-columns:]:
@@ -252,9 +247,7 @@ def torque_against_measured(
         upper.plot(np.degrees(at), points, color=INK.light, linestyle="none", marker=marker, label=label,
                    markerfacecolor="none", markeredgewidth=1.2, markersize=5.5)  # fmt: skip
     label_panel(upper, "torque in N·m", "Torque of the spring", columns=2)
-    lower.set_ylabel("error in N·m")
-    lower.set_title("Model minus measurement")
-    lower.set_xlabel("angle in degrees")
+    lower.set(title="Model minus measurement", xlabel="angle in degrees", ylabel="error in N·m")
     upper.margins(x=0.02)
     return described(
         figure,

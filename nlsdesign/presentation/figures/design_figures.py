@@ -148,14 +148,6 @@ def _end_of_cable(contour: Contour, reach: float) -> Array:
     return np.array([contour.anchor_distance if near else 1.9 * reach, 0.0])
 
 
-def _halves(contour: Contour, parallel: bool) -> list[Array]:
-    if not parallel:
-        return list(contour.outlines())
-    # Of a cam with a parallel cable only the lip is designed; the body behind it is closed over the centre.
-    points = contour.points
-    return [np.vstack([points, [[0.0, 0.0]], points[:1]])]
-
-
 def _rubber(axes: Axes, design: CamDesign, place: Array, side: float, angle: float) -> None:
     """Draw one element behind the end of the cable: as long as it is, rubber as high as a square section."""
     piece = _piece(design)
@@ -262,7 +254,7 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     bars = axes.barh(places, values, 0.66, color=tones, edgecolor=SURFACE.light)
     for bar, hatch in zip(bars, hatches, strict=True):
         bar.set_hatch(hatch)
-    ends = [value for value in values]
+    ends = list(values)
     for k, (_, each) in enumerate(whole):
         upper = each.upper if np.isfinite(each.upper) else each.value
         axes.hlines(places[k], factor * each.lower, factor * upper, color=INK.light, linewidth=1.3)
@@ -277,8 +269,9 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     axes.set_ylim(places[-1] - 0.6, 0.6)
     axes.margins(x=0.1)
     axes.set_xlim(left=0.0)
-    axes.set_xlabel(f"95 % quantile of the rms torque error in {unit}")
-    axes.set_title(f"{len(result.errors)} made springs")
+    axes.set(
+        title=f"{len(result.errors)} made springs", xlabel=f"95 % quantile of the rms torque error in {unit}"
+    )
     best = min((each.value, name) for name, each in whole)
     return described(
         figure,
@@ -316,11 +309,8 @@ def torque_band(result: ToleranceResult) -> Figure:
     upper.plot(degrees, wanted, color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target")
     lower.axhline(0.0, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)))
     lower.grid(color=GRID.light)
-    upper.set_ylabel("torque in N·m")
-    upper.set_title("Torque of made springs")
-    lower.set_ylabel(f"error in {unit}")
-    lower.set_title("Made minus target")
-    lower.set_xlabel("angle in degrees")
+    upper.set(title="Torque of made springs", ylabel="torque in N·m")
+    lower.set(title="Made minus target", xlabel="angle in degrees", ylabel=f"error in {unit}")
     legend(upper, columns=2)
     after = f", {typeset_number(factor * widest[1])} {unit} after the trim" if len(widest) > 1 else ""
     return described(
@@ -359,8 +349,7 @@ def motor_over_task(curve: TaskCurve) -> Figure:
             time, shown = motor.cycle.time, values(motor)
             closed = np.append(time, motor.cycle.period), np.append(shown, shown[0])
             panel.plot(*closed, color=tone.light, linestyle=dash, label=name, linewidth=1.4)
-        panel.set_title(title)
-        panel.set_ylabel(label)
+        panel.set(title=title, ylabel=label)
     legend(axes[0])
     axes[-1].set_xlabel("time in s")
     summary = "; ".join(
@@ -394,9 +383,7 @@ def curve_of_task(curve: TaskCurve) -> Figure:
         beside = f"best linear spring, {typeset_number(curve.linear_stiffness)} N·m/rad"
         at = np.degrees(line / curve.linear_stiffness)
         axes.plot(at, line, color=BEFORE.light, linestyle=DASHES[1], linewidth=1.2, label=beside)
-    axes.set_ylabel("torque in N·m")
-    axes.set_xlabel("deflection in degrees")
-    axes.set_title("Spring for the task")
+    axes.set(title="Spring for the task", xlabel="deflection in degrees", ylabel="torque in N·m")
     axes.margins(x=0.03)
     legend(axes)
     return described(
@@ -431,8 +418,7 @@ def pareto_front(front: ParetoFront) -> Figure:
         axes.plot(chosen[:, 1], chosen[:, 0], color=tone, linestyle=joined, marker=marker, label=named)
     for number, row in enumerate(values):
         axes.annotate(str(number), (row[1], row[0]), xytext=(5, 4), textcoords="offset points", fontsize=8)
-    axes.set_xlabel(labels[1])
-    axes.set_ylabel(labels[0])
+    axes.set(xlabel=labels[1], ylabel=labels[0])
     axes.margins(0.08)
     if len(labels) == 3:
         axes.set_title(labels[2])

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...feedback.control import LoopEvaluation
@@ -21,6 +20,7 @@ from .style import (
     INK,
     LIMIT,
     MUTED,
+    crosses,
     described,
     legend,
     log_axis,
@@ -55,12 +55,12 @@ def torque_responses(responses: Sequence[SineResponse], line: SaturationLine | N
         for panel, values in ((axes[0], response.decibel), (axes[1], response.phase_degrees)):
             panel.plot(response.frequency, values, color=tone, linestyle=dash, marker=point, label=label)
         lost = [f for f, v in zip(response.frequency, response.verdicts, strict=True) if not v.holds]
-        _crosses(axes[0], lost, number)
+        if lost:
+            crosses(axes[0], lost, 0.04 + 0.07 * number, tone)
         words.append(_response_words(label, response, lost))
         if line is not None:
             axes[2].axhline(response.amplitude, color=tone, linestyle=dash, linewidth=1.0)
-    axes[0].set_title("Desired to actual torque (✕: no settled answer)")
-    axes[0].set_ylabel("magnitude in dB")
+    axes[0].set(title="Desired to actual torque (✕: no settled answer)", ylabel="magnitude in dB")
     axes[1].set_ylabel("phase in degrees")
     if line is not None:
         axes[2].plot(
@@ -103,8 +103,7 @@ def impedance_over_frequency(result: OutputImpedance) -> Figure:
     upper.set_ylabel("|jω·Z| in N·m/rad")
     lower.axhline(0.0, color=INK.light, linewidth=0.9, linestyle=DASHES[1])
     symmetric_log_axis(lower, 1e-3)
-    lower.set_title("Real part of the impedance (passive above the dashed line)")
-    lower.set_ylabel("Re Z in N·m·s/rad")
+    lower.set(title="Real part of the impedance (passive above the dashed line)", ylabel="Re Z in N·m·s/rad")
     log_axis(lower, abscissa=True)
     lower.set_xlabel("frequency in Hz")
     legend(upper, columns=6)
@@ -137,8 +136,7 @@ def margins_over_angle(result: Sequence[LoopMargins]) -> Figure:
     for panel, title in zip(
         axes, ("gain margin in dB", "phase margin in degrees", "delay margin in ms"), strict=True
     ):
-        panel.set_ylabel(title)
-        panel.set_xlabel("angle in degrees")
+        panel.set(xlabel="angle in degrees", ylabel=title)
         panel.set_ylim(bottom=0.0)
     symmetric_log_axis(axes[2], 1.0)
     handles, labels = axes[0].get_legend_handles_labels()
@@ -163,9 +161,11 @@ def coupled_stability_map(result: CoupledStability) -> Figure:
     positive = result.stiffnesses[result.stiffnesses > 0.0]
     symmetric_log_axis(axes, float(positive[0]) if len(positive) else 1.0)
     axes.margins(0.05)
-    axes.set_xlabel("inertia of the load in kg·m²")
-    axes.set_ylabel("stiffness to the frame in N·m/rad")
-    axes.set_title(f"Coupled stability at {np.degrees(result.angle):.0f}°")
+    axes.set(
+        title=f"Coupled stability at {np.degrees(result.angle):.0f}°",
+        xlabel="inertia of the load in kg·m²",
+        ylabel="stiffness to the frame in N·m/rad",
+    )
     legend(axes)
     share = f"{int(np.sum(stable))} of {stable.size}"
     return described(figure, f"Coupled stability of the torque loop: stable on {share} loads.")
@@ -176,15 +176,6 @@ def passivity_words(first: float) -> str:
     if np.isnan(first):
         return "unstable, so it has no impedance"
     return f"active from {typeset_number(first)} Hz on" if np.isfinite(first) else "passive"
-
-
-def _crosses(axes: Axes, frequencies: Sequence[float], number: int) -> None:
-    if frequencies:
-        height = np.full(len(frequencies), 0.04 + 0.07 * number)
-        axes.plot(
-            frequencies, height, transform=axes.get_xaxis_transform(), color=look(number).color,
-            linestyle="none", marker="x", markeredgewidth=1.6,
-        )  # fmt: skip
 
 
 def _response_words(label: str, response: SineResponse, lost: Sequence[float]) -> str:

@@ -61,8 +61,9 @@ def observability_over_angle(
     axes[0].set_title("Rank of the observability matrix")
     legend(axes[0])
     log_axis(axes[1])
-    axes[1].set_ylabel("condition number")
-    axes[1].set_title("Condition of the scaled matrix (small is good; ✕: not observable)")
+    axes[1].set(
+        title="Condition of the scaled matrix (small is good; ✕: not observable)", ylabel="condition number"
+    )
     if deviations:
         _deviations(axes[2], deviations)
     axes[-1].set_xlabel("angle in degrees")
@@ -107,8 +108,7 @@ def stability_over_angle(charts: Mapping[str, Chart]) -> Figure:
         (damping, "Its damping ratio (1: nothing oscillates)", "damping ratio"),
         (stiffness, "Stiffness at rest", "stiffness in N·m/rad"),
     ):
-        panel.set_title(title)
-        panel.set_ylabel(unit)
+        panel.set(title=title, ylabel=unit)
     frequency.set_ylim(bottom=0.0)
     if all(np.min(np.asarray(line.get_ydata(), dtype=float)) > 0.0 for line in damping.lines):
         log_axis(damping)
@@ -178,8 +178,7 @@ def _deviations(axes: Axes, charts: Mapping[str, Chart]) -> None:
             degrees, alone, color=MUTED.light, linestyle=DASHES[1], label=f"{prefix}model alone", **points
         )
         axes.plot(degrees, best, color=tone, label=f"{prefix}best use of the measurement", **points)
-    axes.set_ylabel("standard deviation in mN·m")
-    axes.set_title("Standard deviation of the torque estimate")
+    axes.set(title="Standard deviation of the torque estimate", ylabel="standard deviation in mN·m")
     axes.set_ylim(bottom=0.0)
     legend(axes, columns=2)
 
@@ -223,8 +222,7 @@ def errors_over_spread(errors: SpreadErrors) -> Figure:
     log_axis(left)
     left.set_xticks(places, [f"{f:g} Hz" for f in errors.frequencies])
     left.set_xlim(-0.6, len(places) - 0.4)
-    left.set_ylabel(f"torque error in {unit} rms")
-    left.set_title("Bar: median to 90 %; open: exact numbers")
+    left.set(title="Bar: median to 90 %; open: exact numbers", ylabel=f"torque error in {unit} rms")
     _draw_causes(right, errors)
     legend(left)
     return described(figure, f"Torque errors over the spread. {' '.join(words)}")
@@ -245,8 +243,7 @@ def _draw_causes(axes: Axes, errors: SpreadErrors) -> None:
     axes.tick_params(axis="y", labelsize=8)
     axes.margins(x=0.05)
     axes.set_xlim(left=0.0)
-    axes.set_xlabel(f"{unit} rms for one standard deviation")
-    axes.set_title(f"Largest causes, {errors.observers[0]}")
+    axes.set(title=f"Largest causes, {errors.observers[0]}", xlabel=f"{unit} rms for one standard deviation")
     axes.grid(visible=True, axis="y", color=MUTED.light, linewidth=0.3)
 
 

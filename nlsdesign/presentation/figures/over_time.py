@@ -106,26 +106,15 @@ def over_time(time: Array, curves: Mapping[str, Array], *, quantity: str, unit: 
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoopRun:
-    """Signals of a closed loop over time; arrays of shape (n,), in SI.
+    """Signals of a closed loop over time; arrays of shape (n,), in SI."""
 
-    Parameters
-    ----------
-    time
-        In s.
-    desired, true, estimated
-        Torque in N·m.
-    current
-        Motor current in A.
-    current_limit
-        In A; infinite for none.
-    """
-
-    time: Array
+    time: Array  # in s
+    # desired, true, estimated: torque in N·m
     desired: Array
     true: Array
     estimated: Array
-    current: Array
-    current_limit: float = float("inf")
+    current: Array  # motor current in A
+    current_limit: float = float("inf")  # in A; infinite for none
 
 
 def closed_loop_of(

@@ -26,6 +26,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import ArrayLike
 
+from ...foundation.arrays import Array
 from ...foundation.quantity import superscript, typeset_number
 
 
@@ -60,17 +61,10 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Tone:
-    """One colour of the figures.
+    """One colour of the figures."""
 
-    Parameters
-    ----------
-    name
-        Name of its CSS variable, without the leading dashes.
-    light, dark
-        As ``#rrggbb``, on light and on dark pages.
-    """
-
-    name: str
+    name: str  # name of its CSS variable, without the leading dashes
+    # light, dark: as #rrggbb, on light and on dark pages
     light: str
     dark: str
 
@@ -228,9 +222,16 @@ def legend(axes: Axes, *, columns: int = 4) -> None:
 
 def label_panel(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> None:
     """Give a panel its ordinate, title and legend."""
-    axes.set_ylabel(ordinate)
-    axes.set_title(title)
+    axes.set(title=title, ylabel=ordinate)
     legend(axes, columns=columns)
+
+
+def crosses(axes: Axes, at: Array | list[float], height: float, color: str) -> None:
+    """Mark abscissae by crosses at a height, a share of that of the panel."""
+    axes.plot(
+        at, [height] * len(at), transform=axes.get_xaxis_transform(), color=color, linestyle="none",
+        marker="x", markeredgewidth=1.6,
+    )  # fmt: skip
 
 
 def log_axis(axes: Axes, *, abscissa: bool = False) -> None:

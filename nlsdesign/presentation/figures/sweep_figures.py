@@ -42,21 +42,11 @@ _LINES = 6
 
 
 class ShownColumn(NamedTuple):
-    """One column of a sweep as a figure shows it.
+    """One column of a sweep as a figure shows it."""
 
-    Parameters
-    ----------
-    name
-        Full name.
-    unit
-        Of the values; empty for words and counts.
-    values
-        One for each point: numbers, or words.
-    """
-
-    name: str
-    unit: str
-    values: NDArray[Any]
+    name: str  # full name
+    unit: str  # of the values; empty for words and counts
+    values: NDArray[Any]  # one for each point: numbers, or words
 
     @property
     def words(self) -> bool:
@@ -78,18 +68,11 @@ class ShownColumn(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PointKinds:
-    """What the points of a figure are.
+    """What the points of a figure are."""
 
-    Parameters
-    ----------
-    points
-        Numbers of the points, shape (n,).
-    front, missed, failed
-        Which no other betters, which keep not all requirements, which have no answer; no point is two of
-        them.
-    """
-
-    points: NDArray[np.int64]
+    points: NDArray[np.int64]  # numbers of the points, shape (n,)
+    # front, missed, failed: which no other betters, which keep not all requirements, which have no answer; no
+    # point is two of them
     front: Mask
     missed: Mask
     failed: Mask
@@ -173,17 +156,10 @@ _MOST_BARS = 40
 
 
 class MarkedQuantile(NamedTuple):
-    """A quantile in a histogram.
+    """A quantile in a histogram."""
 
-    Parameters
-    ----------
-    share
-        Of the values below it.
-    value, lower, upper
-        In the unit of the column; bounds that are not a number are not drawn.
-    """
-
-    share: float
+    share: float  # of the values below it
+    # value, lower, upper: in the unit of the column; bounds that are not a number are not drawn
     value: float
     lower: float
     upper: float
@@ -204,8 +180,7 @@ def answer_histograms(
         panel.margins(x=0.02)
         panel.set_xlim(*panel.get_xlim())
         _marks(panel, marks)
-        panel.set_xlabel(column.label)
-        panel.set_ylabel("points in %")
+        panel.set(xlabel=column.label, ylabel="points in %")
         panel.xaxis.set_major_locator(MaxNLocator(nbins=5))
     for unused in axes[len(columns) :]:
         unused.set_visible(False)
@@ -289,8 +264,7 @@ def answers_against(
         for value, draw in ((wanted[0], panel.axhline), (wanted[number + 1], panel.axvline)):
             if value is not None:
                 draw(value, color=INK.light, linewidth=0.9, linestyle=(0, (1.2, 1.2)), label="wanted")
-        panel.set_xlabel(column.label)
-        panel.set_ylabel(columns[0].label)
+        panel.set(xlabel=column.label, ylabel=columns[0].label)
         panel.margins(0.06)
         if number == 0:
             legend(panel)
@@ -400,27 +374,16 @@ _STEPS = 7
 
 
 class SurfacePanel(NamedTuple):
-    """One answer over two axes.
+    """One answer over two axes."""
 
-    Parameters
-    ----------
-    title
-        Answer with its unit.
-    across, up
-        Axes, values at the points.
-    kinds
-        What the points are.
-    nodes
-        Nodes of the surface across and up, in the units of the axes; ``None`` where only points are drawn.
-    values
-        Of the answer at the nodes, shape (up, across); not a number where nothing is drawn.
-    """
-
-    title: str
+    title: str  # answer with its unit
+    # across, up: axes, values at the points
     across: ShownColumn
     up: ShownColumn
-    kinds: PointKinds
+    kinds: PointKinds  # what the points are
+    # nodes: nodes of the surface across and up, in the units of the axes; None where only points are drawn
     nodes: tuple[Array, Array] | None
+    # values: of the answer at the nodes, shape (up, across); not a number where nothing is drawn
     values: Array | None
 
 
@@ -438,9 +401,7 @@ def response_surfaces(surfaces: Sequence[SurfacePanel], *, words: str) -> Figure
         if surface.nodes is not None and surface.values is not None:
             _contours(panel, *surface.nodes, surface.values)
         scatter_points(panel, surface.across.numbers(), surface.up.numbers(), kinds=surface.kinds, small=True)
-        panel.set_title(surface.title)
-        panel.set_xlabel(surface.across.label)
-        panel.set_ylabel(surface.up.label)
+        panel.set(title=surface.title, xlabel=surface.across.label, ylabel=surface.up.label)
         panel.grid(visible=False)
         panel.margins(0.03)
     for unused in axes[len(surfaces) :]:
@@ -465,21 +426,13 @@ def _contours(panel: Axes, across: Array, up: Array, values: Array) -> None:
 
 
 class VarianceShare(NamedTuple):
-    """Share of one axis.
+    """Share of one axis."""
 
-    Parameters
-    ----------
-    axis
-        Its name.
-    first, first_error
-        Share of the axis alone, and half of its interval.
-    total, total_error
-        The same with its interactions; not a number where there is none.
-    """
-
-    axis: str
+    axis: str  # its name
+    # first, first_error: share of the axis alone, and half of its interval
     first: float
     first_error: float
+    # total, total_error: the same with its interactions; not a number where there is none
     total: float
     total_error: float
 
@@ -495,8 +448,7 @@ def sensitivity_bars(shares: Mapping[str, Sequence[VarianceShare]], *, words: st
     figure, axes = panels(rows, wide, height=rows * (1.15 + 0.3 * most))
     for number, ((answer, each), panel) in enumerate(zip(shares.items(), axes, strict=False)):
         _draw(panel, each)
-        panel.set_title(shortened(answer, 50))
-        panel.set_xlabel("share of the variance in %")
+        panel.set(title=shortened(answer, 50), xlabel="share of the variance in %")
         if number == 0:
             legend(panel)
     for unused in axes[len(shares) :]:

@@ -63,34 +63,16 @@ _WIDTH = 100.0
 
 @dataclass(frozen=True, eq=False)
 class VerdictSection(Section):
-    """A verdict with its evidence: tables of candidates, figures of the errors.
+    """A verdict with its evidence: tables of candidates, figures of the errors."""
 
-    Parameters
-    ----------
-    verdict
-        ``"none"``, ``"named"``, ``"unknown"``, ``"undecidable"`` or ``"data_suspect"``.
-    words
-        The findings, in sentences.
-    detail
-        What speaks for them, in sentences that are folded away; empty for none.
-    headline
-        The findings in one line.
-    gap
-        Error before and after; ``None`` where there is none to show.
-    after
-        How the model after differs from the one before.
-    parts
-        Sections with the evidence.
-    """
-
-    verdict: str
-    words: str
+    verdict: str  # "none", "named", "unknown", "undecidable" or "data_suspect"
+    words: str  # the findings, in sentences
     _: KW_ONLY
-    detail: str = ""
-    headline: str = ""
-    gap: Gap | None = None
-    after: str = "with what was added"
-    parts: tuple[Section, ...] = ()
+    detail: str = ""  # what speaks for them, in sentences that are folded away; empty for none
+    headline: str = ""  # the findings in one line
+    gap: Gap | None = None  # error before and after; None where there is none to show
+    after: str = "with what was added"  # how the model after differs from the one before
+    parts: tuple[Section, ...] = ()  # sections with the evidence
     template: ClassVar[str] = "verdict.html"
 
     def __post_init__(self) -> None:

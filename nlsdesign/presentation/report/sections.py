@@ -68,21 +68,11 @@ _KEPT = ",:[]{}()/ "
 
 
 class DataLink(NamedTuple):
-    """A link that holds a file or leads to one.
+    """A link that holds a file or leads to one."""
 
-    Parameters
-    ----------
-    name
-        Of the file, when it is saved.
-    link
-        The whole content, or the path of the file from the page.
-    words
-        What is to be had there.
-    """
-
-    name: str
-    link: str
-    words: str = "Data of this figure (JSON)"
+    name: str  # of the file, when it is saved
+    link: str  # the whole content, or the path of the file from the page
+    words: str = "Data of this figure (JSON)"  # what is to be had there
 
 
 def file_link(file: Path, folder: Path) -> DataLink:
@@ -110,18 +100,10 @@ _NUMBER = re.compile(r"^(± )?\(?[−+-]?\d[\d.]*( ± \d[\d.]*\)?)?(·10[⁰¹²
 
 @dataclass(frozen=True)
 class PagePosition:
-    """Position of a section on the page.
+    """Position of a section on the page."""
 
-    Parameters
-    ----------
-    key
-        Identifier that no other section of the page uses; identifiers inside start with it.
-    folder
-        Folder of the report, for relative links.
-    """
-
-    key: str
-    folder: Path
+    key: str  # identifier that no other section of the page uses; identifiers inside start with it
+    folder: Path  # folder of the report, for relative links
 
     def inner(self, number: int) -> PagePosition:
         """Return the place of a section inside this one."""

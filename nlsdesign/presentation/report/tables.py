@@ -111,34 +111,19 @@ def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: st
 
 @dataclass(frozen=True, eq=False)
 class PointTableSection(Section):
-    """A table of points, each with its deck; and what the page shows of any point that is chosen in a figure.
+    """A table of points, each with its deck, and what the page shows of a point chosen in a figure."""
 
-    Parameters
-    ----------
-    table
-        One row per point of ``points``, without the number of the point.
-    points
-        Numbers of the points in the table.
-    decks
-        Path of the deck of a point, from the folder of the page, by number; for points beyond the table too.
-    rows
-        For each point that a figure shows its values, by number: ``status``, ``reason``, ``values``.
-    columns
-        Name and unit of each of the values.
-    command
-        What writes the deck of a point that has none yet; ``POINT`` stands for its number.
-    elsewhere
-        Where the rows of points stand that are not on the page.
-    """
-
-    table: TableSection
-    points: Sequence[int]
+    table: TableSection  # one row per point of points, without the number of the point
+    points: Sequence[int]  # numbers of the points in the table
     _: KW_ONLY
+    # decks: path of the deck of a point, from the folder of the page, by number; for points beyond the table
+    # too
     decks: Mapping[int, str] = field(default_factory=dict)
+    # rows: for each point that a figure shows its values, by number: status, reason, values
     rows: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
-    columns: Sequence[tuple[str, str]] = ()
-    command: str = ""
-    elsewhere: str = ""
+    columns: Sequence[tuple[str, str]] = ()  # name and unit of each of the values
+    command: str = ""  # what writes the deck of a point that has none yet; POINT stands for its number
+    elsewhere: str = ""  # where the rows of points stand that are not on the page
     template: ClassVar[str] = "points.html"
     script: ClassVar[str] = "points.js"
 

@@ -23,21 +23,11 @@ _SEED: Final = 0
 
 
 class ShownPoints(NamedTuple):
-    """Points that the page shows.
+    """Points that the page shows."""
 
-    Parameters
-    ----------
-    rows
-        Their rows in the table, ascending.
-    kinds
-        What they are.
-    rule
-        How they were chosen, as text; empty where all are shown.
-    """
-
-    rows: Indices
-    kinds: PointKinds
-    rule: str
+    rows: Indices  # their rows in the table, ascending
+    kinds: PointKinds  # what they are
+    rule: str  # how they were chosen, as text; empty where all are shown
 
 
 def shown_unit(unit: str) -> tuple[str, float]:

@@ -24,6 +24,7 @@ from .sweep_sections import (
     coordinate_sections,
     front_sections,
     histogram_sections,
+    point_list,
     sensitivity_sections,
     surface_sections,
     unit_of,
@@ -38,13 +39,6 @@ _NAMES = {
 POINTS_FILE = "points.csv"
 DECKS_FOLDER = "point_decks"
 """Not that of the decks that were swept, so that the page may stand in the folder of the sweep."""
-
-
-def write_points(table: SweepTable, folder: Path) -> Path:
-    """Write all points as a table of comma-separated values, in SI, and return its path."""
-    path = folder / POINTS_FILE
-    write_table(path, _rows(table))
-    return path
 
 
 def _rows(table: SweepTable) -> Iterator[Sequence[str]]:
@@ -66,12 +60,10 @@ def write_decks(table: SweepTable, points: Iterable[int], folder: Path) -> tuple
         name = f"{DECKS_FOLDER}/point_{point}.toml"
         write_text(folder / name, text)
         written[point] = name
-    return written, [f"no deck for {_numbers(numbers)}: {reason}" for reason, numbers in remarks.items()]
-
-
-def _numbers(points: Sequence[int]) -> str:
-    shown = ", ".join(map(str, points[:5]))
-    return ("point " if len(points) == 1 else "points ") + shown + (", …" if len(points) > 5 else "")
+    return written, [
+        f"no deck for point{'s' if len(numbers) > 1 else ''} {point_list(numbers, most=5)}: {reason}"
+        for reason, numbers in remarks.items()
+    ]
 
 
 def about_of(table: SweepTable) -> dict[str, str]:
@@ -97,27 +89,14 @@ _FACTS = ("deck", "deck, digest", "question", "version", "seed", "points asked")
 
 
 class SweepPage(NamedTuple):
-    """What was written.
-
-    Parameters
-    ----------
-    page
-        The page.
-    points
-        Table of all points, as CSV.
-    decks
-        Decks of the points in the table of the page, by number.
-    front
-        Numbers of the points that no other betters, the best in the first direction first.
-    remarks
-        What the reader should know, one sentence each.
-    """
+    """What was written."""
 
     page: Path
-    points: Path
-    decks: dict[int, Path]
+    points: Path  # table of all points, as CSV
+    decks: dict[int, Path]  # decks of the points in the table of the page, by number
+    # front: numbers of the points that no other betters, the best in the first direction first
     front: tuple[int, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # what the reader should know, one sentence each
 
 
 def write_sweep_report(
@@ -160,7 +139,8 @@ def write_sweep_report(
     ranked = rank_points(answers, table.done, preferences=preferences, requirements=requirements)
     listed, notes = _listed_rows(table, ranked)
     remarks: list[str] = []
-    points_file = write_points(table, folder)
+    points_file = folder / POINTS_FILE
+    write_table(points_file, _rows(table))
     numbers = [int(table.values["point"][row]) for row in listed[:MOST_DECKS]]
     decks, missing = write_decks(table, numbers, folder)
     remarks += missing

@@ -18,10 +18,10 @@ from nlsdesign.feedback.control import (
     LoopVerdict,
     ScheduledTorque,
     cascade_loops,
-    only_side,
     sine_response,
 )
 from nlsdesign.feedback.control.evaluation.whole_evaluation import stretches
+from nlsdesign.feedback.control.laws.known_drive import only_side
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 

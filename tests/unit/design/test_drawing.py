@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.design import Contour, contour_from_curvature, fingerprint, write_drawings
+from nlsdesign.design import Contour, fingerprint, write_drawings
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from tests.dxf_reading import entities_of, header_of, polylines_of

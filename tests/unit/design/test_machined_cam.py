@@ -22,10 +22,10 @@ from nlsdesign.design import (
     MachinedCam,
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
-    contour_from_curvature,
     contour_from_lever_arm,
     write_drawings,
 )
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.errors import (
     ArrangementError,
     MissingLibraryError,

@@ -15,10 +15,10 @@ from nlsdesign.design import (
     MachinedCam,
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
-    contour_from_curvature,
     contour_from_lever_arm,
 )
 from nlsdesign.design.drawing.making import Mounting, process_of
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.quantity import quantity
 
 CABLE = quantity(0.45, "mm", source="example")

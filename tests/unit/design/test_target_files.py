@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.design import TabulatedStiffness, TabulatedTorque, read_band, read_target
+from nlsdesign.design import TabulatedStiffness, TabulatedTorque, read_target
+from nlsdesign.design.curves.target_files import read_band
 from nlsdesign.foundation.errors import MeasurementError, NlsError, UnitError, ValueRangeError
 
 

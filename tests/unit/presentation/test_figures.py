@@ -15,7 +15,7 @@ import pytest
 from matplotlib import pyplot
 from matplotlib.colors import to_hex
 
-from nlsdesign.design import contour_from_curvature
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import typeset_number
 from nlsdesign.presentation import figures

@@ -20,9 +20,9 @@ from nlsdesign.design import (
     FerruleSeat,
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
-    contour_from_curvature,
     contour_from_lever_arm,
 )
+from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.errors import ValueRangeError
 from nlsdesign.foundation.quantity import degrees, quantity
 from nlsdesign.presentation import figures

@@ -29,10 +29,9 @@ from nlsdesign.sweeps import (
     SaltelliSample,
     SobolSample,
     SpreadQuestion,
-    Subject,
 )
 from nlsdesign.sweeps.axes import AxisSet
-from nlsdesign.sweeps.axis_values import with_settings
+from nlsdesign.sweeps.axis_values import Subject, with_settings
 from nlsdesign.sweeps.run_sweep import SweepSettings, run_task, sweep_task
 from nlsdesign.sweeps.sweep_file import read_sweep_file
 from nlsdesign.sweeps.sweep_parts import Parts

@@ -33,11 +33,11 @@ from nlsdesign.sweeps import (
     RandomDraws,
     SobolSample,
     SpreadQuestion,
-    Subject,
     SweepTable,
     run_sweep,
     sweep,
 )
+from nlsdesign.sweeps.axis_values import Subject
 from nlsdesign.sweeps.changes import changed_assembly
 from nlsdesign.sweeps.questions import QUICK
 from nlsdesign.sweeps.sweep_plan import PointPlan

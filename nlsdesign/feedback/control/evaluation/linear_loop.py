@@ -26,12 +26,12 @@ from ...observer.adaptive.corrected_cascade import PREFIX
 from ..closed_loop import ClosedLoop
 from ..laws.law_writer import DESIRED
 from .linear_parts import (
-    LinearBlock,
     LinearMode,
     LinearPlant,
     SlidingPlant,
     SlopedTables,
     TableSlope,
+    block_at,
     linear_plant,
     with_fine_counts,
 )
@@ -44,44 +44,29 @@ _WITHOUT_ERROR = 6
 
 @dataclass(frozen=True, eq=False)
 class LinearLoop:
-    """x⁺ = A x + B v + B⁺ v⁺, y = C x + D v of the whole loop at many angles.
+    """x⁺ = A x + B v + B⁺ v⁺, y = C x + D v of the whole loop at many angles."""
 
-    Parameters
-    ----------
-    angles
-        Of the spring in rad, shape (n,).
-    torque
-        That the spring holds there, in N·m, shape (n,).
-    current
-        That holds it, in A, shape (n,); where it is beyond the limit of the controller the loop cannot rest
-        there, ``reached`` is false and poles and responses are not numbers.
-    reached
-        Whether the loop rests there inside all limits, shape (n,); false also where the controller was only
-        found inside a limit of its own, so that it does not hear what is wanted.
-    sample_time
-        In s.
-    states, inputs, outputs
-        Full names.
-    a, b, b_next, c, d
-        Shapes (n, states, states), (n, states, inputs), twice, (n, outputs, states), (n, outputs, inputs).
-    mode
-        Of the plant's dry friction.
-    """
-
-    angles: Array
-    torque: Array
+    angles: Array  # of the spring in rad, shape (n,)
+    torque: Array  # that the spring holds there, in N·m, shape (n,)
+    # current: that holds it, in A, shape (n,); where it is beyond the limit of the controller the loop cannot
+    # rest there, reached is false and poles and responses are not numbers
     current: Array
+    # reached: whether the loop rests there inside all limits, shape (n,); false also where the controller was
+    # only found inside a limit of its own, so that it does not hear what is wanted
     reached: Mask
-    sample_time: float
+    sample_time: float  # in s
+    # states, inputs, outputs: full names
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    # a, b, b_next, c, d: shapes (n, states, states), (n, states, inputs), twice, (n, outputs, states), (n,
+    # outputs, inputs)
     a: Array
     b: Array
     b_next: Array
     c: Array
     d: Array
-    mode: LinearMode
+    mode: LinearMode  # of the plant's dry friction
 
     def poles(self) -> Complex:
         """Return the closed-loop poles s = ln(z)/T in 1/s, the slowest first, shape (n, states).
@@ -104,8 +89,7 @@ class LinearLoop:
     def stable(self) -> Mask:
         """Return where the loop is stable, shape (n,)."""
         # A gain of zero leaves an integrator that nothing moves at exactly one.
-        result: Mask = self.radius() < 1.0 + 1e-9
-        return result
+        return self.radius() < 1.0 + 1e-9
 
     def response(self, output: str, given: str, frequencies: Sequence[float] | Array) -> Complex:
         """Return the ratio of an output to an input, shape (n, frequencies)."""
@@ -207,8 +191,7 @@ class _Assembler:
     def __init__(
         self, system: SampledSystem, plant: LinearPlant, cut: tuple[str, ...], tables: TableSlope
     ) -> None:
-        self.system, self.plant, self.cut = system, plant, cut
-        self.blocks = {name: LinearBlock(model, tables) for name, model in system.blocks.items()}
+        self.system, self.plant, self.cut, self.tables = system, plant, cut, tables
         self.n = len(plant.drive)
         self.driven = f"{PLANT}.{system.driven}"
         prescribed = [f"{PLANT}.{name}" for name in plant.inputs[1:]]
@@ -340,7 +323,7 @@ class _Assembler:
             sources = [name if name in self.cut else self.system.sources[name] for name in names]
             # A cut loop rests where the closed one does.
             resting = [values[self.system.sources[name]] for name in names]
-            point = self.blocks[b].at(self.state[b], np.stack(resting, axis=1))
+            point = block_at(model, self.tables, self.state[b], np.stack(resting, axis=1))
             given = np.stack([rows[source] for source in sources], axis=1)
             first, count = self.first[b], len(model.states)
             after, out = point.b @ given, point.d @ given

@@ -166,29 +166,19 @@ class FrozenTables(TableSlope):
 
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
-    """A plant linearised at many angles: ẋ = A x + B u, signals = C x + D u.
+    """A plant linearised at many angles: ẋ = A x + B u, signals = C x + D u."""
 
-    Parameters
-    ----------
-    states, inputs, signals
-        Names; the driven input comes first.
-    a, b, c, d
-        Shapes (n, states, states), (n, states, inputs), (n, signals, states), (n, signals, inputs).
-    values
-        Of the signals, shape (n, signals).
-    drive
-        Value of the driven input that holds the plant, shape (n,).
-    """
-
+    # states, inputs, signals: names; the driven input comes first
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     signals: tuple[str, ...]
+    # a, b, c, d: shapes (n, states, states), (n, states, inputs), (n, signals, states), (n, signals, inputs)
     a: Array
     b: Array
     c: Array
     d: Array
-    values: Array
-    drive: Array
+    values: Array  # of the signals, shape (n, signals)
+    drive: Array  # value of the driven input that holds the plant, shape (n,)
 
     def sampled(self, step: float) -> tuple[Array, Array, Array, Array]:
         """Return exact matrices over one sample.
@@ -267,70 +257,46 @@ def _holding(function: ca.Function, rest: Array, fixed: tuple[Array, Array], pla
         inputs[:, place] = value
         accelerations.append(evaluate_rows(function, rest, inputs, p)[5][:, 0])
     slope = (accelerations[1] - accelerations[0]) / 1e-3
-    result: Array = -accelerations[0] / slope
-    return result
+    return -accelerations[0] / slope
 
 
 @dataclass(frozen=True, eq=False)
 class BlockPoint:
-    """A discrete block evaluated and linearised at many points.
+    """A discrete block evaluated and linearised at many points."""
 
-    Parameters
-    ----------
-    following, output
-        Shapes (n, states) and (n, outputs).
-    a, b, c, d
-        Slopes of both over state and input, tables included.
-    """
-
+    # following, output: shapes (n, states) and (n, outputs)
     following: Array
     output: Array
+    # a, b, c, d: slopes of both over state and input, tables included
     a: Array
     b: Array
     c: Array
     d: Array
 
 
-class LinearBlock:
-    """Evaluates a discrete block with its tables, and their slopes, at many points.
+def block_at(model: FlatModel, tables: TableSlope, state: Array, inputs: Array) -> BlockPoint:
+    """Return values and slopes of a discrete block with its tables at many points.
 
-    Parameters
-    ----------
-    model
-        Discrete.
-    tables
-        How the tables take part.
+    ``state``, ``inputs``: shapes (n, states) and (n, inputs).
     """
-
-    def __init__(self, model: FlatModel, tables: TableSlope) -> None:
-        self.model, self.tables = model, tables
-
-    def at(self, state: Array, inputs: Array) -> BlockPoint:
-        """Return values and slopes.
-
-        ``state``, ``inputs``: shapes (n, states) and (n, inputs).
-        """
-        model, n = self.model, len(state)
-        names, given = [v.name for v in model.states], [v.name for v in model.inputs]
-        columns, into = [np.zeros((n, 0))], [np.zeros((n, 0, len(names) + len(given)))]
-        for table in model.tables:
-            place = names.index(table.argument) if table.argument in names else (
-                len(names) + given.index(table.argument)
-            )  # fmt: skip
-            at = np.concatenate([state, inputs], axis=1)[:, place]
-            columns.append(np.array([table.look_up(float(v)) for v in at]))
-            slope = np.zeros((n, table.values.shape[1], len(names) + len(given)))
-            slope[:, :, place] = self.tables.of(table, at)
-            into.append(slope)
-        w, dw = np.concatenate(columns, axis=1), np.concatenate(into, axis=1)
-        p = model.start(model.parameters)
-        following, output, fx, fu, fw, yx, yu, yw = _with_slopes(model.equations, n)(state, inputs, p, w)
-        count = len(names)
-        return BlockPoint(
-            following[:, :, 0], output[:, :, 0],
-            fx + fw @ dw[:, :, :count], fu + fw @ dw[:, :, count:],
-            yx + yw @ dw[:, :, :count], yu + yw @ dw[:, :, count:],
-        )  # fmt: skip
+    names, n = [v.name for v in (*model.states, *model.inputs)], len(state)
+    columns, into = [np.zeros((n, 0))], [np.zeros((n, 0, len(names)))]
+    for table in model.tables:
+        place = names.index(table.argument)
+        at = np.concatenate([state, inputs], axis=1)[:, place]
+        columns.append(np.array([table.look_up(float(v)) for v in at]))
+        slope = np.zeros((n, table.values.shape[1], len(names)))
+        slope[:, :, place] = tables.of(table, at)
+        into.append(slope)
+    w, dw = np.concatenate(columns, axis=1), np.concatenate(into, axis=1)
+    p = model.start(model.parameters)
+    following, output, fx, fu, fw, yx, yu, yw = _with_slopes(model.equations, n)(state, inputs, p, w)
+    count = len(model.states)
+    return BlockPoint(
+        following[:, :, 0], output[:, :, 0],
+        fx + fw @ dw[:, :, :count], fu + fw @ dw[:, :, count:],
+        yx + yw @ dw[:, :, :count], yu + yw @ dw[:, :, count:],
+    )  # fmt: skip
 
 
 class _AtPoints:

@@ -30,7 +30,7 @@ from ....model import FlatModel
 from ....model.roles import measured_motion, series_spring
 from ....model.transform import named
 from ....simulation.sampled_batch import PLANT
-from ...analysis.rest import evaluate_rows, rate_state, rest_states
+from ...analysis.rest import evaluate_at, rate_state, rest_states
 from ..closed_loop import ClosedLoop
 
 SETTLED, LIMIT_CYCLE, UNSETTLED, DIVERGED = "settled", "limit cycle", "not settled", "diverged"
@@ -263,16 +263,14 @@ def without_harmonics(values: Array, cycles: int) -> Array:
     """
     if cycles == 0:
         time = np.linspace(-1.0, 1.0, len(values))
-        drift: Array = values - np.polynomial.Polynomial.fit(time, values, 1)(time)
-        return drift
+        return values - np.polynomial.Polynomial.fit(time, values, 1)(time)
     spectrum = np.fft.rfft(values)
     spectrum[0] = 0.0
     multiples = spectrum[cycles::cycles]
     # A sharp end would ring before and after every kick, so the removal fades out.
     share = np.clip((np.arange(1.0, len(multiples) + 1.0) - HARMONICS) / HARMONICS, 0.0, 1.0)
     multiples *= 0.5 - 0.5 * np.cos(math.pi * share)
-    rest: Array = np.fft.irfft(spectrum, len(values))
-    return rest
+    return np.fft.irfft(spectrum, len(values))
 
 
 def locked(values: Array, cycles: int) -> tuple[float, int]:
@@ -299,8 +297,7 @@ def _faster(error: Array, desired: Array) -> Array:
     # Below the resolution of the window nothing is told apart.
     last = int(np.searchsorted(power, 0.999 * power[-1])) if power[-1] > 0.0 else 0
     spectrum[: 3 * max(last, 2) + 1] = 0.0
-    faster: Array = np.fft.irfft(spectrum, len(error))
-    return faster
+    return np.fft.irfft(spectrum, len(error))
 
 
 def _without_answer(error: Array, desired: Array) -> Array:
@@ -409,9 +406,5 @@ def tangent_stiffness(plant: FlatModel, angles: Array) -> Array:
     jump = row[at]
     for i in inner:
         jump += row[i] * ca.jacobian(s.derivative[i], s.state[of])
-    slope = ca.Function("slope", [s.time, s.state, s.input, s.parameter], [ca.densify(jump)])
-    rest = rest_states(plant, angles)
-    result: Array = evaluate_rows(slope, rest, plant.start(plant.inputs), plant.start(plant.parameters))[0][
-        :, 0
-    ]
-    return result
+    (slopes,) = evaluate_at(plant, s, [jump], rest_states(plant, angles))
+    return slopes.ravel()

@@ -252,35 +252,21 @@ def output_impedance(
 
 @dataclass(frozen=True, eq=False)
 class CoupledStability:
-    """Whether the loop stays stable on loads with inertia and a spring to the frame.
+    """Whether the loop stays stable on loads with inertia and a spring to the frame."""
 
-    Parameters
-    ----------
-    angle
-        Of the spring at rest, in rad.
-    inertias
-        Of the load in kg·m², shape (i,).
-    stiffnesses
-        Of the spring between load and frame in N·m/rad, shape (s,).
-    radius
-        Largest size of an eigenvalue per sample, shape (i, s); not a number where the loop cannot hold the
-        angle.
-    frequency
-        Of that eigenvalue in Hz, shape (i, s).
-    """
-
-    angle: float
-    inertias: Array
-    stiffnesses: Array
+    angle: float  # of the spring at rest, in rad
+    inertias: Array  # of the load in kg·m², shape (i,)
+    stiffnesses: Array  # of the spring between load and frame in N·m/rad, shape (s,)
+    # radius: largest size of an eigenvalue per sample, shape (i, s); not a number where the loop cannot hold
+    # the angle
     radius: Array
-    frequency: Array
+    frequency: Array  # of that eigenvalue in Hz, shape (i, s)
 
     @property
     def stable(self) -> Mask:
         """Where the coupled loop is stable or at its limit, shape (i, s)."""
         # A free load has a double eigenvalue at one, which rounding parts by 1e-8.
-        result: Mask = self.radius < 1.0 + 1e-6
-        return result
+        return self.radius < 1.0 + 1e-6
 
 
 def coupled_stability(

@@ -47,24 +47,15 @@ _SHORTEST = 0.25
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeriodicDrive:
-    """Which runs are made.
+    """Which runs are made."""
 
-    Parameters
-    ----------
-    frequencies
-        In Hz, one per run, shape (runs,); rounded so that whole cycles fill whole samples. Zero is a
-        constant drive, whose windows last half a second.
-    drives
-        Open inputs over time.
-    parameters
-        Parameters of the loop by full name, numbers or shape (runs,).
-    cycles
-        Cycles in a window; by default as many as make a quarter of a second, and at least one.
-    """
-
+    # frequencies: in Hz, one per run, shape (runs,); rounded so that whole cycles fill whole samples. Zero is
+    # a constant drive, whose windows last half a second.
     frequencies: Array
-    drives: Drives
+    drives: Drives  # open inputs over time
+    # parameters: parameters of the loop by full name, numbers or shape (runs,)
     parameters: Mapping[str, Array | float] = field(default_factory=dict)
+    # cycles: cycles in a window; by default as many as make a quarter of a second, and at least one
     cycles: int | None = None
 
     def windows(self, sample_time: float) -> tuple[Indices, Indices, Array]:
@@ -84,27 +75,13 @@ class PeriodicDrive:
 
 @dataclass(frozen=True, eq=False)
 class PeriodicRun:
-    """The last two windows of a run.
+    """The last two windows of a run."""
 
-    Parameters
-    ----------
-    frequency
-        Of the drive in Hz.
-    cycles
-        In both windows together.
-    time
-        In s, shape (n,).
-    signals
-        By full name, shape (n,).
-    verdict
-        What the run turned out to be.
-    """
-
-    frequency: float
-    cycles: int
-    time: Array
-    signals: Mapping[str, Array]
-    verdict: LoopVerdict
+    frequency: float  # of the drive in Hz
+    cycles: int  # in both windows together
+    time: Array  # in s, shape (n,)
+    signals: Mapping[str, Array]  # by full name, shape (n,)
+    verdict: LoopVerdict  # what the run turned out to be
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (n,)."""
@@ -275,8 +252,7 @@ class SineResponse:
     @property
     def decibel(self) -> Array:
         """Magnitude in dB."""
-        magnitude: Array = 20.0 * np.log10(np.abs(self.response))
-        return magnitude
+        return 20.0 * np.log10(np.abs(self.response))
 
     @property
     def phase_degrees(self) -> Array:
@@ -284,8 +260,7 @@ class SineResponse:
         phase = np.angle(self.response)
         good = np.isfinite(phase)
         phase[good] = np.unwrap(phase[good])
-        degrees: Array = np.degrees(phase)
-        return degrees
+        return np.degrees(phase)
 
     @property
     def saturated(self) -> Array:
@@ -325,21 +300,13 @@ class ZeroTorque:
 
 @dataclass(frozen=True, eq=False)
 class HeldTorque:
-    """How a loop holds torques.
+    """How a loop holds torques."""
 
-    Parameters
-    ----------
-    torque
-        In N·m, shape (n,).
-    rms_error
-        Root mean square of the torque error in N·m, shape (n,); not a number where a verdict does not hold.
-    verdicts
-        On each run.
-    """
-
-    torque: Array
+    torque: Array  # in N·m, shape (n,)
+    # rms_error: root mean square of the torque error in N·m, shape (n,); not a number where a verdict does
+    # not hold
     rms_error: Array
-    verdicts: tuple[LoopVerdict, ...]
+    verdicts: tuple[LoopVerdict, ...]  # on each run
 
 
 def tracking(loop: ClosedLoop, trace: Trace, *, settled: float = 0.0) -> Tracking:
@@ -483,14 +450,8 @@ def held_torque(
 ) -> HeldTorque:
     """Return how a loop holds torques: the error at rest, and whether it limit-cycles there.
 
-    Parameters
-    ----------
-    loop
-        Load fixed, or held by its inputs at zero.
-    torques
-        In N·m, shape (n,).
-    translate
-        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
+    ``loop``: load fixed, or held by its inputs at zero. ``translate``: for instance
+    :func:`~nlsdesign.export.natively`: then compiled code runs.
     """
     wanted = np.asarray(torques, dtype=float)
     check_torque(loop.plant, float(np.max(np.abs(wanted))))
@@ -606,33 +567,19 @@ class StepResponse:
     """Answer of the torque to a step of the desired torque.
 
     Where the loop does not come to rest the numbers are not numbers.
-
-    Parameters
-    ----------
-    begin, end
-        Desired torque before and after the step, in N·m.
-    time
-        Since the step in s, shape (n,).
-    torque
-        In N·m, shape (n,).
-    rise
-        From a tenth to nine tenths of the step, in s.
-    overshoot
-        Beyond the end, as a share of the step, 1.
-    settling
-        Time in s after which the torque stays within a twentieth of the step; not a number if it does not.
-    verdict
-        On the second half of the run.
     """
 
+    # begin, end: desired torque before and after the step, in N·m
     begin: float
     end: float
-    time: Array
-    torque: Array
-    rise: float
-    overshoot: float
+    time: Array  # since the step in s, shape (n,)
+    torque: Array  # in N·m, shape (n,)
+    rise: float  # from a tenth to nine tenths of the step, in s
+    overshoot: float  # beyond the end, as a share of the step, 1
+    # settling: time in s after which the torque stays within a twentieth of the step; not a number if it does
+    # not
     settling: float
-    verdict: LoopVerdict
+    verdict: LoopVerdict  # on the second half of the run
 
 
 def step_response(
@@ -675,13 +622,7 @@ def torque_resolution(loop: ClosedLoop, angles: Sequence[float] | Array) -> Arra
 
     The counts of all encoders between which the deflection is read add up; zero for readings without counts.
 
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    angles
-        Of the driven body with the load at zero, shape (n,), in rad.
+    ``angles``: of the driven body with the load at zero, shape (n,), in rad.
     """
     at = np.atleast_1d(np.asarray(angles, dtype=float))
-    result: Array = np.abs(tangent_stiffness(loop.plant, at)) * LoopJudge(loop).count
-    return result
+    return np.abs(tangent_stiffness(loop.plant, at)) * LoopJudge(loop).count

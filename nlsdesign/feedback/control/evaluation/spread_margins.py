@@ -30,30 +30,20 @@ _TRIED = 8
 
 @dataclass(frozen=True, eq=False)
 class SpreadMargins:
-    """Margins of a gain, and the gain that has enough of them.
+    """Margins of a gain, and the gain that has enough of them."""
 
-    Parameters
-    ----------
-    gain, value
-        Name of the parameter, and its value.
-    least
-        Gain margin in dB and phase margin in degrees of the declared machine, the worst angle.
-    spread
-        Those that 95 % of the drawn machines keep; of the declared one where nothing has a spread.
-    enough
-        Largest value below that has 6 dB and 30° in 95 % of the machines; the value itself where it has them,
-        not
-        a number where none was found.
-    kicked
-        Machines that hold four fifths of what the drive can after a kick; ``None`` where nothing has a
-        spread, or none was kicked.
-    """
-
+    # gain, value: name of the parameter, and its value
     gain: str
     value: float
+    # least: gain margin in dB and phase margin in degrees of the declared machine, the worst angle
     least: tuple[float, float]
+    # spread: those that 95 % of the drawn machines keep; of the declared one where nothing has a spread
     spread: tuple[float, float]
+    # enough: largest value below that has 6 dB and 30° in 95 % of the machines; the value itself where it has
+    # them, not a number where none was found
     enough: float
+    # kicked: machines that hold four fifths of what the drive can after a kick; None where nothing has a
+    # spread, or none was kicked
     kicked: LoopSpread | None
 
     @property

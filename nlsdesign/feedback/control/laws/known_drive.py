@@ -28,14 +28,9 @@ class KnownDrive:
     ω is the speed of the motor, φ the angle and T the torque of the series spring, r the turns of the spring
     per turn of the motor. All are expressions in the parameters of the plant, read off its equations, so a
     motor with its gear declared in it and one in a gear train are the same.
-
-    Parameters
-    ----------
-    plant
-        Continuous; its motor is driven by a current.
     """
 
-    plant: FlatModel
+    plant: FlatModel  # continuous; its motor is driven by a current
 
     def __post_init__(self) -> None:
         if self.plant.sample_time is not None:
@@ -224,18 +219,10 @@ _SMALL_TURN, _NOTHING = 0.1, 1e-6
 
 
 class TorqueLimit(NamedTuple):
-    """The largest torque of the series spring in both directions, and what limits it.
+    """The largest torque of the series spring in both directions, and what limits it."""
 
-    Parameters
-    ----------
-    torque
-        In N·m.
-    reason
-        In words.
-    """
-
-    torque: float
-    reason: str
+    torque: float  # in N·m
+    reason: str  # in words
 
 
 def torque_limit(plant: FlatModel) -> TorqueLimit:
@@ -289,10 +276,7 @@ def only_side(plant: FlatModel) -> float:
 
     A cable that pulls to one side gives no torque at rest at the other end of its travel.
 
-    Parameters
-    ----------
-    plant
-        Continuous, load fixed or prescribed; friction in its smooth form.
+    ``plant``: continuous, load fixed or prescribed; friction in its smooth form.
     """
     drive = KnownDrive(plant)
     spring = series_spring(plant)

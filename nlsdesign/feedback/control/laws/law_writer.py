@@ -16,6 +16,7 @@ import casadi as ca
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Origin, Table, Variable
+from ....model.flat import stated_equations
 from ....model.roles import motor_of, series_spring
 
 DESIRED = "desired"
@@ -24,22 +25,13 @@ DESIRED = "desired"
 
 @dataclass(frozen=True)
 class LoopNames:
-    """Names of the variables by which a torque loop is wired: those of the plant.
+    """Names of the variables by which a torque loop is wired: those of the plant."""
 
-    Parameters
-    ----------
-    angle, speed
-        Motion of the motor and its rate.
-    torque
-        Torque of the series spring.
-    current
-        Input of the motor.
-    """
-
+    # angle, speed: motion of the motor and its rate
     angle: str
     speed: str
-    torque: str
-    current: str
+    torque: str  # torque of the series spring
+    current: str  # input of the motor
 
     @property
     def desired(self) -> str:
@@ -73,12 +65,7 @@ GAIN = "controller"
 class LawWriter:
     """Collects what the parts of a controller declare, and writes it as one discrete flat model.
 
-    Parameters
-    ----------
-    sample_time
-        In s.
-    origin
-        The deck of the plant that the controller is for.
+    ``origin``: the deck of the plant that the controller is for.
     """
 
     def __init__(self, sample_time: float, origin: Origin | None = None) -> None:
@@ -164,12 +151,14 @@ class LawWriter:
             parameters=tuple(v for v, _ in self._parameters.values()),
             outputs=(output[0],),
             signals=tuple(v for v, _ in self._signals.values()),
-            equations=ca.Function(
-                "equations",
-                [ca.SX.sym("time"), x, u, p, ca.vertcat(*w) if w else ca.SX(0, 1)],
-                [ca.vertcat(*following), output[1], ca.vertcat(*signals), ca.SX(0, 1)],
-                ["time", "state", "input", "parameter", "table"],
-                ["derivative", "output", "signal", "residual"],
+            equations=stated_equations(
+                x,
+                u,
+                derivative=ca.vertcat(*following),
+                output=output[1],
+                parameter=p,
+                table=ca.vertcat(*w) if w else ca.SX(0, 1),
+                signal=ca.vertcat(*signals),
             ),
             sample_time=self.sample_time,
             origin=self.origin,
@@ -194,29 +183,15 @@ def limited(value: Expression, limit: Expression) -> Expression:
 
 
 class Integration(NamedTuple):
-    """One integrator of a controller at one sample.
+    """One integrator of a controller at one sample."""
 
-    Parameters
-    ----------
-    name
-        Own name of the loop that it belongs to, for settings: ``torque`` or ``velocity``.
-    value
-        What the integrator holds.
-    error
-        What it integrates, before its gain; its sign is that of the growth.
-    rate
-        Error times gain: growth per second.
-    beyond
-        By how much what it asks for exceeds each limit behind it; positive at the upper limit.
-    nearest
-        The excess over the nearest limit in the unit of the integrator, for back-calculation.
-    """
-
-    name: str
-    value: Expression
-    error: Expression
-    rate: Expression
+    name: str  # own name of the loop that it belongs to, for settings: torque or velocity
+    value: Expression  # what the integrator holds
+    error: Expression  # what it integrates, before its gain; its sign is that of the growth
+    rate: Expression  # error times gain: growth per second
+    # beyond: by how much what it asks for exceeds each limit behind it; positive at the upper limit
     beyond: tuple[Expression, ...]
+    # nearest: the excess over the nearest limit in the unit of the integrator, for back-calculation
     nearest: Expression
 
 

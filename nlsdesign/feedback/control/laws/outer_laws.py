@@ -20,25 +20,18 @@ from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
 from ....model.roles import series_spring
 from ....model.transform import named
-from ...analysis.rest import evaluate_rows, rest_states
+from ...analysis.rest import evaluate_at, rest_states
 from .known_drive import KnownDrive
 from .law_writer import GAIN, AntiWindup, ConditionalIntegration, Integration, LawWriter, limited
 
 
 class Heard(NamedTuple):
-    """What a controller is given at a sample.
+    """What a controller is given at a sample."""
 
-    Parameters
-    ----------
-    desired, torque
-        Torque that the spring should have, and the estimate of the one it has, in N·m.
-    angle
-        Measured angle of the motor in rad.
-    """
-
+    # desired, torque: torque that the spring should have, and the estimate of the one it has, in N·m
     desired: Expression
     torque: Expression
-    angle: Expression
+    angle: Expression  # measured angle of the motor in rad
 
 
 SLOW_PART = 3.125
@@ -46,41 +39,22 @@ SLOW_PART = 3.125
 
 
 class HeldBack(NamedTuple):
-    """By how much commands exceed their limits at a sample; zero within them.
+    """By how much commands exceed their limits at a sample; zero within them."""
 
-    Parameters
-    ----------
-    speed
-        Of the spring, in rad/s.
-    current
-        In A.
-    speed_per_current
-        Speed of the spring that makes one ampere, in rad/s/A; its sign says which way the current pushes.
-    """
-
-    speed: Expression
-    current: Expression
+    speed: Expression  # of the spring, in rad/s
+    current: Expression  # in A
+    # speed_per_current: speed of the spring that makes one ampere, in rad/s/A; its sign says which way the
+    # current pushes
     speed_per_current: Expression
 
 
 class SpeedCommand(NamedTuple):
-    """What an outer law asks for.
+    """What an outer law asks for."""
 
-    Parameters
-    ----------
-    speed
-        Of the spring, within its limits, in rad/s.
-    beyond
-        What the limits took away, in rad/s.
-    acceleration
-        Of the spring, as far as the law knows it beforehand, in rad/s².
-    finish
-        Takes what all limits held back and says what the states of the law are one sample later.
-    """
-
-    speed: Expression
-    beyond: Expression
-    acceleration: Expression
+    speed: Expression  # of the spring, within its limits, in rad/s
+    beyond: Expression  # what the limits took away, in rad/s
+    acceleration: Expression  # of the spring, as far as the law knows it beforehand, in rad/s²
+    # finish: takes what all limits held back and says what the states of the law are one sample later
     finish: Callable[[HeldBack], None]
 
 
@@ -370,11 +344,8 @@ class ScheduledTorque(TorqueLaw):
     def command(self, writer: LawWriter, drive: KnownDrive, heard: Heard) -> SpeedCommand:
         """Return v within its limits; see :class:`TorqueLaw`."""
         stiffness = self._stiffness(writer, drive, heard)
-        gain = (
-            2.0
-            * math.pi
-            * writer.setting("bandwidth", "Hz", "torque loop: bandwidth", self.closes_at(writer.sample_time))
-        )
+        closes_at = self.closes_at(writer.sample_time)
+        gain = 2.0 * math.pi * writer.setting("bandwidth", "Hz", "torque loop: bandwidth", closes_at)
         share = writer.setting(
             "feedforward", "1", "torque loop: share of the rate of the desired torque", self.feedforward
         )
@@ -469,9 +440,8 @@ def stiffness_table(drive: KnownDrive) -> Table:
 def _rest_torques(plant: FlatModel, torque: str, angles: Array) -> Array:
     """Return a torque at rest at many angles of the motor."""
     s = plant.symbols()
-    function = ca.Function("torque", [s.time, s.state, s.input, s.parameter], [named(plant, s)[torque]])
-    states = rest_states(plant, angles)
-    return evaluate_rows(function, states, plant.start(plant.inputs), plant.start(plant.parameters))[0][:, 0]
+    (torques,) = evaluate_at(plant, s, [named(plant, s)[torque]], rest_states(plant, angles))
+    return torques.ravel()
 
 
 def _secant(table: Table) -> float:

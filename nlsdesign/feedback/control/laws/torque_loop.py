@@ -170,13 +170,8 @@ def torque_controller(
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{reason}{supply}"
     model = writer.model("torque_controller", description, (output, motor.current))
-    return with_command_limits(_with_declared_angle(model, plant, names.angle), plant)
-
-
-def _with_declared_angle(controller: FlatModel, plant: FlatModel, angle: str) -> FlatModel:
-    """Return the controller with what the deck declares of the readings of its angle."""
-    inputs = [with_declared_reading(v, plant, angle) if v.name == angle else v for v in controller.inputs]
-    return replace(controller, inputs=tuple(inputs))
+    inputs = [with_declared_reading(v, plant, v.name) if v.name == names.angle else v for v in model.inputs]
+    return with_command_limits(replace(model, inputs=tuple(inputs)), plant)
 
 
 def _parts(

@@ -17,24 +17,12 @@ from .outer_laws import Heard, HeldBack, SpeedCommand, check_settings
 
 
 class MotorBalance(NamedTuple):
-    """What a disturbance observer compares at a sample.
+    """What a disturbance observer compares at a sample."""
 
-    Parameters
-    ----------
-    inertia
-        J in kg·m².
-    torque_per_current
-        k in N·m/A.
-    raw_speed
-        Difference of the measured angle over the last sample, in rad/s.
-    load
-        Torque that the motor is known to work against, in N·m: spring and friction.
-    """
-
-    inertia: Expression
-    torque_per_current: Expression
-    raw_speed: Expression
-    load: Expression
+    inertia: Expression  # J in kg·m²
+    torque_per_current: Expression  # k in N·m/A
+    raw_speed: Expression  # difference of the measured angle over the last sample, in rad/s
+    load: Expression  # torque that the motor is known to work against, in N·m: spring and friction
 
 
 @dataclass(frozen=True)
@@ -188,21 +176,11 @@ class FrictionCompensation:
 
 
 class MotorCurrent(NamedTuple):
-    """What the velocity loop asks for.
+    """What the velocity loop asks for."""
 
-    Parameters
-    ----------
-    current
-        Within its limits, in A.
-    held
-        What the limits held back, for the outer law.
-    speed
-        Filtered speed of the motor in rad/s.
-    """
-
-    current: Expression
-    held: HeldBack
-    speed: Expression
+    current: Expression  # within its limits, in A
+    held: HeldBack  # what the limits held back, for the outer law
+    speed: Expression  # filtered speed of the motor in rad/s
 
 
 @dataclass(frozen=True)

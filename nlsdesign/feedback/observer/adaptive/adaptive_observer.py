@@ -30,12 +30,12 @@ from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
 from ....foundation.quantity import typeset_unit
 from ....foundation.written_numbers import prefixed
-from ....model import FlatModel, Table, Variable
+from ....model import FlatModel, Variable
 from ....model.roles import measured_motion, spring_torque
 from ....simulation.prior import Prior, declared_prior
 from ..scheduling.angle_form import finished, minimal_form
-from ..scheduling.measured_angle import measured_angle, with_plausible_inputs
-from ..scheduling.scheduled import ESTIMATE, INNOVATION, MEMORY, check_sampling, whole_contour
+from ..scheduling.measured_angle import with_plausible_inputs
+from ..scheduling.scheduled import MEMORY, ObserverVariables, check_sampling, whole_contour
 from ..scheduling.step import CascadeGain, ObserverStep
 from ..scheduling.table import Compact, Draft, Grid
 from .adaptive_step import AdaptiveStep, adaptive_step, held_observer
@@ -77,21 +77,19 @@ def filter_model(filter_: FilterEquations, directions: UncertainDirections) -> F
     )
 
 
-class _Variables:
+class _Variables(ObserverVariables):
     """Groups of variables of one adaptive observer."""
 
     def __init__(self, filter_: FilterEquations, directions: UncertainDirections) -> None:
-        self.filter, self.directions = filter_, directions
-        self.plant, self.compact, self.trust = filter_.plant, filter_.compact, filter_.trust
+        super().__init__(filter_.step.nominal, filter_.compact)
+        self.directions, self.trust, self.units = directions, filter_.trust, filter_.units
         self.slow, self.angle, self.speed = filter_.slow, filter_.angle, filter_.speed
-        self.units, self.step = filter_.units, filter_.step
 
     def description(self) -> str:
         """Return one sentence."""
-        grid = self.compact.angles
         return (
             f"observer of {self.plant.estimate.name} that learns {self.slow} deviations from the deck, "
-            f"{self.trust}, table of {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad"
+            f"{self.trust}, {self.table_in_words()}"
         )
 
     def _slow_names(self) -> list[str]:
@@ -99,13 +97,7 @@ class _Variables:
 
     def states(self) -> tuple[Variable, ...]:
         """Return what is carried on from sample to sample."""
-        plant = self.plant
-        states = [
-            Variable(
-                f"{v.name}.{MEMORY}", v.unit, f"what the estimate of {v.name} carries on", nominal=float(size)
-            )
-            for v, size in zip(plant.states, plant.sizes, strict=True)
-        ]  # fmt: skip
+        plant, states = self.plant, self.memory()
         for d, name in enumerate(self._slow_names()):
             text = f"distance from the deck in standard deviations; one is {self.directions.in_words(d)}"
             states.append(Variable(f"{name}.{MEMORY}", "1", text))
@@ -136,34 +128,14 @@ class _Variables:
         first[self.speed] = (0.03 * sizes[self.speed]) ** 2
         return np.asarray(first, dtype=np.float64)
 
-    def inputs(self) -> tuple[Variable, ...]:
-        """Return the measured angle and the known inputs."""
-        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
-
     def outputs(self) -> tuple[Variable, ...]:
         """Return the estimate, its expected deviation, states, innovation and slow states."""
-        plant, v = self.plant, self.plant.estimate
-        size = float(np.max(np.abs(self.step.nominal.scales()["estimate"])))
-        outputs = [
-            Variable(v.name, v.unit, f"estimate of {v.name}", nominal=size),
-            Variable(f"{v.name}.{SPREAD}", v.unit, "standard deviation that the filter expects of it"),
-        ]
-        for s in plant.states:
-            name = f"{s.name}.{ESTIMATE}" if s.name == plant.angle else s.name
-            outputs.append(Variable(name, s.unit, f"estimate of {s.name}"))
-        angle = plant.states[self.angle]
-        outputs.append(
-            Variable(f"{angle.name}.{INNOVATION}", angle.unit, f"measured minus expected {angle.name}")
-        )
+        wanted, text = self.estimate(), "standard deviation that the filter expects of it"
+        outputs = [wanted, Variable(f"{wanted.name}.{SPREAD}", wanted.unit, text), *self.estimates()]
         for d, name in enumerate(self._slow_names()):
             text = f"distance from the deck in standard deviations; one is {self.directions.in_words(d)}"
             outputs.append(Variable(name, "1", text))
         return tuple(outputs)
-
-    def tables(self) -> tuple[Table, ...]:
-        """Return the table over the angle."""
-        table = self.compact.table(self.plant.angle)
-        return () if table is None else (table,)
 
 
 @dataclass(frozen=True, eq=False)

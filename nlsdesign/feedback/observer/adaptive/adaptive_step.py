@@ -27,6 +27,7 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Variable
+from ....model.flat import stated_equations
 from ..scheduling.angle_form import AngleForm, AngleScheduledPlant
 from ..scheduling.step import ObserverStep, held, linear
 from ..scheduling.table import Compact, Entry
@@ -46,17 +47,10 @@ class _Side(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class AdaptiveStep:
-    """One step as exact functions of the angle, nominal and with every direction one deviation up and down.
+    """One step as exact functions of the angle, nominal and with each direction a deviation up and down."""
 
-    Parameters
-    ----------
-    nominal
-        The step with the declared numbers; its gain is not used.
-    raised, lowered
-        The plant with each direction at +1 and −1, and its inertia over the declared one.
-    """
-
-    nominal: ObserverStep
+    nominal: ObserverStep  # the step with the declared numbers; its gain is not used
+    # raised, lowered: the plant with each direction at +1 and −1, and its inertia over the declared one
     raised: tuple[_Side, ...]
     lowered: tuple[_Side, ...]
 
@@ -204,17 +198,9 @@ SLOWEST, STEP = 0.4, 0.23
 
 @dataclass(frozen=True, eq=False)
 class HeldObserver:
-    """Inner states and torque estimate of an adaptive observer whose slow states are given courses of time.
+    """Inner states and torque estimate of an adaptive observer with given courses of its slow states."""
 
-    Parameters
-    ----------
-    model
-        Discrete; its first input is the angle, its only output the estimate.
-    step
-        Of the adaptive observer.
-    """
-
-    model: FlatModel
+    model: FlatModel  # discrete; its first input is the angle, its only output the estimate
     step: AdaptiveStep
 
     def start(self, angle: float) -> dict[str, float]:
@@ -249,14 +235,9 @@ def held_observer(step: AdaptiveStep, compact: Compact) -> HeldObserver:
     known = [*state, ca.SX(1)]
     following = [_sum(read("next", i, j) * x for j, x in enumerate(known)) for i in range(inner)]
     estimate = _sum(read("estimate", 0, j) * x for j, x in enumerate(known))
-    nothing = ca.SX(0, 1)
-    equations = ca.Function(
-        "held",
-        [
-            ca.SX.sym("time"), ca.vertcat(memory, before, count), ca.vertcat(angle, other), ca.SX(0, 1), w
-        ],
-        [ca.vertcat(*following, angle, count + 1), estimate, nothing, nothing],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    equations = stated_equations(
+        ca.vertcat(memory, before, count), ca.vertcat(angle, other),
+        derivative=ca.vertcat(*following, angle, count + 1), output=estimate, table=w,
     )  # fmt: skip
     names = [Variable(f"{v.name}.memory", v.unit, "inner state") for v in plant.states[:inner]]
     states = (*names, Variable("before", "rad", "last angle"), Variable("samples", "1", "since the start"))

@@ -49,54 +49,27 @@ ELSEWHERE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Terms of the balance at the declared numbers, and what is known of their factors.
+    """Terms of the balance at the declared numbers, and what is known of their factors."""
 
-    Parameters
-    ----------
-    inertia
-        That the torque of the spring accelerates, in kg·m².
-    drive, place
-        Torque per unit of the input that moves the body, and the place of that input.
-    viscous, dry
-        In N·m·s/rad and N·m.
-    width
-        Speed in rad/s beyond which the actuator surely moves.
-    torque
-        Amplitude of the duty in N·m.
-    terms
-        Which of :data:`TERMS` have a factor.
-    deviations
-        Of these factors, shape (terms,).
-    correlation
-        Of them, shape (terms, terms).
-    slopes
-        Expected change of the logarithm of the torque at rest and of that which relaxes, per unit of
-        ln(1 + c) of each factor, shape (2, terms).
-    unseen
-        Covariance of both that is left when all factors are known, shape (2, 2).
-    alone
-        Standard deviations of both before any motion, shape (2,).
-    missed
-        Torque of changes of the spring's form, which no factor describes, in N·m rms.
-    before
-        Torque that is not known before any motion, in N·m rms along the duty.
-    """
-
-    inertia: float
+    inertia: float  # that the torque of the spring accelerates, in kg·m²
+    # drive, place: torque per unit of the input that moves the body, and the place of that input
     drive: float
     place: int
+    # viscous, dry: in N·m·s/rad and N·m
     viscous: float
     dry: float
-    width: float
-    torque: float
-    terms: tuple[int, ...]
-    deviations: Array
-    correlation: Array
+    width: float  # speed in rad/s beyond which the actuator surely moves
+    torque: float  # amplitude of the duty in N·m
+    terms: tuple[int, ...]  # which of TERMS have a factor
+    deviations: Array  # of these factors, shape (terms,)
+    correlation: Array  # of them, shape (terms, terms)
+    # slopes: expected change of the logarithm of the torque at rest and of that which relaxes, per unit of
+    # ln(1 + c) of each factor, shape (2, terms)
     slopes: Array
-    unseen: Array
-    alone: Array
-    missed: float
-    before: float
+    unseen: Array  # covariance of both that is left when all factors are known, shape (2, 2)
+    alone: Array  # standard deviations of both before any motion, shape (2,)
+    missed: float  # torque of changes of the spring's form, which no factor describes, in N·m rms
+    before: float  # torque that is not known before any motion, in N·m rms along the duty
 
 
 def balance_of(form: AngleForm, prior: Prior, duty: Duty) -> Balance:

@@ -42,6 +42,7 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.symbolic import Expression
 from ....model import Table, Variable
+from ....model.flat import stated_equations
 from ..scheduling.scheduled import ObserverDesign
 from .balance import DRIVE, DRY, OFFSET, RELAXING, REST, VISCOUS, Balance
 from .filter_equations import pairs
@@ -142,12 +143,8 @@ class CorrectionEquations:
         estimate, deviation = self.corrected(signals, slow, packed, weight)
         states = [follow[0], *(ca.vertcat(*chain) for chain in after), slow, packed, others]
         outputs = [estimate, deviation, follow[1][1:], slow, weight, others[2]]
-        results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
-        return ca.Function(
-            "equations", [ca.SX.sym("time"), self.state, self.u, ca.SX(0, 1), self.w],
-            [*results, ca.SX(0, 1), ca.SX(0, 1)],
-            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-        )  # fmt: skip
+        carried, shown = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
+        return stated_equations(self.state, self.u, derivative=carried, output=shown, table=self.w)
 
     def learned(
         self, residual: Expression, terms: Expression, rest: Expression, moving: Expression

@@ -39,18 +39,11 @@ SHARE = 0.5
 
 @dataclass(frozen=True)
 class Duty:
-    """Sines of the torque, one after the other.
+    """Sines of the torque, one after the other."""
 
-    Parameters
-    ----------
-    torque
-        Amplitude in N·m; by default half of the torque at rest at the end of the cam's contour.
-    frequencies
-        In Hz.
-    """
-
+    # torque: amplitude in N·m; by default half of the torque at rest at the end of the cam's contour
     torque: float | None = None
-    frequencies: tuple[float, ...] = (2.0, 5.0)
+    frequencies: tuple[float, ...] = (2.0, 5.0)  # in Hz
 
     def __post_init__(self) -> None:
         if self.torque is not None and not self.torque > 0.0:
@@ -61,36 +54,17 @@ class Duty:
 
 @dataclass(frozen=True, eq=False)
 class OperatingPoints:
-    """States and inputs along a duty, in which inner states rest.
+    """States and inputs along a duty, in which inner states rest."""
 
-    Parameters
-    ----------
-    angles
-        Shape (n,), in rad.
-    states
-        In the order of the model, shape (n, states).
-    inputs
-        Shape (n, inputs).
-    carried
-        Inner states as the observer carries them after a jump from zero angle, shape (n, states).
-    pulsations
-        2π times the frequencies, in rad/s.
-    inertia
-        What the torque of the spring accelerates, in kg·m².
-    amplitude
-        Of the angle, in rad.
-    torque
-        Amplitude of the torque at rest.
-    """
-
-    angles: Array
-    states: Array
-    inputs: Array
+    angles: Array  # shape (n,), in rad
+    states: Array  # in the order of the model, shape (n, states)
+    inputs: Array  # shape (n, inputs)
+    # carried: inner states as the observer carries them after a jump from zero angle, shape (n, states)
     carried: Array
-    pulsations: tuple[float, ...]
-    inertia: float
-    amplitude: float
-    torque: float
+    pulsations: tuple[float, ...]  # 2π times the frequencies, in rad/s
+    inertia: float  # what the torque of the spring accelerates, in kg·m²
+    amplitude: float  # of the angle, in rad
+    torque: float  # amplitude of the torque at rest
 
 
 def operating_points(form: AngleForm, duty: Duty) -> OperatingPoints:
@@ -241,28 +215,18 @@ STEP = 0.5
 
 @dataclass(frozen=True, eq=False)
 class UncertainDirections:
-    """Directions in the space of uncertain numbers, each with unit variance.
+    """Directions in the space of uncertain numbers, each with unit variance."""
 
-    Parameters
-    ----------
-    names
-        Numbers that move, in the order of the rows.
-    slopes
-        Change of the logarithm of each number per unit of each direction, shape (numbers, directions).
-    effect
-        Root mean square torque that each direction moves per standard deviation, in the unit of the torque,
-        descending, shape (directions,).
-    torque_share
-        Part of that effect that is one on the estimated torque itself, not on the drive, shape (directions,).
-    left_out
-        Root mean square torque of all directions that were left out.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # numbers that move, in the order of the rows
+    # slopes: change of the logarithm of each number per unit of each direction, shape (numbers, directions)
     slopes: Array
+    # effect: root mean square torque that each direction moves per standard deviation, in the unit of the
+    # torque, descending, shape (directions,)
     effect: Array
+    # torque_share: part of that effect that is one on the estimated torque itself, not on the drive, shape
+    # (directions,)
     torque_share: Array
-    left_out: float
+    left_out: float  # root mean square torque of all directions that were left out
 
     def values(self, nominal: Mapping[str, float], at: Array) -> dict[str, float]:
         """Return the numbers at a point."""

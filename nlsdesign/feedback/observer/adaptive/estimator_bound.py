@@ -29,21 +29,11 @@ from ....simulation.prior import Prior
 
 @dataclass(frozen=True, eq=False)
 class EstimatorBound:
-    """Least standard deviation of an estimate along a run.
+    """Least standard deviation of an estimate along a run."""
 
-    Parameters
-    ----------
-    time
-        In s, shape (T,).
-    deviation
-        Of the estimate from all readings so far, shape (T,).
-    before
-        The same from the numbers of the deck alone, without any reading, shape (T,).
-    """
-
-    time: Array
-    deviation: Array
-    before: Array
+    time: Array  # in s, shape (T,)
+    deviation: Array  # of the estimate from all readings so far, shape (T,)
+    before: Array  # the same from the numbers of the deck alone, without any reading, shape (T,)
 
 
 @dataclass(frozen=True)
@@ -60,23 +50,8 @@ class SensedTorque:
 def estimator_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: SensedTorque) -> EstimatorBound:
     """Return the bound along the trajectory that known inputs cause from the start values of a model.
 
-    Parameters
-    ----------
-    model
-        Continuous, with the numbers of the trajectory.
-    prior
-        What is known of the numbers; those that the model does not have are left out.
-    inputs
-        Held over each sample, shape (inputs, T).
-    sensed
-        What is estimated from what.
-
-    Raises
-    ------
-    UnknownNameError
-        If the estimate or the measured state does not exist.
-    ConvergenceError
-        If the trajectory or its slopes do not stay finite.
+    ``model``: continuous, with the numbers of the trajectory. ``prior``: what is known of the numbers; those
+    that the model does not have are left out. ``inputs``: held over each sample, shape (inputs, T).
     """
     known = prior.only([name for name in prior.names if name in model.values])
     step, read = _variational(model, known, sensed)

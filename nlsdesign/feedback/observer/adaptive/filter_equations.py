@@ -32,6 +32,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from ....foundation.symbolic import Expression
+from ....model.flat import stated_equations
 from ..scheduling.measured_angle import at_rest
 from ..scheduling.step import speed_change
 from ..scheduling.table import Compact
@@ -50,39 +51,19 @@ _WIDE = 5.0
 
 @dataclass(frozen=True)
 class FilterNoise:
-    """What the filter does not know.
+    """What the filter does not know."""
 
-    Parameters
-    ----------
-    angle
-        Standard deviation of the measured angle in rad.
-    acceleration
-        Of what the equations miss, in rad/s².
-    estimate
-        Of the estimate beyond what its states explain, in its unit.
-    safe_inputs
-        Size of each limited input up to which the drive surely gives it.
-    """
-
-    angle: float
-    acceleration: float
-    estimate: float
-    safe_inputs: Mapping[str, float]
+    angle: float  # standard deviation of the measured angle in rad
+    acceleration: float  # of what the equations miss, in rad/s²
+    estimate: float  # of the estimate beyond what its states explain, in its unit
+    safe_inputs: Mapping[str, float]  # size of each limited input up to which the drive surely gives it
 
 
 class FilterEquations:
     """Writes the filter with the entries read from the table.
 
-    Parameters
-    ----------
-    step
-        One step and its slopes along the slow states.
-    compact
-        Its table.
-    trust
-        How far the equations are trusted.
-    noise
-        What the filter does not know.
+    ``step``: one step and its slopes along the slow states. ``trust``: how far the equations are trusted.
+    ``noise``: what the filter does not know.
     """
 
     def __init__(self, step: AdaptiveStep, compact: Compact, trust: Trust, noise: FilterNoise) -> None:
@@ -237,16 +218,9 @@ class FilterEquations:
         variance = ca.mtimes([slopes_of_estimate, posterior, slopes_of_estimate.T]) + self.noise.estimate**2
         shifted = state + self.matrix("shift", n, 1, slow_after)
         outputs = [estimate, ca.sqrt(variance), shifted, innovation, slow_after]
-        results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
-        return ca.Function(
-            "equations",
-            [
-                ca.SX.sym("time"), ca.vertcat(memory, slow, inflation, low_pass, packed),
-                ca.vertcat(angle, u), ca.SX(0, 1), self.w,
-            ],
-            [*results, ca.SX(0, 1), ca.SX(0, 1)],
-            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-        )  # fmt: skip
+        carried = ca.vertcat(memory, slow, inflation, low_pass, packed)
+        after, shown = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
+        return stated_equations(carried, ca.vertcat(angle, u), derivative=after, output=shown, table=self.w)
 
     def _gate(self, nis: Expression) -> Expression:
         """Return how much of a correction passes to the slow states, 0 to 1.

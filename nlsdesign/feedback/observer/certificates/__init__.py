@@ -4,7 +4,7 @@
 It never trusts the solver: what is written is checked in exact or interval arithmetic.
 """
 
-from .certificate import CERTIFICATE, Certificate, Proof, write_certificate
+from .certificate import CERTIFICATE, Certificate, write_certificate
 from .co_design import CertifiedGain
 from .continuous import certify_continuous
 from .contraction import Contraction, certify, declared_assumptions
@@ -19,7 +19,6 @@ __all__ = [
     "CertifiedGain",
     "CodeToCompare",
     "Contraction",
-    "Proof",
     "certified_design",
     "certify",
     "certify_continuous",

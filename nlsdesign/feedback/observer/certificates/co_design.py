@@ -14,7 +14,6 @@ from typing import NamedTuple, TypeVar
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ....foundation.arrays import Array
@@ -29,18 +28,10 @@ SOLVED = ("Solved", "AlmostSolved")
 
 @dataclass(frozen=True, eq=False)
 class Inequality:
-    """F₀ + Σ xᵢ Fᵢ ⪰ 0.
+    """F₀ + Σ xᵢ Fᵢ ⪰ 0."""
 
-    Parameters
-    ----------
-    constant
-        F₀, shape (n, n), symmetric.
-    factors
-        F, shape (unknowns, n, n), symmetric.
-    """
-
-    constant: Array
-    factors: Array
+    constant: Array  # F₀, shape (n, n), symmetric
+    factors: Array  # F, shape (unknowns, n, n), symmetric
 
 
 def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
@@ -48,7 +39,8 @@ def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
     rows, sides, cones = [], [], []
     for each in inequalities:
         n = len(each.constant)
-        row, column = _triangle(n)
+        # The upper triangle, column by column.
+        row, column = np.array([(i, j) for j in range(n) for i in range(j + 1)]).T
         weight = np.where(row == column, 1.0, math.sqrt(2.0))
         rows.append(-(each.factors[:, row, column] * weight).T)
         sides.append(each.constant[row, column] * weight)
@@ -63,12 +55,6 @@ def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
     solution = solver.solve()
     x = np.array(solution.x)
     return x if str(solution.status) in SOLVED and np.all(np.isfinite(x)) else None
-
-
-def _triangle(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return rows and columns of an upper triangle, column by column."""
-    pairs = np.array([(i, j) for j in range(n) for i in range(j + 1)])
-    return pairs[:, 0], pairs[:, 1]
 
 
 Sought = TypeVar("Sought")
@@ -118,27 +104,13 @@ def least_disturbed(p: Array, y: Array, inequalities: Sequence[Inequality]) -> G
 
 @dataclass(frozen=True, eq=False)
 class GainProblem:
-    """Corners of one sample before the correction, in scaled states, and what is asked of the gain.
+    """Corners of one sample before the correction, in scaled states, and what is asked of the gain."""
 
-    Parameters
-    ----------
-    corners
-        F(q)·Φ, shape (corners, n, n).
-    output_matrix
-        C, shape (r, n).
-    sample_time
-        T in s.
-    moving
-        Places of angle and speed.
-    condition
-        Largest condition of P.
-    """
-
-    corners: Array
-    output_matrix: Array
-    sample_time: float
-    moving: tuple[int, int]
-    condition: float
+    corners: Array  # F(q)·Φ, shape (corners, n, n)
+    output_matrix: Array  # C, shape (r, n)
+    sample_time: float  # T in s
+    moving: tuple[int, int]  # places of angle and speed
+    condition: float  # largest condition of P
 
     @property
     def structures(self) -> tuple[tuple[int, ...], ...]:
@@ -312,7 +284,8 @@ class CertifiedGain:
         """
         problem = gain_problem(plant, sample_time, angles, condition=self.condition)
         gain = np.array(scaling(plant))[:, None] * self._fast_enough(problem).gain
-        return ConstantGain(tuple(tuple(_rounded(v) for v in row) for row in gain))
+        # To seven digits: what is written is what is proved.
+        return ConstantGain(tuple(tuple(float(f"{v:.7g}") for v in row) for row in gain))
 
     def _fast_enough(self, problem: GainProblem) -> GainAndLyapunov:
         wanted = 2.0 * math.pi * self.bandwidth
@@ -396,8 +369,3 @@ def _hull(matrices: Array) -> Array:
     share = (flat - centre) @ used.T
     ends = corners(list(share.min(axis=0)), list(share.max(axis=0)))
     return np.array([centre + np.array(end) @ used for end in ends]).reshape(-1, n, n)
-
-
-def _rounded(value: float) -> float:
-    """Return a number to seven digits: what is written is what is proved."""
-    return float(f"{value:.7g}")

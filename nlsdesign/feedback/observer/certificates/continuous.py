@@ -41,33 +41,17 @@ BANDWIDTH = 20.0
 
 @dataclass(frozen=True, eq=False)
 class ContinuousContraction:
-    """The error of an observer in continuous time decays, with one gain for every angle.
-
-    Parameters
-    ----------
-    states
-        Which states the observer carries.
-    gain
-        L, one row per state, one number per measured output.
-    system
-        All matrices A.
-    lyapunov
-        P in scaled states, shape (n, n).
-    decay
-        In 1/s: √(eᵀPe) falls at least with e^(−decay·t).
-    condition
-        Bound on the condition of P.
-    """
+    """The error of an observer in continuous time decays, with one gain for every angle."""
 
     form: ClassVar[str] = f"{FORMAT}, continuous time"
     sampled: ClassVar[bool] = False
 
-    states: Minimal | PaperForm
-    gain: tuple[tuple[float, ...], ...]
-    system: ErrorSystem
-    lyapunov: Array
-    decay: float
-    condition: float
+    states: Minimal | PaperForm  # which states the observer carries
+    gain: tuple[tuple[float, ...], ...]  # L, one row per state, one number per measured output
+    system: ErrorSystem  # all matrices A
+    lyapunov: Array  # P in scaled states, shape (n, n)
+    decay: float  # in 1/s: √(eᵀPe) falls at least with e^(−decay·t)
+    condition: float  # bound on the condition of P
 
     @property
     def statement(self) -> tuple[str, ...]:

@@ -34,29 +34,15 @@ REFINEMENTS, TOLERANCE = 24, 2e-3
 
 @dataclass(frozen=True, eq=False)
 class ErrorSystem:
-    """All matrices A of ė = (A − L·C)·e, entry by entry.
+    """All matrices A of ė = (A − L·C)·e, entry by entry."""
 
-    Parameters
-    ----------
-    states
-        Names, in the order of the observer.
-    sizes
-        Typical sizes of the states, shape (n,); V = eᵀPe is written in states over these.
-    moving
-        Places of angle and speed.
-    seen
-        Places of the measured states.
-    angles
-        Range of the angle in rad.
-    lower, upper
-        Bounds of each entry of A, shape (n, n).
-    """
-
-    states: tuple[str, ...]
+    states: tuple[str, ...]  # names, in the order of the observer
+    # sizes: typical sizes of the states, shape (n,); V = eᵀPe is written in states over these
     sizes: tuple[float, ...]
-    moving: tuple[int, int]
-    seen: tuple[int, ...]
-    angles: tuple[float, float]
+    moving: tuple[int, int]  # places of angle and speed
+    seen: tuple[int, ...]  # places of the measured states
+    angles: tuple[float, float]  # range of the angle in rad
+    # lower, upper: bounds of each entry of A, shape (n, n)
     lower: tuple[tuple[float, ...], ...]
     upper: tuple[tuple[float, ...], ...]
 
@@ -122,7 +108,8 @@ def error_system(
         return bounds.outputs[0].lower, bounds.outputs[0].upper, np.zeros(len(cells[0]), dtype=bool)
 
     low, high = (v.reshape(n, n) for v in hull(by_angle, np.linspace(*angles, CELLS + 1)))
-    (low[fast, fast],), (high[fast, fast],) = hull(by_speed, _speeds())
+    speeds = np.concatenate([[0.0], np.geomspace(1e-6, SPEED_LIMIT, 2000)])
+    (low[fast, fast],), (high[fast, fast],) = hull(by_speed, np.concatenate([-speeds[:0:-1], speeds]))
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
         i, j = np.argwhere(~np.isfinite(low + high))[0]
         raise ConvergenceError(
@@ -136,11 +123,6 @@ def error_system(
         angles=(float(angles[0]), float(angles[1])),
         lower=tuple(map(tuple, low.tolist())), upper=tuple(map(tuple, high.tolist())),
     )  # fmt: skip
-
-
-def _speeds() -> Array:
-    edges = np.concatenate([[0.0], np.geomspace(1e-6, SPEED_LIMIT, 2000)])
-    return np.concatenate([-edges[:0:-1], edges])
 
 
 def _slopes(

@@ -80,24 +80,12 @@ NARROWINGS = 5
 
 @dataclass(frozen=True)
 class HeldEstimateBound:
-    """Largest distance of an adaptive observer's estimate from the deck's torque, in N·m.
+    """Largest distance of an adaptive observer's estimate from the deck's torque, in N·m."""
 
-    Parameters
-    ----------
-    learned
-        What the slow states can do to the estimate.
-    cascade
-        Bound of the same observer with all slow states at zero.
-    limit
-        Of the slow states, in deviations.
-    boxes
-        Range in which each inner state of the observer stays, by name.
-    """
-
-    learned: float
-    cascade: float
-    limit: float
-    boxes: Mapping[str, tuple[float, float]]
+    learned: float  # what the slow states can do to the estimate
+    cascade: float  # bound of the same observer with all slow states at zero
+    limit: float  # of the slow states, in deviations
+    boxes: Mapping[str, tuple[float, float]]  # range in which each inner state of the observer stays, by name
 
     @property
     def total(self) -> float:
@@ -182,8 +170,7 @@ class _Table:
         place = self.compact.places[key]
         if place.column is None:
             return np.full(len(self.compact.angles), place.factor)
-        column: Array = place.factor * self.compact.values[:, place.column]
-        return column
+        return place.factor * self.compact.values[:, place.column]
 
     def deck_box(self, k: int) -> Array:
         """Return the range of an inner state with all slow states at zero, shape (2,)."""
@@ -290,25 +277,13 @@ def held_assumptions(model: FlatModel, design: AdaptiveDesign) -> Assumptions:
 
 @dataclass(frozen=True, eq=False)
 class HeldEstimate:
-    """The estimate of an adaptive observer stays near the torque of its deck.
-
-    Parameters
-    ----------
-    sample_time
-        In s.
-    settings
-        Numbers of the settings of trust by name.
-    assumptions
-        Of the bound.
-    bound
-        The bound.
-    """
+    """The estimate of an adaptive observer stays near the torque of its deck."""
 
     form: ClassVar[str] = f"{FORMAT}, held estimate"
     sampled: ClassVar[bool] = True
 
-    sample_time: float
-    settings: Mapping[str, float]
+    sample_time: float  # in s
+    settings: Mapping[str, float]  # numbers of the settings of trust by name
     assumptions: Assumptions
     bound: HeldEstimateBound
 

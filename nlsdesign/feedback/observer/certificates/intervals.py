@@ -30,37 +30,25 @@ ELEMENTARY = 4
 
 @dataclass(frozen=True, eq=False)
 class Range:
-    """Lower and upper bounds of many numbers.
+    """Lower and upper bounds of many numbers."""
 
-    Parameters
-    ----------
-    lower, upper
-        Arrays of one shape.
-    """
-
+    # lower, upper: arrays of one shape
     lower: Array
     upper: Array
 
     @property
     def magnitude(self) -> Array:
         """Largest absolute value in each."""
-        size: Array = np.maximum(np.abs(self.lower), np.abs(self.upper))
-        return size
+        return np.maximum(np.abs(self.lower), np.abs(self.upper))
 
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Ranges of the outputs of a function over many boxes.
+    """Ranges of the outputs of a function over many boxes."""
 
-    Parameters
-    ----------
-    outputs
-        One per output of the function, arrays of shape (boxes, elements).
-    undecided
-        Boxes that reach over the edge of a piece of a table, shape (boxes,): their ranges are valid but wide.
-    """
-
-    outputs: tuple[Range, ...]
+    outputs: tuple[Range, ...]  # one per output of the function, arrays of shape (boxes, elements)
+    # undecided: boxes that reach over the edge of a piece of a table, shape (boxes,): their ranges are valid
+    # but wide
     undecided: Mask
 
 
@@ -152,10 +140,6 @@ def _add(a: Bounds, b: Bounds) -> Bounds:
     return np.where(low_error == 0.0, low, wide[0]), np.where(high_error == 0.0, high, wide[1])
 
 
-def _subtract(a: Bounds, b: Bounds) -> Bounds:
-    return _add(a, _negate(b))
-
-
 def _negate(a: Bounds) -> Bounds:
     return -a[1], -a[0]
 
@@ -242,14 +226,6 @@ def _truth(never: Mask, always: Mask) -> Bounds:
     return np.where(always, 1.0, 0.0), np.where(never, 0.0, 1.0)
 
 
-def _less(a: Bounds, b: Bounds) -> Bounds:
-    return _truth(a[0] >= b[1], a[1] < b[0])
-
-
-def _less_or_equal(a: Bounds, b: Bounds) -> Bounds:
-    return _truth(a[0] > b[1], a[1] <= b[0])
-
-
 def _equal(a: Bounds, b: Bounds) -> Bounds:
     apart = (a[0] > b[1]) | (a[1] < b[0])
     return _truth(apart, (a[0] == a[1]) & (b[0] == b[1]) & (a[0] == b[0]))
@@ -257,10 +233,6 @@ def _equal(a: Bounds, b: Bounds) -> Bounds:
 
 def _not(a: Bounds) -> Bounds:
     return _truth((a[0] > 0.0) | (a[1] < 0.0), (a[0] == 0.0) & (a[1] == 0.0))
-
-
-def _unequal(a: Bounds, b: Bounds) -> Bounds:
-    return _not(_equal(a, b))
 
 
 def _and(a: Bounds, b: Bounds) -> Bounds:
@@ -295,19 +267,18 @@ def _whole_power(a: Bounds, n: int) -> Bounds:
     return multiply(half, a) if n % 2 else half
 
 
-def _same(a: Bounds) -> Bounds:
-    return a
-
-
 _OPERATIONS: dict[int, Callable[..., Bounds]] = {
-    ca.OP_ASSIGN: _same, ca.OP_ADD: _add, ca.OP_SUB: _subtract, ca.OP_MUL: multiply, ca.OP_DIV: _divide,
+    ca.OP_ASSIGN: lambda a: a,
+    ca.OP_ADD: _add, ca.OP_SUB: lambda a, b: _add(a, _negate(b)), ca.OP_MUL: multiply, ca.OP_DIV: _divide,
     ca.OP_NEG: _negate, ca.OP_SQ: _square, ca.OP_INV: _inverse, ca.OP_SQRT: _root, ca.OP_FABS: _magnitude,
     ca.OP_TWICE: lambda a: (2.0 * a[0], 2.0 * a[1]),
     ca.OP_FMIN: _and, ca.OP_FMAX: _or, ca.OP_AND: _and, ca.OP_OR: _or, ca.OP_NOT: _not,
     ca.OP_FLOOR: lambda a: (np.floor(a[0]), np.floor(a[1])),
     ca.OP_CEIL: lambda a: (np.ceil(a[0]), np.ceil(a[1])),
     ca.OP_SIGN: lambda a: (np.sign(a[0]), np.sign(a[1])),
-    ca.OP_EQ: _equal, ca.OP_NE: _unequal, ca.OP_LT: _less, ca.OP_LE: _less_or_equal,
+    ca.OP_EQ: _equal, ca.OP_NE: lambda a, b: _not(_equal(a, b)),
+    ca.OP_LT: lambda a, b: _truth(a[0] >= b[1], a[1] < b[0]),
+    ca.OP_LE: lambda a, b: _truth(a[0] > b[1], a[1] <= b[0]),
     ca.OP_IF_ELSE_ZERO: _where, ca.OP_POW: _power, ca.OP_CONSTPOW: _power,
     ca.OP_EXP: _rising(np.exp), ca.OP_EXPM1: _rising(np.expm1), ca.OP_LOG: _rising(np.log),
     ca.OP_LOG1P: _rising(np.log1p), ca.OP_TANH: _rising(np.tanh), ca.OP_SINH: _rising(np.sinh),

@@ -41,31 +41,20 @@ class EntryReading(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ErrorPolytope:
-    """All matrices that a sample can apply to the error.
+    """All matrices that a sample can apply to the error."""
 
-    Parameters
-    ----------
-    states, sizes, moving, seen
-        As of an :class:`~nlsdesign.feedback.observer.certificates.error_system.ErrorSystem`.
-    sample_time
-        T in s.
-    columns
-        Least and greatest value of each column of the table, shape (columns, 2).
-    transition, correction
-        Φ (n, n) and M (n, r) as they are read.
-    friction
-        Least and greatest slope of the braked speed; (1, 1) without dry friction.
-    """
-
+    # states, sizes, moving, seen: as of an ErrorSystem
     states: tuple[str, ...]
     sizes: tuple[float, ...]
     moving: tuple[int, int]
     seen: tuple[int, ...]
-    sample_time: float
+    sample_time: float  # T in s
+    # columns: least and greatest value of each column of the table, shape (columns, 2)
     columns: tuple[tuple[float, float], ...]
+    # transition, correction: Φ (n, n) and M (n, r) as they are read
     transition: tuple[tuple[EntryReading, ...], ...]
     correction: tuple[tuple[EntryReading, ...], ...]
-    friction: tuple[float, float]
+    friction: tuple[float, float]  # least and greatest slope of the braked speed; (1, 1) without dry friction
 
     def exact_corners(self) -> Iterator[Matrix]:
         """Yield every corner of (I − MC)·F(q)·Φ in scaled states, in fractions."""
@@ -196,20 +185,18 @@ def _mean_exponential(x: Array) -> Array:
     """Return φ(x) = ∫₀¹ e^(sx) ds, which rises; to 1e-10."""
     near = np.abs(x) < 1e-3
     away = np.where(near, 1.0, x)
-    value: Array = np.where(near, 1.0 + x / 2.0 + x**2 / 6.0 + x**3 / 24.0, np.expm1(away) / away)
-    return value
+    return np.where(near, 1.0 + x / 2.0 + x**2 / 6.0 + x**3 / 24.0, np.expm1(away) / away)
 
 
 def _bent_exponential(x: Array) -> Array:
     """Return φ′(x) = ∫₀¹ s·e^(sx) ds, which rises; to 1e-10."""
     near = np.abs(x) < 1e-2
     away = np.where(near, 1.0, x)
-    value: Array = np.where(
+    return np.where(
         near,
         0.5 + x / 3.0 + x**2 / 8.0 + x**3 / 30.0 + x**4 / 144.0,
         (away * np.exp(away) - np.expm1(away)) / away**2,
     )
-    return value
 
 
 def _rounded(value: float, way: np.ufunc) -> float:

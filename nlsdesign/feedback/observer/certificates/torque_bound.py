@@ -31,35 +31,19 @@ NARROWEST = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class SpringView:
-    """ż = a·(r(θ) − z) for each inner state, and the torque τ(θ, z), with their slopes, all symbolic.
+    """ż = a·(r(θ) − z) for each inner state, and the torque τ(θ, z), with their slopes, all symbolic."""
 
-    Parameters
-    ----------
-    inner
-        Names of the inner states z.
-    uncertain
-        Names of the parameters with a range.
-    nominal, spread
-        Their values and half ranges, shape (parameters,).
-    rest
-        ``casadi.Function`` (θ, z, p) -> (r, ∂r/∂θ, a).
-    torque
-        ``casadi.Function`` (θ, z, p) -> (τ, ∂τ/∂θ, ∂τ/∂z).
-    rest_by_parameter, torque_by_parameter
-        ``casadi.Function`` (θ, z, p) -> (∂r/∂p,) and (∂τ/∂p,).
-    affine
-        Whether the torque is affine in z.
-    """
-
-    inner: tuple[str, ...]
-    uncertain: tuple[str, ...]
+    inner: tuple[str, ...]  # names of the inner states z
+    uncertain: tuple[str, ...]  # names of the parameters with a range
+    # nominal, spread: their values and half ranges, shape (parameters,)
     nominal: Array
     spread: Array
-    rest: ca.Function
-    torque: ca.Function
+    rest: ca.Function  # casadi.Function (θ, z, p) -> (r, ∂r/∂θ, a)
+    torque: ca.Function  # casadi.Function (θ, z, p) -> (τ, ∂τ/∂θ, ∂τ/∂z)
+    # rest_by_parameter, torque_by_parameter: casadi.Function (θ, z, p) -> (∂r/∂p,) and (∂τ/∂p,)
     rest_by_parameter: ca.Function
     torque_by_parameter: ca.Function
-    affine: bool
+    affine: bool  # whether the torque is affine in z
 
     def ranges(
         self, function: ca.Function, cells: Bounds, z: Array | None = None, *, whole: bool = False
@@ -238,29 +222,14 @@ class Assumptions:
 
 @dataclass(frozen=True)
 class TorqueErrorBound:
-    """Bounds on the torque error in N·m, by cause; they add up.
+    """Bounds on the torque error in N·m, by cause; they add up."""
 
-    Parameters
-    ----------
-    encoder
-        Of the measured angle.
-    motion
-        Of what the angle does between two samples.
-    parameters
-        Of parameters anywhere in their ranges.
-    table
-        Of interpolation, shared columns and linearisation.
-    rounding
-        Of the numbers of the controller.
-    start
-        By inner state: torque per unit of a wrong start, and 1/s with which that is forgotten.
-    """
-
-    encoder: float
-    motion: float
-    parameters: float
-    table: float
-    rounding: float
+    encoder: float  # of the measured angle
+    motion: float  # of what the angle does between two samples
+    parameters: float  # of parameters anywhere in their ranges
+    table: float  # of interpolation, shared columns and linearisation
+    rounding: float  # of the numbers of the controller
+    # start: by inner state: torque per unit of a wrong start, and 1/s with which that is forgotten
     start: Mapping[str, tuple[float, float]]
 
     @property
@@ -358,19 +327,14 @@ class _Bounding:
         box: Array = np.clip(np.stack([rest.lower - slow, rest.upper + slow], axis=2), *self.box)
         return box
 
-    def _rest_deviation(self, cells: Bounds) -> Array:
-        """Return how far parameters move the rest value, shape (cells, inner)."""
-        slopes = self.view.ranges(self.view.rest_by_parameter, cells, whole=True)[0].magnitude
-        by = slopes.reshape(len(cells[0]), len(self.view.uncertain), len(self.inner))
-        moved: Array = np.einsum("cpi,p->ci", by, self.view.spread)
-        return moved
-
     def bound(self) -> TorqueErrorBound:
         """Return the bound; see :func:`torque_bound`."""
         view, assumed, cells = self.view, self.assumed, self.cells
         z = self._carried(self.rest_of_all)
         table, roundoff = self._step_errors(z)
-        shift, lead = _angle_rounding(self.design, assumed.real), self.lead
+        grid, lead = self.design.compact.angles, self.lead
+        # Rounding moves a look-up as an error of the angle would.
+        shift = 4.0 * ROUNDING[assumed.real] * float(grid[-1] - grid[0] + np.max(np.abs(grid)))
         causes = {
             "encoder": lead * assumed.angle_error,
             "motion": lead * assumed.speed * self.design.step.sample_time / 2.0,
@@ -419,7 +383,11 @@ class _Bounding:
         jump = slower * (np.max(z[:, :, 1], axis=0) - np.min(z[:, :, 0], axis=0))
         # ∫|e^(−at) − e^(−a*t)| dt = |1/a − 1/a*|, times the largest rate of the rest value.
         creep = self.lead * self.assumed.speed / nominal * np.max(np.abs(1.0 - 1.0 / ends), axis=0)
-        error: Array = np.max(self._rest_deviation(self.cells), axis=0) + np.minimum(jump, creep)
+        # How far parameters move the rest value, shape (cells, inner).
+        slopes = self.view.ranges(self.view.rest_by_parameter, self.cells, whole=True)[0].magnitude
+        by = slopes.reshape(len(self.cells[0]), len(self.view.uncertain), len(self.inner))
+        moved: Array = np.einsum("cpi,p->ci", by, self.view.spread)
+        error: Array = np.max(moved, axis=0) + np.minimum(jump, creep)
         return error
 
     def _step_errors(self, z: Array) -> tuple[Array, Array]:
@@ -437,21 +405,18 @@ class _Bounding:
             weights = {f"next[{i}][{n}]": -math.expm1(-x) - end, f"prior[{i}][0]": end}
             off = abs(math.exp(-x) - kept[k]) * float(np.max(np.abs(z[:, k])))
             for key, weight in weights.items():
-                off += self._reading_error(key, weight, k)
+                # The largest distance of what is read from weight × rest value, by cells.
+                middle = (self.cells[0] + self.cells[1]) / 2.0
+                half = (self.cells[1] - self.cells[0]) / 2.0
+                value, slope = _read(self.design, key, middle)
+                at = _distance(value, weight, self.rest_in_middle[0], k)
+                steep = _distance(slope, weight, self.rest[1], k)
+                off += float(np.max(at + steep * half))
             size = max(float(np.max(np.abs(z[:, k]))), float(np.max(rest.magnitude[:, k])))
             table.append(off / (1.0 - kept[k]))
             unit = OPERATIONS * ROUNDING[self.assumed.real]
             rounding.append(unit * size / (1.0 - kept[k]))
         return np.array(table), np.array(rounding)
-
-    def _reading_error(self, key: str, weight: float, k: int) -> float:
-        """Return the largest distance of what is read from weight × rest value, by cells."""
-        middle = (self.cells[0] + self.cells[1]) / 2.0
-        half = (self.cells[1] - self.cells[0]) / 2.0
-        value, slope = _read(self.design, key, middle)
-        at = _distance(value, weight, self.rest_in_middle[0], k)
-        steep = _distance(slope, weight, self.rest[1], k)
-        return float(np.max(at + steep * half))
 
     # --- torque -----------------------------------------------------------------------------------------
 
@@ -485,8 +450,7 @@ def _affine(read: list[Array], box: Array) -> Bounds:
 
 def _apart(a: Bounds, b: Bounds) -> Array:
     """Return the largest distance of two numbers in their ranges."""
-    apart: Array = np.maximum(a[1] - b[0], b[1] - a[0])
-    return apart
+    return np.maximum(a[1] - b[0], b[1] - a[0])
 
 
 def _distance(value: Array, weight: float, of: Range, k: int) -> Array:
@@ -561,9 +525,3 @@ def _terms(design: ObserverDesign, inner: tuple[str, ...], z: Array, size: float
     terms = [float(np.max(np.abs(_read(design, key, design.compact.angles)[0]))) for key in keys]
     added = float(np.dot(terms, np.max(np.abs(z), axis=(0, 2)))) if keys else 0.0
     return size + 2.0 * added
-
-
-def _angle_rounding(design: ObserverDesign, real: str) -> float:
-    """Return the angle in rad by which rounding moves a look-up."""
-    grid = design.compact.angles
-    return 4.0 * ROUNDING[real] * float(grid[-1] - grid[0] + np.max(np.abs(grid)))

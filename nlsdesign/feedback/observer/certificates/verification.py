@@ -42,15 +42,9 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """What a re-check of a certificate found.
+    """What a re-check of a certificate found."""
 
-    Parameters
-    ----------
-    checks
-        In the order in which they were made.
-    """
-
-    checks: tuple[Check, ...]
+    checks: tuple[Check, ...]  # in the order in which they were made
 
     @property
     def holds(self) -> bool:

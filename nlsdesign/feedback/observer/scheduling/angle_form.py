@@ -26,7 +26,7 @@ from ....foundation.errors import ArrangementError, ValueRangeError, unknown_nam
 from ....model import FlatModel, Variable
 from ....model.paper_form import GEOMETRIC, PaperFormNames, paper_form
 from ....model.transform import with_outputs, without_idle_states
-from ...analysis.rest import RestSolver, evaluate_rows, rate_state, rest_states, typical_sizes
+from ...analysis.rest import RestSolver, evaluate_at, evaluate_rows, rate_state, rest_states, typical_sizes
 
 
 class Coefficients(NamedTuple):
@@ -47,55 +47,27 @@ class Coefficients(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AngleScheduledPlant:
-    """The plant in the form ẋ = A(θ)x + g(θ) + b(θ)·δ̇ + E·d(u) + friction(ω).
+    """The plant in the form ẋ = A(θ)x + g(θ) + b(θ)·δ̇ + E·d(u) + friction(ω)."""
 
-    Parameters
-    ----------
-    name
-        Name of the model.
-    states
-        All states: the inner ones, then angle and speed.
-    angle, speed
-        Names of the state that is measured and scheduled over, and of its rate.
-    estimate
-        What is wanted.
-    inputs
-        Known inputs u.
-    measured
-        States that are measured besides the angle, because they follow from it: the published extension.
-        Their rate δ̇ is then an input too.
-    at
-        Takes angles of shape (N,) and returns the coefficients there.
-    rest
-        Takes angles of shape (N,) and returns the states at rest, shape (N, n).
-    driven
-        ``casadi.Function`` u -> d, what the inputs add to the rates.
-    rows
-        States into whose rates d goes; they make E.
-    friction
-        ``casadi.Function`` ω -> ω̇, what the speed adds to its own rate beyond its linear part, or ``None``.
-    sizes
-        Typical sizes of the states as the observer carries them, shape (n,).
-    rate_bandwidth
-        Cut-off frequency of the filter on δ̇ in Hz.
-    affine_error
-        Deviation of the estimate from its tangent in the inner states, share of its largest value.
-    """
-
-    name: str
-    states: tuple[Variable, ...]
+    name: str  # name of the model
+    states: tuple[Variable, ...]  # all states: the inner ones, then angle and speed
+    # angle, speed: names of the state that is measured and scheduled over, and of its rate
     angle: str
     speed: str
-    estimate: Variable
-    inputs: tuple[Variable, ...]
+    estimate: Variable  # what is wanted
+    inputs: tuple[Variable, ...]  # known inputs u
+    # measured: states that are measured besides the angle, because they follow from it: the published
+    # extension. Their rate δ̇ is then an input too.
     measured: tuple[str, ...]
-    at: Callable[[Array], Coefficients]
-    rest: Callable[[Array], Array]
-    driven: ca.Function
-    rows: tuple[int, ...]
+    at: Callable[[Array], Coefficients]  # takes angles of shape (N,) and returns the coefficients there
+    rest: Callable[[Array], Array]  # takes angles of shape (N,) and returns the states at rest, shape (N, n)
+    driven: ca.Function  # casadi.Function u -> d, what the inputs add to the rates
+    rows: tuple[int, ...]  # states into whose rates d goes; they make E
+    # friction: casadi.Function ω -> ω̇, what the speed adds to its own rate beyond its linear part, or None
     friction: ca.Function | None
-    sizes: Array
-    rate_bandwidth: float
+    sizes: Array  # typical sizes of the states as the observer carries them, shape (n,)
+    rate_bandwidth: float  # cut-off frequency of the filter on δ̇ in Hz
+    # affine_error: deviation of the estimate from its tangent in the inner states, share of its largest value
     affine_error: float
 
     @property
@@ -112,8 +84,7 @@ class AngleScheduledPlant:
     def output_matrix(self) -> Array:
         """C, shape (r, n): the angle first, then what else is measured."""
         places = [self.names.index(name) for name in (self.angle, *self.measured)]
-        matrix: Array = np.eye(len(self.states))[places]
-        return matrix
+        return np.eye(len(self.states))[places]
 
 
 ADDITIVE_LIMIT = 1e-6
@@ -124,39 +95,21 @@ FINE = 2.5e-4
 
 @dataclass(frozen=True)
 class ScheduledNames:
-    """Which variable of a model plays which role.
+    """Which variable of a model plays which role."""
 
-    Parameters
-    ----------
-    angle, speed
-        States.
-    speed_size
-        Typical speed in rad/s.
-    angles
-        Ascending, shape (n,): the range in which the form is wanted.
-    consistent
-        States that agree with a signal at rest, as for :func:`~nlsdesign.feedback.analysis.rest.rest_states`.
-    rate
-        Input that is the rate of a measured state, if there is one.
-    """
-
+    # angle, speed: states
     angle: str
     speed: str
-    speed_size: float
-    angles: Array
-    consistent: Mapping[str, str]
-    rate: str | None = None
+    speed_size: float  # typical speed in rad/s
+    angles: Array  # ascending, shape (n,): the range in which the form is wanted
+    consistent: Mapping[str, str]  # states that agree with a signal at rest, as for rest_states
+    rate: str | None = None  # input that is the rate of a measured state, if there is one
 
 
 class AngleForm:
     """Evaluates one model in the form above; states in the order of the observer: inner ones, angle, speed.
 
-    Parameters
-    ----------
-    model
-        Continuous; its first output is what is wanted.
-    layout
-        Which variable plays which role.
+    ``model``: continuous; its first output is what is wanted.
     """
 
     def __init__(self, model: FlatModel, layout: ScheduledNames) -> None:
@@ -200,8 +153,7 @@ class AngleForm:
 
     def rest(self, angles: Array) -> Array:
         """Return rest states in the order of the observer, shape (N, n)."""
-        ordered: Array = self.rest_in_model_order(angles)[:, self.order]
-        return ordered
+        return self.rest_in_model_order(angles)[:, self.order]
 
     def at(self, angles: Array) -> Coefficients:
         """Return the coefficients at many angles."""
@@ -315,15 +267,13 @@ class AngleForm:
         """Return ∂ż/∂ω of the inner states, shape (N, inner); it may depend on the angle only."""
         x = np.tile(self.model.start(self.model.states), (len(angles), 1))
         x[:, self.angle_state] = angles
-        slopes: Array = evaluate_rows(
+        return evaluate_rows(
             self._follow, _moving(x, self.speed_state, self.layout.speed_size), self.u, self.p
         )[0]
-        return slopes
 
     def _shift(self, angles: Array) -> Array:
         """Return Q(θ), shape (N, inner)."""
-        shift: Array = np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
-        return shift
+        return np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
 
     def _summed(self) -> CubicHermiteSpline | None:
         """Return Q = ∫₀^θ ∂ż/∂ω dθ as a spline with its exact slope at fine nodes, zero among them."""
@@ -454,14 +404,7 @@ class PaperForm:
         names, sizes = [v.name for v in published.states], np.max(np.abs(rest), axis=0)
         s = published.symbols()
         led = s.input[[v.name for v in published.inputs].index(n.rate)]
-        probe = ca.Function(
-            "probe",
-            [s.time, s.state, s.input, s.parameter],
-            [s.derivative, ca.densify(ca.jacobian(s.derivative, led))],
-        )
-        rates, jumps = evaluate_rows(
-            probe, rest, published.start(published.inputs), published.start(published.parameters)
-        )
+        rates, jumps = evaluate_at(published, s, [s.derivative, ca.jacobian(s.derivative, led)], rest)
         # What rests at zero, such as a relaxing stress, is as large as its jump when the cable is pulled.
         sizes = np.maximum(sizes, np.max(np.abs(jumps), axis=0) * sizes[names.index(n.extension)])
         sizes[names.index(n.speed)] = np.sqrt(

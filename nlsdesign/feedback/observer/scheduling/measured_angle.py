@@ -198,8 +198,9 @@ def at_rest(carried: Sequence[Sequence[Expression]], offset: Sequence[Expression
     ``carried``: A, shape (n, n).
     """
     count = len(offset)
-    lasting = [i for i in range(count) if not _decays(carried[i][i])]
-    moving = [i for i in range(count) if i not in lasting]
+    shares = [carried[i][i] for i in range(count)]
+    # What is kept over a sample is below one, or varies with the angle.
+    moving = [i for i, kept in enumerate(shares) if not kept.is_constant() or float(kept) < 1.0 - 1e-12]
     result = [ca.SX(0)] * count
     if not moving:
         return result
@@ -210,11 +211,6 @@ def at_rest(carried: Sequence[Sequence[Expression]], offset: Sequence[Expression
     for place, i in enumerate(moving):
         result[i] = rest[place]
     return result
-
-
-def _decays(kept: Expression) -> bool:
-    """Return whether a share that is kept over a sample is below one, or varies with the angle."""
-    return not (kept.is_constant() and float(kept) >= 1.0 - 1e-12)
 
 
 def _column(items: Sequence[Expression]) -> Expression:

@@ -25,6 +25,7 @@ from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.quantity import typeset_unit
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
+from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
 from .angle_form import Minimal, StateForm
 from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
@@ -183,11 +184,57 @@ def whole_contour(model: FlatModel) -> GridByTorqueError:
     return GridByTorqueError(-end, end)
 
 
-class _Writer:
-    """Writes the step with the entries read from the table."""
+class ObserverVariables:
+    """Variables and table that an observer over an angle has, however it corrects itself."""
 
     def __init__(self, step: ObserverStep, compact: Compact) -> None:
         self.step, self.compact, self.plant = step, compact, step.plant
+
+    def inputs(self) -> tuple[Variable, ...]:
+        """Return the measured angle and the known inputs."""
+        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return the table over the angle; none where every entry is a literal."""
+        table = self.compact.table(self.plant.angle)
+        return () if table is None else (table,)
+
+    def table_in_words(self) -> str:
+        """Return size and range of the table."""
+        grid = self.compact.angles
+        return f"table of {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad"
+
+    def memory(self) -> list[Variable]:
+        """Return what each estimate carries on from sample to sample."""
+        return [
+            Variable(
+                f"{v.name}.{MEMORY}", v.unit, f"what the estimate of {v.name} carries on", nominal=float(size)
+            )
+            for v, size in zip(self.plant.states, self.plant.sizes, strict=True)
+        ]
+
+    def estimate(self) -> Variable:
+        """Return what is wanted."""
+        v, size = self.plant.estimate, float(np.max(np.abs(self.step.scales()["estimate"])))
+        return Variable(v.name, v.unit, f"estimate of {v.name}", nominal=size)
+
+    def estimates(self) -> list[Variable]:
+        """Return the estimates of the states, and the innovation of each that is measured."""
+        plant, outputs = self.plant, []
+        for v in plant.states:
+            name = f"{v.name}.{ESTIMATE}" if v.name == plant.angle else v.name
+            outputs.append(Variable(name, v.unit, f"estimate of {v.name}"))
+        for name in (plant.angle, *plant.measured):
+            unit = plant.states[plant.names.index(name)].unit
+            outputs.append(Variable(f"{name}.{INNOVATION}", unit, f"measured minus expected {name}"))
+        return outputs
+
+
+class _Writer(ObserverVariables):
+    """Writes the step with the entries read from the table."""
+
+    def __init__(self, step: ObserverStep, compact: Compact) -> None:
+        super().__init__(step, compact)
         self.w = ca.SX.sym("w", len(compact.columns))
         self.n = len(self.plant.states)
         self.angle_place, self.speed_place = self.plant.moving
@@ -221,29 +268,22 @@ class _Writer:
         following = [self.row("next", i, [*state, ca.SX(1), *pushed]) for i in range(n)]
         estimate = self.row("estimate", 0, [*state, ca.SX(1)])
         shown = [state[i] + self.read("shift", i) for i in range(n)]
-        equations = ca.Function(
-            "equations",
-            [
-                ca.SX.sym("time"), _column([*memory, *previous, *filtered]), _column([angle, *u]),
-                ca.SX(0, 1), self.w,
-            ],
-            [
-                _column([*following, *measured[1:], *(rates if filtered else [])]),
-                _column([estimate, *shown, *innovation]), ca.SX(0, 1), ca.SX(0, 1),
-            ],
-            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+        equations = stated_equations(
+            _column([*memory, *previous, *filtered]), _column([angle, *u]),
+            derivative=_column([*following, *measured[1:], *(rates if filtered else [])]),
+            output=_column([estimate, *shown, *innovation]), table=self.w,
         )  # fmt: skip
         return FlatModel(
             name=f"{plant.name}_observer",
-            description=self._description(),
+            description=f"observer of {plant.estimate.name}, {self.step.gain}, {self.table_in_words()}",
             states=self._states(),
-            inputs=self._inputs(),
+            inputs=self.inputs(),
             parameters=(),
-            outputs=self._outputs(),
+            outputs=(self.estimate(), *self.estimates()),
             signals=(),
             equations=equations,
             sample_time=self.step.sample_time,
-            tables=self._tables(),
+            tables=self.tables(),
             begin=first.begin(),
             expected=first.expected(),
         )
@@ -276,21 +316,8 @@ class _Writer:
         after[self.speed_place] += change
         return after
 
-    def _description(self) -> str:
-        grid = self.compact.angles
-        return (
-            f"observer of {self.plant.estimate.name}, {self.step.gain}, table of {len(grid)} angles from "
-            f"{grid[0]:.4g} to {grid[-1]:.4g} rad"
-        )
-
     def _states(self) -> tuple[Variable, ...]:
-        plant = self.plant
-        states = [
-            Variable(
-                f"{v.name}.{MEMORY}", v.unit, f"what the estimate of {v.name} carries on", nominal=float(size)
-            )
-            for v, size in zip(plant.states, plant.sizes, strict=True)
-        ]  # fmt: skip
+        plant, states = self.plant, self.memory()
         for name in plant.measured:
             v = plant.states[plant.names.index(name)]
             states.append(Variable(f"{name}.{PREVIOUS}", v.unit, f"{name} one sample ago"))
@@ -299,29 +326,6 @@ class _Writer:
             states.append(Variable(f"{name}.rate", f"{v.unit}/s", f"filtered rate of {name}"))
         return tuple(states)
 
-    def _inputs(self) -> tuple[Variable, ...]:
-        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
-
-    def _outputs(self) -> tuple[Variable, ...]:
-        plant = self.plant
-        size = float(np.max(np.abs(self.step.scales()["estimate"])))
-        outputs = [
-            Variable(
-                plant.estimate.name, plant.estimate.unit, f"estimate of {plant.estimate.name}", nominal=size
-            )
-        ]
-        for v in plant.states:
-            name = f"{v.name}.{ESTIMATE}" if v.name == self.angle.name else v.name
-            outputs.append(Variable(name, v.unit, f"estimate of {v.name}"))
-        for name in (self.angle.name, *plant.measured):
-            v = plant.states[plant.names.index(name)]
-            outputs.append(Variable(f"{name}.{INNOVATION}", v.unit, f"measured minus expected {name}"))
-        return tuple(outputs)
-
-    def _tables(self) -> tuple[Table, ...]:
-        table = self.compact.table(self.angle.name)
-        return () if table is None else (table,)
-
 
 def _column(items: Sequence[Expression]) -> Expression:
     return ca.SX(ca.densify(ca.vertcat(*items))) if items else ca.SX(0, 1)
@@ -329,24 +333,12 @@ def _column(items: Sequence[Expression]) -> Expression:
 
 @dataclass(frozen=True, eq=False)
 class ErrorStability:
-    """What is known of the stability of the estimation error.
+    """What is known of the stability of the estimation error."""
 
-    Parameters
-    ----------
-    angles
-        Checked angles in rad, shape (n,).
-    radius
-        Spectral radius of the error matrix at each.
-    proved
-        Whether the whole error is proved to vanish exponentially for every motion.
-    proved_inner
-        Whether that is proved of the inner states, on which the estimate of the force rests.
-    """
-
-    angles: Array
-    radius: Array
-    proved: bool
-    proved_inner: bool
+    angles: Array  # checked angles in rad, shape (n,)
+    radius: Array  # spectral radius of the error matrix at each
+    proved: bool  # whether the whole error is proved to vanish exponentially for every motion
+    proved_inner: bool  # whether that is proved of the inner states, on which the estimate of the force rests
 
     @property
     def worst(self) -> tuple[float, float]:
@@ -388,8 +380,7 @@ def error_matrices(observer: FlatModel, angles: Array, speed: float = 0.0) -> Ar
         at = np.array(many(state, given, table)[1])
         state[moving] += [at[0], speed - at[1]]
     entries = np.array(many(state, given, table)[0])
-    matrices: Array = entries.T.reshape(len(angles), len(memory), len(memory))
-    return matrices
+    return entries.T.reshape(len(angles), len(memory), len(memory))
 
 
 def _memory(observer: FlatModel) -> tuple[list[int], list[int]]:

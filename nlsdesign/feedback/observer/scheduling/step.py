@@ -64,8 +64,7 @@ def _exponentials(blocks: Array) -> Array:
         and len(blocks) > 1
         and np.array_equal(blocks, np.broadcast_to(blocks[0], blocks.shape))
     ):
-        same: Array = np.broadcast_to(expm(blocks[0]), blocks.shape).copy()
-        return same
+        return np.broadcast_to(expm(blocks[0]), blocks.shape).copy()
     result: Array = expm(blocks)
     return result
 
@@ -91,36 +90,16 @@ Spectrum: TypeAlias = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class SampledPlant:
-    """The plant at one angle over one sample.
+    """The plant at one angle over one sample."""
 
-    Parameters
-    ----------
-    angle
-        In rad.
-    a
-        Continuous, shape (n, n).
-    transition
-        Φ = e^(AT), shape (n, n).
-    output_matrix
-        C, shape (r, n); the angle comes first.
-    names
-        Of the states.
-    sizes
-        Typical sizes of the states, shape (n,).
-    sample_time
-        T in s.
-    speed
-        Name of the state that is the rate of the measured angle.
-    """
-
-    angle: float
-    a: Array
-    transition: Array
-    output_matrix: Array
+    angle: float  # in rad
+    a: Array  # continuous, shape (n, n)
+    transition: Array  # Φ = e^(AT), shape (n, n)
+    output_matrix: Array  # C, shape (r, n); the angle comes first
     names: tuple[str, ...]
-    sizes: Array
-    sample_time: float
-    speed: str
+    sizes: Array  # typical sizes of the states, shape (n,)
+    sample_time: float  # T in s
+    speed: str  # name of the state that is the rate of the measured angle
 
     @property
     def moving(self) -> tuple[int, int]:
@@ -344,12 +323,14 @@ class PolePlacement:
         seen, hidden = _decomposed(a * plant.sample_time, c, self.condition_limit)
         if hidden.shape[1]:
             own = np.linalg.eigvals(hidden.T @ a @ hidden).astype(complex)
-            poles = _without_nearest(poles, own)
+            left = list(poles)
+            for eigenvalue in own:
+                left.pop(int(np.argmin([abs(pole - eigenvalue) for pole in left])))
+            poles = np.array(left)
         inner: Array = expm(seen.T @ a @ seen * plant.sample_time)
         gain = seen @ _placed(inner, c @ seen, np.exp(poles * plant.sample_time))
         # The gain of the prediction, L = Φ M, is what is placed.
-        result: Array = np.asarray(np.linalg.solve(plant.transition, gain * scale[:, None]), dtype=np.float64)
-        return result
+        return np.asarray(np.linalg.solve(plant.transition, gain * scale[:, None]), dtype=np.float64)
 
 
 def _decomposed(a: Array, c: Array, limit: float) -> tuple[Array, Array]:
@@ -360,13 +341,6 @@ def _decomposed(a: Array, c: Array, limit: float) -> tuple[Array, Array]:
     _, singular, directions = np.linalg.svd(np.vstack(rows))
     rank = int(np.sum(singular > singular[0] / limit))
     return directions[:rank].T, directions[rank:].T
-
-
-def _without_nearest(poles: Spectrum, taken: Spectrum) -> Spectrum:
-    left = list(poles)
-    for eigenvalue in taken:
-        left.pop(int(np.argmin([abs(pole - eigenvalue) for pole in left])))
-    return np.array(left)
 
 
 def _placed(a: Array, c: Array, poles: Spectrum) -> Array:
@@ -405,23 +379,12 @@ class ObserverStep:
     s⁺ = Φ(θ)·x̂ + γ₀(θ) + Γ(θ)·d(u) + Γ_δ(θ)·δ̇. What the angle drives runs linearly between samples: γ₀ is
     its part at the beginning of a sample, γ₁ at the end, which is known only when the next angle is. In the
     published form it is held instead, γ₁ = 0: there it is the offset of a tangent in the extension.
-
-    Parameters
-    ----------
-    plant
-        In the form of an angle-scheduled plant.
-    gain
-        Chooses M.
-    sample_time
-        In s.
-    reference
-        Angles over which typical sizes of the sums are taken.
     """
 
-    plant: AngleScheduledPlant
-    gain: GainRule
-    sample_time: float
-    reference: Array
+    plant: AngleScheduledPlant  # in the form of an angle-scheduled plant
+    gain: GainRule  # chooses M
+    sample_time: float  # in s
+    reference: Array  # angles over which typical sizes of the sums are taken
 
     def matrices(self, angles: Array) -> dict[str, Array]:
         """Return the matrices of the step at many angles."""

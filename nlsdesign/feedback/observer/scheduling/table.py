@@ -32,27 +32,15 @@ CHECKS = 4
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A function of the angle and the weight of its error.
+    """A function of the angle and the weight of its error."""
 
-    Parameters
-    ----------
-    key
-        Where it is read in the step.
-    row
-        The sum in which it stands, for instance the next speed.
-    name, unit
-        Of the column that it may become.
-    values
-        Shape (N,).
-    weight
-        Typical size of what it multiplies over the typical size of the sum: error = weight × deviation.
-    """
-
-    key: str
-    row: str
+    key: str  # where it is read in the step
+    row: str  # the sum in which it stands, for instance the next speed
+    # name, unit: of the column that it may become
     name: str
     unit: str
-    values: Array
+    values: Array  # shape (N,)
+    # weight: typical size of what it multiplies over the typical size of the sum: error = weight × deviation
     weight: float
 
 
@@ -69,21 +57,11 @@ class ColumnPlace:
 
 @dataclass(frozen=True)
 class TableTorqueError:
-    """What reading a table costs: torque with the table minus torque with exact functions of the angle.
+    """What reading a table costs: torque with the table minus torque with exact functions of the angle."""
 
-    Parameters
-    ----------
-    largest
-        Over all motions, in the unit of the estimate.
-    rms
-        Root mean square over all motions.
-    full_scale
-        Largest exact torque over all motions.
-    """
-
-    largest: float
-    rms: float
-    full_scale: float
+    largest: float  # over all motions, in the unit of the estimate
+    rms: float  # root mean square over all motions
+    full_scale: float  # largest exact torque over all motions
 
     @property
     def share(self) -> float:
@@ -93,36 +71,17 @@ class TableTorqueError:
 
 @dataclass(frozen=True, eq=False)
 class Compact:
-    """A table and how to read each entry from it.
+    """A table and how to read each entry from it."""
 
-    Parameters
-    ----------
-    angles
-        Grid, shape (n,).
-    columns
-        The entries that became columns.
-    values
-        Shape (n, columns).
-    places
-        By key of the entry.
-    error
-        By row: largest error at the checked points, share of the typical size of the sum.
-    angle_error
-        Angle in rad within which the exact function may be read to judge the error.
-    uniform
-        Whether the grid points lie equally far apart.
-    torque_error
-        What the table costs; ``None`` where it was not measured.
-    """
-
-    angles: Array
-    columns: tuple[Entry, ...]
-    values: Array
-    places: Mapping[str, ColumnPlace]
+    angles: Array  # grid, shape (n,)
+    columns: tuple[Entry, ...]  # the entries that became columns
+    values: Array  # shape (n, columns)
+    places: Mapping[str, ColumnPlace]  # by key of the entry
+    # error: by row: largest error at the checked points, share of the typical size of the sum
     error: Mapping[str, float]
-    angle_error: float
-    uniform: bool = True
-    torque_error: TableTorqueError | None = None
+    angle_error: float  # angle in rad within which the exact function may be read to judge the error
+    uniform: bool = True  # whether the grid points lie equally far apart
+    torque_error: TableTorqueError | None = None  # what the table costs; None where it was not measured
 
     def size(self, bytes_per_number: int) -> int:
         """Return the flash that values and breakpoints take, in bytes."""
@@ -165,18 +124,10 @@ class ObserverWithTable(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """An observer that still lacks its table.
+    """An observer that still lacks its table."""
 
-    Parameters
-    ----------
-    plant
-        On which it is designed.
-    write
-        Writes it for a table.
-    """
-
-    plant: AngleScheduledPlant
-    write: Callable[[Compact], ObserverWithTable]
+    plant: AngleScheduledPlant  # on which it is designed
+    write: Callable[[Compact], ObserverWithTable]  # writes it for a table
 
 
 class Grid(ABC):
@@ -379,21 +330,11 @@ STRAIGHT_CELLS = (8, 16, 32, 64, 128, 256, 512, 1024)
 
 @dataclass(frozen=True, eq=False)
 class FineEntries:
-    """The entries on a grid that is fine where they bend or jump.
+    """The entries on a grid that is fine where they bend or jump."""
 
-    Parameters
-    ----------
-    angles
-        Ascending, shape (n,).
-    entries
-        On these angles.
-    resolution
-        Width in rad to which jumps are narrowed down.
-    """
-
-    angles: Array
-    entries: tuple[Entry, ...]
-    resolution: float
+    angles: Array  # ascending, shape (n,)
+    entries: tuple[Entry, ...]  # on these angles
+    resolution: float  # width in rad to which jumps are narrowed down
 
     @staticmethod
     def of(entries: Entries, lower: float, upper: float, resolution: float) -> FineEntries:
@@ -524,8 +465,7 @@ def linearly(grid: Array, values: Array, at: Array) -> Array:
     left = np.clip(np.searchsorted(grid, held, side="right") - 1, 0, len(grid) - 2)
     share = (held - grid[left]) / (grid[left + 1] - grid[left])
     rows = values.T
-    read: Array = rows[:, left] + share * (rows[:, left + 1] - rows[:, left])
-    return read
+    return rows[:, left] + share * (rows[:, left + 1] - rows[:, left])
 
 
 def _finite(entries: Sequence[Entry]) -> Sequence[Entry]:

@@ -9,7 +9,6 @@ lives with its own errors: what a wrong entry does to a state is carried on from
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -45,23 +44,10 @@ CHUNK = 250
 """Samples that one call computes."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Motions:
-    """Angles (N, motions) and inputs (N, motions, inputs) at the samples."""
-
-    angles: Array
-    inputs: Array
-
-
 class TableTrial:
     """Compares tables with the exact functions of the angle, on the same motions.
 
-    Parameters
-    ----------
-    draft
-        Plant, and how an observer is written for a table.
-    fine
-        The exact entries.
+    ``draft``: plant, and how an observer is written for a table.
     """
 
     def __init__(self, draft: Draft, fine: FineEntries) -> None:
@@ -71,10 +57,17 @@ class TableTrial:
         self._model = observer.model
         self.deciding = _deciding(self._model, separate.columns)
         self._columns = [separate.columns.index(entry) for entry in self.deciding]
-        self._motions = _motions(draft.plant, float(self._model.sample_time or 1.0), fine)
-        begin = [self._model.with_values(observer.start(float(a))) for a in self._motions.angles[0]]
+        angles, inputs = _motions(draft.plant, float(self._model.sample_time or 1.0), fine)
+        self._many, self._seen = angles.shape[1], angles.ravel()
+        self._inputs = np.concatenate([angles[:, :, None], inputs], axis=2).reshape(angles.size, -1).T
+        begin = [self._model.with_values(observer.start(float(a))) for a in angles[0]]
         self._start = np.array([each.start(each.states) for each in begin]).T
-        self._step = self._stepped()
+        s = self._model.symbols()
+        step = ca.Function(
+            "step", [s.state, ca.vertcat(s.input, s.table)],
+            [ca.densify(s.derivative), ca.densify(s.output[0])],
+        )  # fmt: skip
+        self._step = step.map(self._many).mapaccum("samples", CHUNK, {"base": 10})
         values = np.array([entry.values for entry in self.deciding]).reshape(-1, len(fine.angles))
         self._exactly = linearly(fine.angles, values.T, self._seen)
         self._estimate = self._run(self._exactly)
@@ -100,26 +93,9 @@ class TableTrial:
             return TableTorqueError(np.inf, np.inf, self.full_scale)
         return TableTorqueError(float(np.max(np.abs(off))), float(np.sqrt(np.mean(off**2))), self.full_scale)
 
-    @cached_property
-    def _seen(self) -> Array:
-        return self._motions.angles.ravel()
-
-    @cached_property
-    def _inputs(self) -> Array:
-        angles, inputs = self._motions.angles, self._motions.inputs
-        return np.concatenate([angles[:, :, None], inputs], axis=2).reshape(angles.size, -1).T
-
-    def _stepped(self) -> ca.Function:
-        many, s = self._motions.angles.shape[1], self._model.symbols()
-        step = ca.Function(
-            "step", [s.state, ca.vertcat(s.input, s.table)],
-            [ca.densify(s.derivative), ca.densify(s.output[0])],
-        )  # fmt: skip
-        return step.map(many).mapaccum("samples", CHUNK, {"base": 10})
-
     def _run(self, read: Array) -> Array:
         """Return the estimates with these entries, shape (N · motions,)."""
-        many = self._motions.angles.shape[1]
+        many = self._many
         looked_up = np.zeros((self._model.symbols().table.numel(), read.shape[1]))
         looked_up[self._columns] = read
         given = np.vstack([self._inputs, looked_up])
@@ -162,8 +138,11 @@ def _separate(fine: FineEntries) -> Compact:
     return Compact(fine.angles, tuple(columns), values, places, {}, 0.0, uniform=False)
 
 
-def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) -> _Motions:
-    """Return swings over the whole range, runs between rests, and a mixture of frequencies."""
+def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) -> tuple[Array, Array]:
+    """Return swings over the whole range, runs between rests, and a mixture of frequencies.
+
+    Angles (N, motions) and inputs (N, motions, inputs) at the samples.
+    """
     count = CHUNK * -(-max(FEWEST, round(SPAN / sample_time)) // CHUNK)
     time, low, high = sample_time * np.arange(float(count)), float(fine.angles[0]), float(fine.angles[-1])
     end = float(time[-1])
@@ -178,15 +157,14 @@ def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) 
     angles = (low + high) / 2.0 + (high - low) / 2.0 * np.array(shares).T
     speed = np.gradient(angles, sample_time, axis=0)
     acceleration = np.gradient(speed, sample_time, axis=0)
-    return _Motions(angles, _inputs(plant, angles, speed, acceleration))
+    return angles, _inputs(plant, angles, speed, acceleration)
 
 
 def _smooth(time: Array, marks: Array, values: Array) -> Array:
     """Return a course through values at some times that is at rest at each of them."""
     cell = np.clip(np.searchsorted(marks, time, side="right") - 1, 0, len(marks) - 2)
     share = (time - marks[cell]) / (marks[cell + 1] - marks[cell])
-    course: Array = values[cell] + (values[cell + 1] - values[cell]) * share**2 * (3.0 - 2.0 * share)
-    return course
+    return values[cell] + (values[cell + 1] - values[cell]) * share**2 * (3.0 - 2.0 * share)
 
 
 def _inputs(plant: AngleScheduledPlant, angles: Array, speed: Array, acceleration: Array) -> Array:
@@ -320,18 +298,9 @@ class GridByTorqueError(Grid):
 class TableTooLargeError(ConvergenceError):
     """A table cannot be as small as was asked for.
 
-    Parameters
-    ----------
-    most
-        Bytes that it may take.
-    allowed
-        Torque error that it may cause.
-    cost
-        Torque error that the best table of that size would cause; ``None`` where there is none that small.
-    least
-        Bytes of the smallest table found that keeps what is allowed.
-    unit
-        Of the torque.
+    ``allowed``: torque error that it may cause. ``cost``: torque error that the best table of that size would
+    cause; ``None`` where there is none that small. ``least``: bytes of the smallest table found that keeps
+    what is allowed.
     """
 
     def __init__(self, most: int, allowed: float, cost: float | None, least: int, unit: str) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
 from ....model import FlatModel, Variable
+from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
 from ....simulation.sampled_batch import PLANT, SampledSystem
 from ..adaptive.duty_and_directions import Duty, operating_points, push, spring_inertia
@@ -187,11 +188,9 @@ def _servo(driven: Variable, angle: Variable, slope: float, time: float) -> Flat
     speed = (read - before) / time
     push_ = acceleration + 2.0 * pulsation * (rate - speed) + pulsation**2 * (wanted - read)
     name = f"{angle.name}.wanted"
-    equations = ca.Function(
-        "equations",
-        [ca.SX.sym("time"), before, ca.vertcat(read, wanted, rate, acceleration), ca.SX(0, 1), ca.SX(0, 1)],
-        [read, driven.start + push_ / slope, ca.SX(0, 1), ca.SX(0, 1)],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    equations = stated_equations(
+        before, ca.vertcat(read, wanted, rate, acceleration),
+        derivative=read, output=driven.start + push_ / slope,
     )  # fmt: skip
     return FlatModel(
         name="bench_servo",

@@ -13,16 +13,14 @@ from nlsdesign.feedback.control import (
     LoopJudge,
     TorqueGains,
     encoder_loop,
-    held_torque,
     loop_over_spread,
     sine_response,
     torque_controller,
-    torque_resolution,
     tracking,
     zero_torque,
 )
 from nlsdesign.feedback.control.evaluation.loop_verdict import COUNTS, sustained, without_harmonics
-from nlsdesign.feedback.control.evaluation.responses import step_response
+from nlsdesign.feedback.control.evaluation.responses import held_torque, step_response, torque_resolution
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
