@@ -3,6 +3,9 @@
 Presentation and commands may import it; it reads models, and designs nothing.
 """
 
+from .c.block_files import read_parameter_block, write_parameter_block
+from .c.block_layout import BlockLayout, ParameterBlock
+from .c.coefficients import LoadableModel, loadable_model
 from .c.controller_code import export_c
 from .c.programs import write_examples
 from .c.writer import CSource
@@ -27,6 +30,7 @@ from .mujoco.actuator_model import export_mujoco
 
 __all__ = [
     "ALL_PLATFORMS",
+    "BlockLayout",
     "CORTEX_M4F",
     "CORTEX_M7",
     "PROCESSORS",
@@ -39,6 +43,8 @@ __all__ = [
     "Held",
     "Iterated",
     "Late",
+    "LoadableModel",
+    "ParameterBlock",
     "Processor",
     "SamplesOf",
     "Stepping",
@@ -49,12 +55,15 @@ __all__ = [
     "export_fmu",
     "export_modelica",
     "export_mujoco",
+    "loadable_model",
     "measure_on_target",
     "natively",
     "quickest",
     "read_exports",
+    "read_parameter_block",
     "read_ssp",
     "write_examples",
+    "write_parameter_block",
     "write_reference",
     "write_ssp",
 ]

@@ -14,7 +14,10 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import write_all
+from .block_code import block_declarations, block_functions
+from .block_layout import block_layout
 from .c_text import Real, comment, identifier, signature
+from .coefficients import LoadableModel
 from .elementary import elementary_functions
 from .guarded_step import STATUS_BITS, first_outputs, index_bit
 from .programs import selftest_source
@@ -24,6 +27,7 @@ from .writer import (
     CWriter,
     derived_statements,
     guard_functions,
+    paths_in_memory,
     settled_functions,
     step_body,
     take_statements,
@@ -31,14 +35,19 @@ from .writer import (
 
 
 def export_c(
-    model: FlatModel, folder: str | Path, *, real: Real | str = Real.DOUBLE, name: str | None = None
+    model: FlatModel | LoadableModel,
+    folder: str | Path,
+    *,
+    real: Real | str = Real.DOUBLE,
+    name: str | None = None,
 ) -> CSource:
     """Write ``<name>.h``, ``<name>.c`` and ``<name>_selftest.c`` for a discrete model.
 
     Parameters
     ----------
     model
-        Discrete model: observer or controller.
+        Discrete model: observer or controller. The code of a :class:`LoadableModel` takes over blocks of other
+        numbers at run time, by its function ``<name>_load``.
     folder
         Folder of the files; it is made if it is missing.
     real
@@ -56,12 +65,19 @@ def export_c(
     ExportError
         If the model is continuous, depends on time, cannot be written in C, or the folder cannot be written.
     """
-    c = CWriter(model, identifier(name or model.name), Real.named(real))
+    number = Real.named(real)
+    if isinstance(model, LoadableModel):
+        prefix = identifier(name or model.model.name)
+        layout = block_layout(model, prefix, number, tuple(paths_in_memory(model.parameters)))
+        model = model.model
+    else:
+        prefix, layout = identifier(name or model.name), None
     check_discrete(model)
+    c = CWriter(model, prefix, number, layout)
     header, source, selftest = (Path(folder) / f"{c.name}{end}" for end in (".h", ".c", "_selftest.c"))
     texts = {header: header_text(c), source: source_text(c), selftest: selftest_source(c)}
     write_all({path: stamped(text, model) for path, text in texts.items()})
-    return CSource(c.name, model, c.real, header, source, selftest)
+    return CSource(c.name, model, c.real, header, source, selftest, layout)
 
 
 def check_discrete(model: FlatModel) -> None:
@@ -108,6 +124,7 @@ def header_text(c: CWriter) -> str:
         else [],
         "derived": [f"{c.real} derived[{derived}]; /* follows from the parameters */"] if derived else [],
         **_heads(c.name),
+        **block_declarations(c),
     }
     version_of_interface = "@interface@"  # known once all else is written
     text = c.filled("controller.h", values | {"interface": version_of_interface})
@@ -127,7 +144,7 @@ def source_text(c: CWriter) -> str:
             *elementary_functions(real, [*body, *settled, *derived]),
             *(line for table in c.tables if table.columns(looked_up) for line in (*table.data(), "")),
         ],
-        "start_parameters": c.initialiser("parameters", [v.start for v in model.parameters]),
+        "start_parameters": c.initialiser("parameters", [v.start for v in c.parameters]),
         "start_states": c.initialiser("states", [v.start for v in model.states]),
         "start_inputs": c.initialiser("inputs", inputs),
         "start_outputs": c.initialiser("outputs", outputs),
@@ -138,7 +155,7 @@ def source_text(c: CWriter) -> str:
         "assignments": [
             f"take_over(parameters->{path}, {real.bound(v.minimum)}, {real.bound(v.maximum)}, "
             f"&state->parameters.{path}, 0x{index_bit(i):x}u, &status);"
-            for i, (v, path) in enumerate(zip(model.parameters, c.paths.parameters, strict=True))
+            for i, (v, path) in enumerate(zip(c.parameters, c.paths.parameters, strict=True))
         ]
         or ["(void)parameters;"],
         "derived": [f"{c.name}_derive(state);"] if derived else [],
@@ -154,6 +171,7 @@ def source_text(c: CWriter) -> str:
         "settled": settled,
         "take": take_statements(c),
         "body": body,
+        **block_functions(c, bool(derived)),
     }
     return c.filled("controller.c", _heads(c.name) | values)
 

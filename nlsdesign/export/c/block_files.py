@@ -1,0 +1,218 @@
+"""Blocks of numbers as files: C, the bytes of the structure, and JSON that names every number."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...foundation.errors import ExportError, NlsError, nearest
+from ...foundation.locations import version
+from ...foundation.text_files import draft
+from ...model.flat import Table, Variable
+from .block_code import initialised
+from .block_layout import BlockLayout, ParameterBlock, check_digest, check_sum, unpacked
+from .c_text import Real, comment, identifier
+
+FORMAT = "nlsdesign parameter block 1"
+_MOST_BYTES = 1 << 26
+
+
+def write_parameter_block(block: ParameterBlock, path: str | Path) -> Path:
+    """Write a block as a file; its ending says in which form.
+
+    ``.bin`` holds the bytes of the structure, least significant first, ``.c`` a constant of that structure,
+    ``.json`` names, values, units and ranges, from which the other two can be made again.
+
+    Parameters
+    ----------
+    block
+        Numbers for a generated code.
+    path
+        File to write, with one of these endings.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ExportError
+        If the ending is another one, a number is out of its range, or the file cannot be written.
+
+    Examples
+    --------
+    >>> write_parameter_block(block, "joint.bin")  # doctest: +SKIP
+    """
+    target = Path(path)
+    made = _WRITERS.get(target.suffix)
+    if made is None:
+        raise ExportError(
+            str(path), f"a block has one of the endings {', '.join(_WRITERS)}",
+            did_you_mean=nearest(target.suffix, list(_WRITERS)),
+        )  # fmt: skip
+    block.check()
+    with draft(target) as name:
+        name.write_bytes(made(block))
+    return target
+
+
+def read_parameter_block(path: str | Path, code: BlockLayout | None = None) -> ParameterBlock:
+    """Return a block from a ``.json`` or ``.bin`` file.
+
+    Parameters
+    ----------
+    path
+        File.
+    code
+        Of which code it must be; a ``.json`` says that itself, a ``.bin`` has no names.
+
+    Raises
+    ------
+    ExportError
+        If the file cannot be read, is damaged or edited, is of other code, or a number is out of its range.
+
+    Examples
+    --------
+    >>> read_parameter_block("out/c/torque_loop_block.json").values["motor.inertia"]  # doctest: +SKIP
+    """
+    file, place = Path(path), str(path)
+    try:
+        if file.stat().st_size > _MOST_BYTES:
+            raise ExportError(place, f"has {file.stat().st_size} bytes, no block is as large")
+        content = file.read_bytes()
+    except OSError as error:
+        raise ExportError(place, f"cannot be read: {error.strerror or error}") from None
+    if file.suffix == ".json":
+        return _from_json(content, code, place)
+    if code is None:
+        raise ExportError(
+            place, "holds no names, so the code must be named that it is for",
+            next_step="give the layout from the .json beside the code: read_parameter_block(json).layout",
+        )  # fmt: skip
+    return unpacked(content, code, place)
+
+
+def _as_c(block: ParameterBlock) -> bytes:
+    name = block.layout.name
+    own = f"{name}_block_of_{identifier(block.deck or 'no_deck')}"
+    lines = [
+        f"/* Block for {name}.c of {comment(block.layout.deck)}, layout {block.layout.digest}.",
+        f"   Written by nlsdesign {version()}; do not edit: its checksum is that of its numbers. */",
+        f'#include "{name}.h"', "", f"extern const {name}_block {own};", "", *initialised(block, own), "",
+    ]  # fmt: skip
+    return "\n".join(lines).encode()
+
+
+def _as_json(block: ParameterBlock) -> bytes:
+    layout = block.layout
+    numbers = [_described(v) | {"value": block.values[v.name]} for v in layout.parameters]
+    coefficients = [_described(v) | {"value": block.values[v.name]} for v in layout.coefficients]
+    tables = [
+        {
+            "argument": t.argument,
+            "grid": t.grid.tolist(),
+            "uniform": None if t.breakpoints is not None else [t.lower, t.step],
+            "columns": [_described(v) for v in t.columns],
+            "values": values.tolist(),
+        }
+        for t, values in zip(layout.tables, block.tables, strict=True)
+    ]
+    content = {
+        "format": FORMAT,
+        "code": layout.name,
+        "real": str(layout.real),
+        "byte_order": "little",
+        "digest": layout.digest,
+        "checksum": f"0x{block.checksum:08x}",
+        "code_deck": {"name": layout.deck, "sha256": layout.deck_digest},
+        "deck": {"name": block.deck, "sha256": block.deck_digest},
+        "parameters": numbers,
+        "coefficients": coefficients,
+        "tables": tables,
+        "recipe": dict(block.recipe),
+    }
+    return (json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _described(v: Variable) -> dict[str, Any]:
+    limits = [x if math.isfinite(x) else None for x in (v.minimum, v.maximum)]
+    return {
+        "name": v.name,
+        "unit": v.unit,
+        "minimum": limits[0],
+        "maximum": limits[1],
+        "description": v.description,
+    }
+
+
+_WRITERS: Mapping[str, Callable[[ParameterBlock], bytes]] = {
+    ".json": _as_json,
+    ".bin": ParameterBlock.packed,
+    ".c": _as_c,
+}
+
+
+def _from_json(content: bytes, code: BlockLayout | None, place: str) -> ParameterBlock:
+    try:
+        raw = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise ExportError(place, f"is no JSON: {error}") from None
+    if not isinstance(raw, dict) or raw.get("format") != FORMAT:
+        raise ExportError(
+            place, f"is not of the format '{FORMAT}'",
+            next_step="take the NAME_block.json that nlsdesign export c --block writes beside the code",
+        )  # fmt: skip
+    try:
+        block, stated = _restored(raw), int(raw["checksum"], 16)
+        check_sum(stated, block.checksum, place)
+    except NlsError:
+        raise
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
+        raise ExportError(place, f"lacks a field or has one of another form: {error!r}") from None
+    if code is not None:
+        check_digest(block.layout.digest, code, place)
+    block.check()
+    return block
+
+
+def _restored(raw: Mapping[str, Any]) -> ParameterBlock:
+    parameters, coefficients = (tuple(map(_variable, raw[group])) for group in ("parameters", "coefficients"))
+    tables = tuple(map(_table, raw["tables"]))
+    layout = BlockLayout(
+        str(raw["code"]), Real.named(raw["real"]), str(raw["code_deck"]["name"]), str(raw["code_deck"]["sha256"]),
+        parameters, coefficients, tables, str(raw["digest"]),
+    )  # fmt: skip
+    values = {v.name: v.start for v in (*parameters, *coefficients)}
+    if len(values) != len(parameters) + len(coefficients):
+        raise ValueError("a name stands twice")
+    deck = raw["deck"]
+    return ParameterBlock(
+        layout, values, tuple(t.values for t in tables), str(deck["name"]), str(deck["sha256"]),
+        dict(raw["recipe"]),
+    )  # fmt: skip
+
+
+def _variable(raw: Mapping[str, Any]) -> Variable:
+    low, high = (
+        math.inf * s if raw[k] is None else float(raw[k]) for s, k in ((-1, "minimum"), (1, "maximum"))
+    )
+    return Variable(
+        str(raw["name"]), str(raw["unit"]), str(raw["description"]), start=float(raw.get("value", 0.0)),
+        minimum=low, maximum=high,
+    )  # fmt: skip
+
+
+def _table(raw: Mapping[str, Any]) -> Table:
+    columns, values = tuple(map(_variable, raw["columns"])), np.array(raw["values"], dtype=float)
+    if values.shape != (len(raw["grid"]), len(columns)):
+        raise ValueError(f"a table has the shape {values.shape}")
+    if raw["uniform"] is None:
+        return Table.over(str(raw["argument"]), np.array(raw["grid"], dtype=float), columns, values)
+    lower, step = map(float, raw["uniform"])
+    return Table(str(raw["argument"]), lower, step, columns, values)
