@@ -47,12 +47,15 @@ class SameTable(Grid):
         By key of each entry the column that it is read from, −1 for a constant, −2 for nothing.
     uniform
         Whether the points lie equally far apart.
+    judged
+        Whether the torque error of a table over these points is measured, which takes the most time.
     """
 
     angles: tuple[float, ...]
     columns: tuple[str, ...]
     places: Mapping[str, int]
     uniform: bool
+    judged: bool = True
 
     @property
     def lower(self) -> float:  # type: ignore[override]
@@ -118,7 +121,9 @@ class SameTable(Grid):
         rows = [in_order.index(key) for key in self.columns]
         at_points = np.ascontiguousarray(values.reshape(-1, len(grid))[rows].T)
         table = Compact(grid, columns, at_points, places, {}, 0.0, self.uniform)
-        return table if draft is None else self._judged(table, TableTrial(draft, fine), draft)
+        if draft is None or not self.judged:
+            return table
+        return self._judged(table, TableTrial(draft, fine), draft)
 
     def _judged(self, table: Compact, trial: TableTrial, draft: Draft) -> Compact:
         error, unit = trial.error(table), typeset_unit(draft.plant.estimate.unit)
@@ -199,9 +204,11 @@ class CodeRecipe:
         """
         from ..export import loadable_model  # here, as its libraries take time to load
 
+        # What the table of the code costs is known, and of the moved numbers nobody asks.
+        quick = replace(self, table=self.table and replace(self.table, judged=False))
         try:
             return loadable_model(
-                self.designed(plant, controller), self.designed(moved_numbers(plant), controller)
+                quick.designed(plant, controller), quick.designed(moved_numbers(plant), controller)
             )
         except ExportError as error:
             raise ExportError(
@@ -289,8 +296,8 @@ def block_for(code: ParameterBlock, better: Assembly, controller: Controller) ->
     recipe = CodeRecipe.of(code)
     declared = declare(read_deck(recipe.deck, Path(f"{code.layout.deck}.toml")))
     loadable = recipe.loadable(flatten(declared), controller)
-    names, order = tuple(v.name for v in loadable.parameters), tuple(paths_in_memory(loadable.parameters))
-    again = block_layout(loadable, code.layout.name, code.layout.real, order)
+    names = tuple(v.name for v in loadable.parameters)
+    again = block_layout(loadable, code.layout.name, code.layout.real, paths_in_memory)
     if again.digest != code.layout.digest:
         raise ExportError(
             f"code '{code.layout.name}' of deck '{code.layout.deck}'",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...model.flat import Variable
+from ...model.flat import Table, Variable
 from .block_layout import MAGIC, VERSION, BlockLayout, ParameterBlock
 from .c_text import comment, signature
 from .writer import CWriter, paths_in_memory
@@ -18,7 +18,7 @@ def block_declarations(c: CWriter) -> dict[str, str | list[str]]:
     layout = c.layout
     if layout is None:
         return {"block": [], "loaded": [], "load": []}
-    count, numbers = len(layout.coefficients), _table_members(layout)
+    count = len(layout.coefficients)
     coefficients = [
         f"{c.real} coefficients[{count}]; /* constants of the equations that follow from the deck */"
     ]
@@ -28,13 +28,13 @@ def block_declarations(c: CWriter) -> dict[str, str | list[str]]:
         "size": str(layout.size),
         "parameters_member": [f"{c.name}_parameters parameters;"] if layout.parameters else [],
         "coefficients_member": coefficients if count else [],
-        "table_members": numbers,
+        "table_members": _table_members(layout, by_row=False),
     }
     return {
         "block": [*c.filled("controller_block.h", values).splitlines(), ""],
         "loaded": [
             *(coefficients if count else []),
-            *numbers,
+            *_table_members(layout, by_row=True),
             "uint32_t status; /* last word of step */",
             "uint32_t loaded; /* first digits of the deck whose numbers are in force */",
         ],
@@ -79,12 +79,17 @@ def _half_byte(number: int) -> int:
     return number
 
 
-def _table_members(layout: BlockLayout) -> list[str]:
+def _table_members(layout: BlockLayout, *, by_row: bool) -> list[str]:
     return [
-        f"{layout.real} table_{k}[{len(t.values)}][{len(t.columns)}]; /* over {comment(t.argument)}: "
+        f"{layout.real} table_{k}{_size(t, by_row)}; /* over {comment(t.argument)}: "
         f"{comment(', '.join(f'{v.name} [{v.unit}]' for v in t.columns))} */"
         for k, t in enumerate(layout.tables)
     ]
+
+
+def _size(table: Table, by_row: bool) -> str:
+    rows, columns = table.values.shape
+    return f"[{rows}][{columns}]" if by_row else f"[{columns}][{rows}]"
 
 
 def _ranges(c: CWriter, layout: BlockLayout) -> list[str]:
@@ -95,7 +100,7 @@ def _ranges(c: CWriter, layout: BlockLayout) -> list[str]:
     lines = [call(v, f"parameters.{paths[v.name]}") for v in layout.parameters]
     lines += [call(v, f"coefficients[{i}]") for i, v in enumerate(layout.coefficients)]
     for k, table in enumerate(layout.tables):
-        rows = [f"    {call(v, f'table_{k}[row][{j}]')}" for j, v in enumerate(table.columns)]
+        rows = [f"    {call(v, f'table_{k}[{j}][row]')}" for j, v in enumerate(table.columns)]
         lines += [f"for (uint32_t row = 0u; row < {len(table.values)}u; ++row) {{", *rows, "}"]
     return lines
 
@@ -108,7 +113,7 @@ def _taken(layout: BlockLayout) -> list[str]:
     for k, table in enumerate(layout.tables):
         lines.append(f"for (uint32_t row = 0u; row < {len(table.values)}u; ++row) {{")
         columns = range(len(table.columns))
-        lines += [f"    state->table_{k}[row][{j}] = block->table_{k}[row][{j}];" for j in columns]
+        lines += [f"    state->table_{k}[row][{j}] = block->table_{k}[{j}][row];" for j in columns]
         lines.append("}")
     return [*lines, "state->loaded = block->deck[0];"]
 
@@ -132,8 +137,11 @@ def initialised(block: ParameterBlock, name: str) -> list[str]:
         numbers = [real.literal(block.values[v.name]) for v in layout.coefficients]
         lines += [".coefficients = {", *(f"    {line}" for line in _lines(numbers)), "},"]
     for k, values in enumerate(block.tables):
-        rows = ["{" + ", ".join(map(real.literal, row)) + "}" for row in values.tolist()]
-        lines += [f".table_{k} = {{", *(f"    {line}" for line in _lines(rows)), "},"]
+        lines.append(f".table_{k} = {{")
+        for column in values.T.tolist():
+            numbers = _lines([real.literal(value) for value in column])
+            lines += ["    {", *(f"        {line}" for line in numbers), "    },"]
+        lines.append("},")
     lines += [f".checksum = 0x{block.checksum:08x}u,", ".unused = 0u,"]
     head = f"/* Numbers of {comment(block.deck) or 'no deck'}, {block.deck_digest[:12] or 'made without one'}. */"
     return [head, f"const {layout.name}_block {name} = {{", *(f"    {line}" for line in lines), "};"]

@@ -20,6 +20,7 @@ from .c_text import Real, comment, identifier
 
 FORMAT = "nlsdesign parameter block 1"
 _MOST_BYTES = 1 << 26
+_SEEN = ("states", "inputs", "outputs")
 
 
 def write_parameter_block(block: ParameterBlock, path: str | Path) -> Path:
@@ -135,6 +136,7 @@ def _as_json(block: ParameterBlock) -> bytes:
         "parameters": numbers,
         "coefficients": coefficients,
         "tables": tables,
+        **{group: [_described(v) for v in getattr(layout, group)] for group in _SEEN},
         "recipe": dict(block.recipe),
     }
     return (json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
@@ -186,7 +188,7 @@ def _restored(raw: Mapping[str, Any]) -> ParameterBlock:
     tables = tuple(map(_table, raw["tables"]))
     layout = BlockLayout(
         str(raw["code"]), Real.named(raw["real"]), str(raw["code_deck"]["name"]), str(raw["code_deck"]["sha256"]),
-        parameters, coefficients, tables, str(raw["digest"]),
+        parameters, coefficients, tables, *(tuple(map(_variable, raw[group])) for group in _SEEN), str(raw["digest"]),
     )  # fmt: skip
     values = {v.name: v.start for v in (*parameters, *coefficients)}
     if len(values) != len(parameters) + len(coefficients):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -45,7 +45,10 @@ class BlockLayout:
     parameters, coefficients
         Numbers in the order of the memory, with their ranges; their starts are those of the code.
     tables
-        With the values of the code; minimum and maximum of a column bound its values.
+        With the values of the code; minimum and maximum of a column bound its values. A block has them column
+        by column.
+    states, inputs, outputs
+        Variables of an instance in the order of the memory.
     digest
         32 hexadecimal digits: what two blocks must have in common to fit the same code.
     """
@@ -57,6 +60,9 @@ class BlockLayout:
     parameters: tuple[Variable, ...]
     coefficients: tuple[Variable, ...]
     tables: tuple[Table, ...]
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
     digest: str
 
     @cached_property
@@ -67,8 +73,21 @@ class BlockLayout:
         members += [("digest", "V16"), ("deck", "V8")]
         members += [("parameters", number, (len(self.parameters),))] if self.parameters else []
         members += [("coefficients", number, (len(self.coefficients),))] if self.coefficients else []
-        members += [(f"table_{k}", number, table.values.shape) for k, table in enumerate(self.tables)]
+        members += [(f"table_{k}", number, table.values.T.shape) for k, table in enumerate(self.tables)]
         return np.dtype([*members, ("checksum", "<u4"), ("unused", "<u4")])
+
+    @cached_property
+    def instance(self) -> np.dtype[Any]:
+        """The first members of an instance of the code, as NumPy reads them."""
+        number = "<f4" if self.real is Real.FLOAT else "<f8"
+        groups = ("parameters", "states", "inputs", "outputs")
+        # C99 knows no empty structure: it has a character.
+        members: list[Any] = [
+            (g, *((number, (len(v),)) if (v := getattr(self, g)) else ("i1",))) for g in groups
+        ]
+        members += [("coefficients", number, (len(self.coefficients),))] if self.coefficients else []
+        members += [(f"table_{k}", number, table.values.shape) for k, table in enumerate(self.tables)]
+        return np.dtype([*members, ("status", "<u4"), ("loaded", "<u4")], align=True)
 
     @property
     def size(self) -> int:
@@ -102,14 +121,20 @@ class BlockLayout:
         return made
 
 
-def block_layout(loadable: LoadableModel, name: str, real: Real, order: tuple[str, ...]) -> BlockLayout:
-    """Return the layout of the blocks of a code; ``order``: names of its parameters as they lie in memory."""
+def block_layout(
+    loadable: LoadableModel, name: str, real: Real, in_memory: Callable[[Sequence[Variable]], Iterable[str]]
+) -> BlockLayout:
+    """Return the layout of the blocks of a code; ``in_memory`` gives names as they lie in a structure."""
     model = loadable.model
     origin = model.origin
-    by_name = {v.name: v for v in loadable.parameters}
+
+    def ordered(group: Sequence[Variable]) -> tuple[Variable, ...]:
+        by_name = {v.name: v for v in group}
+        return tuple(by_name[n] for n in in_memory(group))
+
     tables = tuple(replace(t, columns=tuple(map(_bounded, t.columns, t.values.T))) for t in model.tables)
-    parameters = tuple(by_name[n] for n in order)
-    coefficients = model.parameters[len(by_name) :]
+    parameters = ordered(loadable.parameters)
+    coefficients = model.parameters[len(parameters) :]
     lines = [
         f"nlsdesign block {VERSION}", str(real), repr(model.sample_time), origin.digest if origin else "",
         *(f"{v.name} {v.unit}" for v in (*parameters, *coefficients)),
@@ -118,7 +143,8 @@ def block_layout(loadable: LoadableModel, name: str, real: Real, order: tuple[st
     ]  # fmt: skip
     digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()[:32]
     deck, deck_digest = (origin.deck, origin.digest) if origin else ("", "")
-    return BlockLayout(name, real, deck, deck_digest, parameters, coefficients, tables, digest)
+    seen = (ordered(group) for group in (model.states, model.inputs, model.outputs))
+    return BlockLayout(name, real, deck, deck_digest, parameters, coefficients, tables, *seen, digest)
 
 
 def _bounded(column: Variable, values: Array) -> Variable:
@@ -213,7 +239,7 @@ class ParameterBlock:
             if variables := getattr(layout, group):
                 content[group] = [self.values[v.name] for v in variables]
         for k, table in enumerate(self.tables):
-            content[f"table_{k}"] = table
+            content[f"table_{k}"] = table.T
         content["checksum"] = zlib.crc32(content.tobytes()[: layout.offset("checksum")])
         return content.tobytes()
 
@@ -250,7 +276,7 @@ def unpacked(content: bytes, layout: BlockLayout, place: str) -> ParameterBlock:
         if (variables := getattr(layout, group))
         for v, x in zip(variables, read[group], strict=True)
     }
-    tables = tuple(np.array(read[f"table_{k}"], dtype=float) for k in range(len(layout.tables)))
+    tables = tuple(np.array(read[f"table_{k}"], dtype=float).T for k in range(len(layout.tables)))
     digits = bytes(read["deck"]).hex()
     name = layout.deck if layout.deck_digest.startswith(digits) else f"deck {digits}"
     made = ParameterBlock(layout, values, tables, name, digits)

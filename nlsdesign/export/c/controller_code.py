@@ -68,7 +68,7 @@ def export_c(
     number = Real.named(real)
     if isinstance(model, LoadableModel):
         prefix = identifier(name or model.model.name)
-        layout = block_layout(model, prefix, number, tuple(paths_in_memory(model.parameters)))
+        layout = block_layout(model, prefix, number, paths_in_memory)
         model = model.model
     else:
         prefix, layout = identifier(name or model.name), None
