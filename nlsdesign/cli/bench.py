@@ -13,6 +13,7 @@ import click
 from ..foundation.command_words import typed_command
 from ..foundation.errors import MeasurementError
 from ..foundation.quantity import typeset_unit, with_error
+from .export_block import block_option, written_block
 from .options import (
     deck_option,
     export_option,
@@ -175,6 +176,7 @@ def _diagnosis_files(given: Mapping[str, Any]) -> list[str]:
 @spring_option
 @measured_option
 @workers_option
+@block_option
 @out_option("out/diagnosis", writes=_diagnosis_files)
 @json_option
 def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
@@ -221,6 +223,9 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
             machine = export_machine(flatten(verdict.actuator), out, observer=observer, **roles)
         content |= machine.content()
         sentences += machine.findings()
+    blocks, lacking = written_block(options["code"], verdict.actuator, out)
+    content |= _named(options["code"], blocks, lacking)
+    sentences += [*([f"block: {', '.join(map(str, blocks))}"] if blocks else []), *lacking]
     warn(remarks)
     if as_json:
         show_json(content)
@@ -244,6 +249,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
 @click.option("--known", type=NamedPath(dir_okay=False), default=None,
               help="joint_numbers.json of an earlier calibration, as what is known before.")  # fmt: skip
 @click.option("--plan", is_flag=True, help="Rank calibrations by what they would buy; needs no records.")
+@block_option
 @out_option(
     "out/calibration",  # and the deck, whose name is read
     writes=lambda given: ["plan.json"] if given["plan"] else ["joint_numbers.json", "calibration.json"],
@@ -257,6 +263,7 @@ def calibrate(
     plan: bool,
     out: Path,
     as_json: bool,
+    code: Path | None,
 ) -> None:
     """Turn bench tests into smaller spreads, or plan them. An afternoon is enough."""
     from ..bench.calibration import (
@@ -296,14 +303,23 @@ def calibrate(
     with steps.step("estimate"):
         result = calibrated(actuator, estimate(actuator, tests, prior=prior))
     paths = write_calibration(result, out, deck=deck.path)
+    blocks, lacking = written_block(code, result.actuator, out)
     if as_json:
-        show_json({**result.to_dict(), "deck": str(paths["deck"]), "joint": str(paths["joint"])})
+        files = {"deck": str(paths["deck"]), "joint": str(paths["joint"]), **_named(code, blocks, lacking)}
+        show_json({**result.to_dict(), **files})
         return
     heads = ("name", "before", "after", "unit", "moved, in spreads", "known from")
     show_table("Numbers", heads, shown_numbers(result.numbers))
     for sentence in (*record_findings(tests), *result.words()):
         click.echo(sentence)
-    click.echo(f"written: {', '.join(map(str, paths.values()))}")
+    for sentence in lacking:
+        click.echo(sentence)
+    click.echo(f"written: {', '.join(map(str, [*paths.values(), *blocks]))}")
+
+
+def _named(code: Path | None, blocks: Sequence[Path], lacking: Sequence[str]) -> dict[str, list[str]]:
+    """Return the files of a block for JSON, and why there are none; nothing where none was asked for."""
+    return {} if code is None else {"block": list(map(str, blocks)), "no_block": list(lacking)}
 
 
 def _check_calibration(kinds: tuple[str, ...], folders: tuple[Path, ...], plan: bool) -> None:

@@ -3,6 +3,7 @@
 Presentation and commands may import it; it reads models, and designs nothing.
 """
 
+from .c.asap2 import write_a2l
 from .c.block_files import read_parameter_block, write_parameter_block
 from .c.block_layout import BlockLayout, ParameterBlock
 from .c.coefficients import LoadableModel, loadable_model
@@ -30,11 +31,11 @@ from .mujoco.actuator_model import export_mujoco
 
 __all__ = [
     "ALL_PLATFORMS",
-    "BlockLayout",
     "CORTEX_M4F",
     "CORTEX_M7",
     "PROCESSORS",
     "Authorship",
+    "BlockLayout",
     "CSource",
     "CoSimulation",
     "Convergence",
@@ -62,6 +63,7 @@ __all__ = [
     "read_exports",
     "read_parameter_block",
     "read_ssp",
+    "write_a2l",
     "write_examples",
     "write_parameter_block",
     "write_reference",

@@ -143,7 +143,7 @@ def initialised(block: ParameterBlock, name: str) -> list[str]:
             lines += ["    {", *(f"        {line}" for line in numbers), "    },"]
         lines.append("},")
     lines += [f".checksum = 0x{block.checksum:08x}u,", ".unused = 0u,"]
-    head = f"/* Numbers of {comment(block.deck) or 'no deck'}, {block.deck_digest[:12] or 'made without one'}. */"
+    head = f"/* Numbers of {comment(block.deck) or 'no deck'}, {block.deck_digest[:12] or 'no digest'}. */"
     return [head, f"const {layout.name}_block {name} = {{", *(f"    {line}" for line in lines), "};"]
 
 

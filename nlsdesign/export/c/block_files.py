@@ -186,9 +186,11 @@ def _from_json(content: bytes, code: BlockLayout | None, place: str) -> Paramete
 def _restored(raw: Mapping[str, Any]) -> ParameterBlock:
     parameters, coefficients = (tuple(map(_variable, raw[group])) for group in ("parameters", "coefficients"))
     tables = tuple(map(_table, raw["tables"]))
+    states, inputs, outputs = (tuple(map(_variable, raw[group])) for group in _SEEN)
+    code = raw["code_deck"]
     layout = BlockLayout(
-        str(raw["code"]), Real.named(raw["real"]), str(raw["code_deck"]["name"]), str(raw["code_deck"]["sha256"]),
-        parameters, coefficients, tables, *(tuple(map(_variable, raw[group])) for group in _SEEN), str(raw["digest"]),
+        str(raw["code"]), Real.named(raw["real"]), str(code["name"]), str(code["sha256"]),
+        parameters, coefficients, tables, states, inputs, outputs, str(raw["digest"]),
     )  # fmt: skip
     values = {v.name: v.start for v in (*parameters, *coefficients)}
     if len(values) != len(parameters) + len(coefficients):

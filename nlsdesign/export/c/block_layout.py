@@ -8,7 +8,6 @@ lies in memory.
 from __future__ import annotations
 
 import hashlib
-import math
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -109,7 +108,7 @@ class BlockLayout:
     def block(self, numbers: BlockNumbers, names: tuple[str, ...], model: FlatModel) -> ParameterBlock:
         """Return the block with the numbers of another design; one out of range is an ``ExportError``.
 
-        ``names``: of the parameters, in the order of ``numbers``. ``model``: the design, which names its deck.
+        ``names``: of the parameters, in the order of ``numbers``. ``model``: the design, with its deck.
         """
         values = dict(zip(names, numbers.parameters, strict=True))
         values |= {v.name: x for v, x in zip(self.coefficients, numbers.coefficients, strict=True)}
@@ -143,8 +142,10 @@ def block_layout(
     ]  # fmt: skip
     digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()[:32]
     deck, deck_digest = (origin.deck, origin.digest) if origin else ("", "")
-    seen = (ordered(group) for group in (model.states, model.inputs, model.outputs))
-    return BlockLayout(name, real, deck, deck_digest, parameters, coefficients, tables, *seen, digest)
+    return BlockLayout(
+        name, real, deck, deck_digest, parameters, coefficients, tables,
+        ordered(model.states), ordered(model.inputs), ordered(model.outputs), digest,
+    )  # fmt: skip
 
 
 def _bounded(column: Variable, values: Array) -> Variable:

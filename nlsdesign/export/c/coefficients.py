@@ -1,9 +1,9 @@
 """Which constants of a step follow from the numbers of its deck: those that a block of numbers replaces.
 
-A design turns the numbers of a deck into constants of equations. Equations are written twice, from the deck
-and from one whose numbers are all a little different. What differs between both is a *coefficient*; it becomes
-a parameter of the equations. Coincidences of one deck, such as a quotient that is one and drops out, are those
-of no other, so the second equations give the form, and the first are read as a case of it.
+A design turns the numbers of a deck into constants of equations. They are written twice, from the deck and
+from one whose numbers are all a little different. What differs between both is a *coefficient*, and becomes
+a parameter of the equations. Coincidences of one deck, such as a quotient that is one and drops out, are
+those of no other, so the second equations give the form, and the first are read as a case of it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -40,7 +40,7 @@ _SPECIAL = {(ca.OP_MUL, ca.OP_NEG): -1.0, (ca.OP_MUL, ca.OP_TWICE): 2.0, (ca.OP_
 
 
 class BlockNumbers(NamedTuple):
-    """Numbers that a block holds: parameters and coefficients in order, and tables of shape (rows, columns)."""
+    """Numbers of a block: parameters and coefficients in order, and tables of shape (rows, columns)."""
 
     parameters: tuple[float, ...]
     coefficients: tuple[float, ...]
@@ -113,7 +113,9 @@ def loadable_model(model: FlatModel, moved: FlatModel) -> LoadableModel:
     }
     added = tuple(_coefficient(i, *pair, i in divisors) for i, pair in enumerate(found))
     symbols = ca.SX.sym(COEFFICIENT, len(added))
-    functions = {n: _rewritten(getattr(model, n), forms[n], members[n], symbols) for n in names}
+    functions: dict[str, Any] = {
+        n: _rewritten(getattr(model, n), forms[n], members[n], symbols) for n in names
+    }
     whole = replace(model, parameters=(*model.parameters, *added), **functions)
     return LoadableModel(whole, len(added), forms, members)
 
@@ -122,7 +124,7 @@ def _coefficient(number: int, value: float, moved: float, divides: bool) -> Vari
     size = WIDER * max(abs(value), abs(moved))
     low, high = (sorted((value / WIDER, value * WIDER))) if divides else (-size, size)
     return Variable(
-        f"{COEFFICIENT}[{number}]", "1", "constant of the equations that follows from the numbers of the deck",
+        f"{COEFFICIENT}[{number}]", "1", "constant of the equations that follows from the deck",
         start=value, nominal=abs(value) or 1.0, minimum=low, maximum=high,
     )  # fmt: skip
 
@@ -173,7 +175,7 @@ def _form(function: ca.Function) -> Graph:
 
 
 def _operands(form: Graph) -> list[tuple[int, int]]:
-    """Return where constants stand, in order: step and place, or for a result the step −1 and its constant."""
+    """Return where constants stand, in order: step and place, or −1 and the constant of a result."""
     constant = [step.operation == ca.OP_CONST for step in form.steps]
     inside = [
         (k, place)

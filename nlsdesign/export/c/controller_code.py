@@ -46,8 +46,8 @@ def export_c(
     Parameters
     ----------
     model
-        Discrete model: observer or controller. The code of a :class:`LoadableModel` takes over blocks of other
-        numbers at run time, by its function ``<name>_load``.
+        Discrete model: observer or controller. The code of a :class:`LoadableModel` takes over blocks of
+        other numbers at run time, by its function ``<name>_load``.
     folder
         Folder of the files; it is made if it is missing.
     real

@@ -41,7 +41,7 @@ def started(joint) -> Running:
 
 
 def test_a_loaded_block_makes_the_code_of_the_better_deck(joint, tmp_path):
-    source, code, better, _ = joint
+    _, _, better, _ = joint
     plain = recipe().designed(flatten(machine().with_values(BETTER)), controller)
     expected = Running(export_c(plain, tmp_path, real="float", name="better"), tmp_path)
     assert expected.call("init", None) == 0
@@ -166,7 +166,7 @@ def test_the_block_in_c_is_the_bytes_of_the_file(joint, tmp_path):
 
 
 def test_reading_refuses_damaged_and_foreign_files(joint, tmp_path):
-    source, code, better, _ = joint
+    source, _, better, _ = joint
     content = better.packed()
     file = tmp_path / "block.bin"
     foreign = replace(source.layout, digest="0" * 32, deck="other")
@@ -198,18 +198,18 @@ def test_reading_refuses_damaged_and_foreign_files(joint, tmp_path):
 
 def test_numbers_that_the_code_cannot_take_are_named(joint, tmp_path):
     _, code, _, _ = joint
-    with pytest.raises(ExportError, match="'motor.current_limit' is 40 A.*1e-06 to 20"):
+    with pytest.raises(ExportError, match=r"'motor\.current_limit' is 40 A.*1e-06 to 20"):
         block_for(code, machine().with_values({"motor.current_limit": 40.0}), controller)
-    with pytest.raises(ExportError, match="controller.bandwith.*is no parameter"):
+    with pytest.raises(ExportError, match=r"controller\.bandwith.*is no parameter"):
         code.with_values({"controller.bandwith": 3.0})
     assert code.with_values({"controller.bandwidth": 9.0}).values["controller.bandwidth"] == 9.0
-    with pytest.raises(ExportError, match="endings .json, .bin, .c"):
+    with pytest.raises(ExportError, match=r"endings \.json"):
         write_parameter_block(code, tmp_path / "block.hex")
 
 
 def test_a_deck_of_another_form_is_refused(joint):
     _, code, _, _ = joint
-    with pytest.raises(ExportError, match="grid points|other|points of the code"):
+    with pytest.raises(ExportError, match="export the code again"):
         block_for(code, machine().with_values({"spring.cam.last_angle": 1.0}), controller)
     with pytest.raises(ExportError, match="export the code again"):
         block_for(code, machine("test_rig"), controller)
