@@ -12,7 +12,7 @@ import numpy as np
 
 from nlsdesign.components import Assembly, declare
 from nlsdesign.components.assembly.deck_writer import deck_text
-from nlsdesign.export import CSource, ParameterBlock, export_c
+from nlsdesign.export import CSource, ParameterBlock, export_c_with_blocks
 from nlsdesign.export.c.writer import paths_in_memory
 from nlsdesign.feedback.control import ScheduledTorque, torque_controller
 from nlsdesign.feedback.observer import designed_observer
@@ -58,9 +58,8 @@ def loadable(kind: str = "cascade"):
 
 def exported(folder: Path, real: str, kind: str = "cascade") -> tuple[CSource, ParameterBlock]:
     """Write the joined step, and return the block of its design."""
-    source = export_c(loadable(kind), folder, real=real, name="joint")
-    assert source.layout is not None
-    return source, replace(source.layout.default, recipe=recipe(kind).to_dict())
+    source, layout = export_c_with_blocks(loadable(kind), folder, real=real, name="joint")
+    return source, replace(layout.default, recipe=recipe(kind).to_dict())
 
 
 class Running:

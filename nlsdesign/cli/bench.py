@@ -261,9 +261,8 @@ def calibrate(
     folders: tuple[Path, ...],
     known: Path | None,
     plan: bool,
-    out: Path,
     as_json: bool,
-    code: Path | None,
+    **files: Path,
 ) -> None:
     """Turn bench tests into smaller spreads, or plan them. An afternoon is enough."""
     from ..bench.calibration import (
@@ -284,6 +283,7 @@ def calibrate(
     from ..regeneration import errors_while_running
 
     _check_calibration(kinds, folders, plan)
+    out, code = files["out"], files["code"]
     deck = load_deck(deck_name)
     actuator = declare(deck)
     prior = read_joint_numbers(known) if known else None
@@ -305,8 +305,8 @@ def calibrate(
     paths = write_calibration(result, out, deck=deck.path)
     blocks, lacking = written_block(code, result.actuator, out)
     if as_json:
-        files = {"deck": str(paths["deck"]), "joint": str(paths["joint"]), **_named(code, blocks, lacking)}
-        show_json({**result.to_dict(), **files})
+        named = {"deck": str(paths["deck"]), "joint": str(paths["joint"]), **_named(code, blocks, lacking)}
+        show_json({**result.to_dict(), **named})
         return
     heads = ("name", "before", "after", "unit", "moved, in spreads", "known from")
     show_table("Numbers", heads, shown_numbers(result.numbers))

@@ -127,7 +127,7 @@ def _with_blocks(
 ) -> tuple[CSource, Path]:
     """Write code that takes blocks; return its files and that of the block of its design."""
     from ..components import deck_text
-    from ..export import export_c, write_parameter_block
+    from ..export import export_c_with_blocks, write_parameter_block
     from ..model import flatten
     from ..regeneration import CodeRecipe, SameTable
 
@@ -141,9 +141,8 @@ def _with_blocks(
     loadable = recipe.loadable(
         flatten(declared), lambda plant: controller_of(plant, chosen["sample_time"], **law)[0]
     )
-    source = export_c(loadable, out, real=chosen["real"], name=part.name)
-    assert source.layout is not None  # the model is loadable
-    block = replace(source.layout.default, recipe=recipe.to_dict())
+    source, layout = export_c_with_blocks(loadable, out, real=chosen["real"], name=part.name)
+    block = replace(layout.default, recipe=recipe.to_dict())
     return source, write_parameter_block(block, out / f"{part.name}_block.json")
 
 

@@ -4,6 +4,7 @@ Presentation and commands may import it; it reads models, and designs nothing.
 """
 
 from .c.asap2 import write_a2l
+from .c.block_code import export_c_with_blocks
 from .c.block_files import read_parameter_block, write_parameter_block
 from .c.block_layout import BlockLayout, ParameterBlock
 from .c.coefficients import LoadableModel, loadable_model
@@ -53,6 +54,7 @@ __all__ = [
     "convergence",
     "cosimulate",
     "export_c",
+    "export_c_with_blocks",
     "export_fmu",
     "export_modelica",
     "export_mujoco",

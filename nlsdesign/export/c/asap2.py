@@ -72,8 +72,8 @@ def write_a2l(
         if not re.fullmatch(r"[A-Za-z_]\w*", name):
             raise ExportError(f"symbol '{name}'", "is no name of a variable in C",
                               next_step="name a variable at file scope of the program")  # fmt: skip
-    found = elf_symbols(Path(elf), (block, instance)) if elf else dict.fromkeys((block, instance), 0)
-    text = a2l_text(layout, Symbol(block, found[block]), Symbol(instance, found[instance]))
+    addresses = elf_symbols(Path(elf), (block, instance)) if elf else dict.fromkeys((block, instance), 0)
+    text = a2l_text(layout, Symbol(block, addresses[block]), Symbol(instance, addresses[instance]))
     write_text(Path(path), text)
     return Path(path)
 
@@ -154,7 +154,12 @@ class _Description:
     def characteristics(self) -> Iterator[str]:
         """Yield the numbers of the block."""
         layout = self.layout
-        yield from self._words(layout)
+        unsigned = [(member, layout.offset(member)) for member in (*_HEAD, "checksum")]
+        unsigned += [(f"digest[{i}]", layout.offset("digest") + 4 * i) for i in range(4)]
+        unsigned += [(f"deck[{i}]", layout.offset("deck") + 4 * i) for i in range(2)]
+        for name, at in unsigned:
+            limited = Variable(name, "1", f"{name} of the block", minimum=0, maximum=4294967295)
+            yield from self._value(f"{layout.name}.block.{name}", limited, at, "word")
         for group in ("parameters", "coefficients"):
             start = layout.offset(group) if getattr(layout, group) else 0
             for i, v in enumerate(getattr(layout, group)):
@@ -166,20 +171,9 @@ class _Description:
                 name = f"{layout.name}.table_{k}.{column.name}"
                 yield from self._curve(name, column, at, (table.argument, unit, table.grid.tolist()))
 
-    def _words(self, layout: BlockLayout) -> Iterator[str]:
-        words = [*((w, layout.offset(w)) for w in (*_HEAD, "checksum"))]
-        words += [(f"digest[{i}]", layout.offset("digest") + 4 * i) for i in range(4)]
-        words += [(f"deck[{i}]", layout.offset("deck") + 4 * i) for i in range(2)]
-        for name, at in words:
-            yield f"    /begin CHARACTERISTIC {layout.name}.block.{name}"
-            yield f"      {_string(f'{name} of the block')} VALUE {self._address(self.block, at)} word 0"
-            yield f"      {_method('1')} 0 4294967295"
-            yield f'      SYMBOL_LINK "{self.block.name}" {at}'
-            yield "    /end CHARACTERISTIC"
-
-    def _value(self, name: str, v: Variable, at: int) -> Iterator[str]:
+    def _value(self, name: str, v: Variable, at: int, record: str = "number") -> Iterator[str]:
         yield f"    /begin CHARACTERISTIC {_identifier(name)}"
-        yield f"      {_string(v.description)} VALUE {self._address(self.block, at)} number 0"
+        yield f"      {_string(v.description)} VALUE {self._address(self.block, at)} {record} 0"
         yield f"      {_method(v.unit)} {self._limits(v)}"
         yield f'      SYMBOL_LINK "{self.block.name}" {at}'
         yield "    /end CHARACTERISTIC"
@@ -266,7 +260,7 @@ def elf_symbols(path: Path, wanted: Sequence[str]) -> Mapping[str, int]:
     try:
         if path.stat().st_size > _LARGEST_ELF:
             raise ExportError(str(path), f"has more than {_LARGEST_ELF >> 20} MB, no firmware has")
-        found = dict(_symbols(path.read_bytes()))
+        addresses = dict(_symbols(path.read_bytes()))
     except OSError as error:
         raise ExportError(str(path), f"cannot be read: {error.strerror or error}") from None
     except (struct.error, IndexError, ValueError) as error:
@@ -275,12 +269,12 @@ def elf_symbols(path: Path, wanted: Sequence[str]) -> Mapping[str, int]:
             next_step="name the linked program, not stripped",
         ) from None  # fmt: skip
     for name in wanted:
-        if name not in found:
+        if name not in addresses:
             raise ExportError(
-                f"{path}: symbol '{name}'", "does not exist", did_you_mean=nearest(name, list(found)),
+                f"{path}: symbol '{name}'", "does not exist", did_you_mean=nearest(name, list(addresses)),
                 next_step="give the names of the variables with --block-symbol and --instance-symbol",
             )  # fmt: skip
-    return {name: found[name] for name in wanted}
+    return {name: addresses[name] for name in wanted}
 
 
 def _symbols(content: bytes) -> Iterator[tuple[str, int]]:

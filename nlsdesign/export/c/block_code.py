@@ -3,61 +3,88 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
-from ...model.flat import Table, Variable
-from .block_layout import MAGIC, VERSION, BlockLayout, ParameterBlock
-from .c_text import comment, signature
-from .writer import CWriter, paths_in_memory
+from ...model.flat import Variable
+from .block_layout import MAGIC, VERSION, BlockLayout, ParameterBlock, block_layout
+from .c_text import Real, comment, identifier, signature
+from .coefficients import LoadableModel
+from .controller_code import write_step
+from .writer import CSource, CWriter, paths_in_memory
 
 _PER_LINE = 6
 """Numbers of a row in a line of C."""
 
 
-def block_declarations(c: CWriter) -> dict[str, str | list[str]]:
-    """Return what the header says of blocks; nothing for code whose numbers are fixed."""
-    layout = c.layout
-    if layout is None:
-        return {"block": [], "loaded": [], "load": []}
+def export_c_with_blocks(
+    loadable: LoadableModel, folder: str | Path, *, real: Real | str = Real.DOUBLE, name: str | None = None
+) -> tuple[CSource, BlockLayout]:
+    """Write C as :func:`~nlsdesign.export.export_c` does, which takes blocks of other numbers at run time.
+
+    Parameters
+    ----------
+    loadable
+        Discrete model with its coefficients.
+    folder
+        Folder of the files; it is made if it is missing.
+    real
+        ``"double"`` or ``"float"``.
+    name
+        Prefix of all C names; made from the name of the model by default.
+
+    Returns
+    -------
+    tuple
+        Names of the files, and the layout of the blocks.
+
+    Raises
+    ------
+    ExportError
+        If the model depends on time, cannot be written in C, or the folder cannot be written.
+    """
+    number, prefix = Real.named(real), identifier(name or loadable.model.name)
+    layout = block_layout(loadable, prefix, number, paths_in_memory)
+    c = CWriter(loadable.model, prefix, number, loadable.coefficients)
+    return write_step(c, folder, {**_declarations(c, layout), **_functions(c, layout)}), layout
+
+
+def _declarations(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
+    """Return what the header says of blocks."""
     count = len(layout.coefficients)
-    coefficients = [
-        f"{c.real} coefficients[{count}]; /* constants of the equations that follow from the deck */"
-    ]
+    own = f"{c.real} coefficients[{count}]; /* constants of the equations that follow from the deck */"
+    coefficients = [own] if count else []
     values: dict[str, str | list[str]] = {
         "magic": f"0x{MAGIC:08x}u",
         "version": f"{VERSION}u",
         "size": str(layout.size),
         "parameters_member": [f"{c.name}_parameters parameters;"] if layout.parameters else [],
-        "coefficients_member": coefficients if count else [],
+        "coefficients_member": coefficients,
         "table_members": _table_members(layout, by_row=False),
     }
     return {
         "block": [*c.filled("controller_block.h", values).splitlines(), ""],
         "loaded": [
-            *(coefficients if count else []),
+            *coefficients,
             *_table_members(layout, by_row=True),
             "uint32_t status; /* last word of step */",
             "uint32_t loaded; /* first digits of the deck whose numbers are in force */",
         ],
-        "load": [*c.filled("controller_load.h", {"load": _head(c.name)}).splitlines(), ""],
+        "load_head": [*c.filled("controller_load.h", {"load": _head(c.name)}).splitlines(), ""],
     }
 
 
-def block_functions(c: CWriter, derived: bool) -> dict[str, str | list[str]]:
-    """Return what the source has for blocks; nothing for code whose numbers are fixed.
-
-    ``derived``: whether numbers follow from the parameters.
-    """
-    layout = c.layout
-    if layout is None:
-        return {name: [] for name in ("default_block", "block_check", "take_block", "load", "noted")}
-    derive = [f"{c.name}_derive(state);"] if derived else []
+def _functions(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
+    """Return what the source has for blocks."""
+    crc = list(range(16))
+    for _ in range(4):
+        crc = [(k >> 1) ^ (0xEDB88320 if k & 1 else 0) for k in crc]
     values: dict[str, str | list[str]] = {
-        "half_bytes": _lines([f"0x{_half_byte(k):08x}u" for k in range(16)]),
+        "half_bytes": _lines([f"0x{k:08x}u" for k in crc]),
         "bytes": str(layout.offset("checksum")),
-        "ranges": _ranges(c, layout),
+        "ranges": _ranges(layout),
         "taken": _taken(layout),
         "load": _head(c.name),
-        "derived": derive,
+        "derived": [f"{c.name}_derive(state);"] if c.equations.numbers.numel() else [],
     }
     return {
         "default_block": [*initialised(layout.default, f"{c.name}_default_block"), ""],
@@ -72,29 +99,20 @@ def _head(name: str) -> str:
     return signature(f"{name}_block_result {name}_load", f"{name}_state *state", f"const {name}_block *block")
 
 
-def _half_byte(number: int) -> int:
-    """Return what the CRC-32 becomes by half a byte."""
-    for _ in range(4):
-        number = (number >> 1) ^ (0xEDB88320 if number & 1 else 0)
-    return number
-
-
 def _table_members(layout: BlockLayout, *, by_row: bool) -> list[str]:
-    return [
-        f"{layout.real} table_{k}{_size(t, by_row)}; /* over {comment(t.argument)}: "
-        f"{comment(', '.join(f'{v.name} [{v.unit}]' for v in t.columns))} */"
-        for k, t in enumerate(layout.tables)
-    ]
+    lines = []
+    for k, table in enumerate(layout.tables):
+        rows, columns = table.values.shape
+        size = f"[{rows}][{columns}]" if by_row else f"[{columns}][{rows}]"
+        names = comment(", ".join(f"{v.name} [{v.unit}]" for v in table.columns))
+        lines.append(f"{layout.real} table_{k}{size}; /* over {comment(table.argument)}: {names} */")
+    return lines
 
 
-def _size(table: Table, by_row: bool) -> str:
-    rows, columns = table.values.shape
-    return f"[{rows}][{columns}]" if by_row else f"[{columns}][{rows}]"
-
-
-def _ranges(c: CWriter, layout: BlockLayout) -> list[str]:
+def _ranges(layout: BlockLayout) -> list[str]:
     def call(v: Variable, text: str) -> str:
-        return f"wrong |= outside(block->{text}, {c.real.bound(v.minimum)}, {c.real.bound(v.maximum)});"
+        limits = f"{layout.real.bound(v.minimum)}, {layout.real.bound(v.maximum)}"
+        return f"wrong |= outside(block->{text}, {limits});"
 
     paths = paths_in_memory(layout.parameters)
     lines = [call(v, f"parameters.{paths[v.name]}") for v in layout.parameters]
@@ -132,7 +150,9 @@ def initialised(block: ParameterBlock, name: str) -> list[str]:
     ]  # fmt: skip
     paths = paths_in_memory(layout.parameters)
     for v in layout.parameters:
-        lines.append(f".parameters.{paths[v.name]} = {real.literal(block.values[v.name])}, /* {_range(v)} */")
+        remark = f"{comment(v.unit)}, {v.minimum:.6g} to {v.maximum:.6g}"
+        value = real.literal(block.values[v.name])
+        lines.append(f".parameters.{paths[v.name]} = {value}, /* {remark} */")
     if layout.coefficients:
         numbers = [real.literal(block.values[v.name]) for v in layout.coefficients]
         lines += [".coefficients = {", *(f"    {line}" for line in _lines(numbers)), "},"]
@@ -145,10 +165,6 @@ def initialised(block: ParameterBlock, name: str) -> list[str]:
     lines += [f".checksum = 0x{block.checksum:08x}u,", ".unused = 0u,"]
     head = f"/* Numbers of {comment(block.deck) or 'no deck'}, {block.deck_digest[:12] or 'no digest'}. */"
     return [head, f"const {layout.name}_block {name} = {{", *(f"    {line}" for line in lines), "};"]
-
-
-def _range(v: Variable) -> str:
-    return f"{comment(v.unit)}, {v.minimum:.6g} to {v.maximum:.6g}"
 
 
 def _lines(items: Sequence[str]) -> list[str]:

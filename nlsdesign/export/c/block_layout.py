@@ -94,7 +94,13 @@ class BlockLayout:
         return int(self.record.itemsize)
 
     def offset(self, member: str) -> int:
-        """Return the bytes before a member of the structure."""
+        """Return the bytes before a member of the structure.
+
+        Parameters
+        ----------
+        member
+            Name of a member.
+        """
         fields: Any = self.record.fields
         return int(fields[member][1])
 
@@ -106,9 +112,21 @@ class BlockLayout:
         return ParameterBlock(self, values, tables, self.deck, self.deck_digest)
 
     def block(self, numbers: BlockNumbers, names: tuple[str, ...], model: FlatModel) -> ParameterBlock:
-        """Return the block with the numbers of another design; one out of range is an ``ExportError``.
+        """Return the block with the numbers of another design.
 
-        ``names``: of the parameters, in the order of ``numbers``. ``model``: the design, with its deck.
+        Parameters
+        ----------
+        numbers
+            As :meth:`LoadableModel.numbers_of` gives them.
+        names
+            Of the parameters, in their order.
+        model
+            The design, with its deck.
+
+        Raises
+        ------
+        ExportError
+            If a number is out of its range.
         """
         values = dict(zip(names, numbers.parameters, strict=True))
         values |= {v.name: x for v, x in zip(self.coefficients, numbers.coefficients, strict=True)}
@@ -131,7 +149,14 @@ def block_layout(
         by_name = {v.name: v for v in group}
         return tuple(by_name[n] for n in in_memory(group))
 
-    tables = tuple(replace(t, columns=tuple(map(_bounded, t.columns, t.values.T))) for t in model.tables)
+    sizes = [WIDER * np.max(np.abs(t.values), axis=0) for t in model.tables]
+    tables = tuple(
+        replace(t, columns=tuple(
+            replace(v, minimum=-(float(most) or 1.0), maximum=float(most) or 1.0)
+            for v, most in zip(t.columns, size, strict=True)
+        ))
+        for t, size in zip(model.tables, sizes, strict=True)
+    )  # fmt: skip
     parameters = ordered(loadable.parameters)
     coefficients = model.parameters[len(parameters) :]
     lines = [
@@ -146,11 +171,6 @@ def block_layout(
         name, real, deck, deck_digest, parameters, coefficients, tables,
         ordered(model.states), ordered(model.inputs), ordered(model.outputs), digest,
     )  # fmt: skip
-
-
-def _bounded(column: Variable, values: Array) -> Variable:
-    size = WIDER * float(np.max(np.abs(values))) or 1.0
-    return replace(column, minimum=-size, maximum=size)
 
 
 @dataclass(frozen=True, eq=False)

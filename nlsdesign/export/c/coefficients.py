@@ -51,8 +51,16 @@ class BlockNumbers(NamedTuple):
 class LoadableModel:
     """A discrete model whose coefficients are its last parameters.
 
-    ``members`` holds for each function of the model and each constant of its form the number of the
-    coefficient, or the constant itself; ``forms`` holds the forms.
+    Parameters
+    ----------
+    model
+        With the numbers of its deck.
+    coefficients
+        How many of the last parameters are coefficients.
+    forms
+        Operations of each function of the model.
+    members
+        For each function and each constant of its form the number of the coefficient, or the constant itself.
     """
 
     model: FlatModel
@@ -73,45 +81,62 @@ class LoadableModel:
     def numbers_of(self, other: FlatModel) -> BlockNumbers:
         """Return the numbers with which these equations become those of another design.
 
-        A design of another form, interface or grid is an ``ExportError``.
+        Parameters
+        ----------
+        other
+            Designed alike for another deck.
+
+        Raises
+        ------
+        ExportError
+            If it has another form, interface or grid.
         """
         _same_interface(self.model, other, len(self.parameters))
-        found: dict[int, float] = {}
+        solved: dict[int, float] = {}
         for name, form in self.forms.items():
             values = _constants(form, _form(getattr(other, name)), other.name)
             for member, value in zip(self.members[name], values, strict=True):
-                known = found.setdefault(member, value) if isinstance(member, int) else member
+                known = solved.setdefault(member, value) if isinstance(member, int) else member
                 if not _same(known, value):
                     raise _other_form(other.name, f"has the constant {value:.9g} in place of {known:.9g}")
         parameters = tuple(v.start for v in other.parameters)
         tables = tuple(np.asarray(table.values, dtype=float) for table in other.tables)
-        return BlockNumbers(parameters, tuple(found[i] for i in range(self.coefficients)), tables)
+        return BlockNumbers(parameters, tuple(solved[i] for i in range(self.coefficients)), tables)
 
 
 def loadable_model(model: FlatModel, moved: FlatModel) -> LoadableModel:
     """Return a discrete model with its coefficients as parameters.
 
-    ``moved``: the same design for numbers that all differ a little. Designs of different forms are an
-    ``ExportError``.
+    Parameters
+    ----------
+    model
+        Observer, controller or both.
+    moved
+        The same design for numbers that all differ a little.
+
+    Raises
+    ------
+    ExportError
+        If both have different forms.
     """
     _same_interface(model, moved, len(model.parameters))
     names = [name for name in ("equations", "begin", "expected") if getattr(model, name) is not None]
     forms = {name: _form(getattr(moved, name)) for name in names}
-    found: dict[tuple[float, float], int] = {}
+    numbered: dict[tuple[float, float], int] = {}
     members: dict[str, tuple[int | float, ...]] = {}
     for name, form in forms.items():
         pairs = zip(_constants(form, _form(getattr(model, name)), model.name), _own(form), strict=True)
         members[name] = tuple(
-            value if _same(value, other) else found.setdefault((value, other), len(found))
+            value if _same(value, other) else numbered.setdefault((value, other), len(numbered))
             for value, other in pairs
         )
     divisors = {
-        member
+        members[name][n]
         for name, form in forms.items()
-        for member, divides in zip(members[name], _divisors(form), strict=True)
-        if divides
+        for n, (k, place) in enumerate(_operands(form))
+        if k >= 0 and form.steps[k].operation == ca.OP_DIV and place == 1
     }
-    added = tuple(_coefficient(i, *pair, i in divisors) for i, pair in enumerate(found))
+    added = tuple(_coefficient(i, *pair, i in divisors) for i, pair in enumerate(numbered))
     symbols = ca.SX.sym(COEFFICIENT, len(added))
     functions: dict[str, Any] = {
         n: _rewritten(getattr(model, n), forms[n], members[n], symbols) for n in names
@@ -194,11 +219,6 @@ def _own(form: Graph) -> list[float]:
     ]
 
 
-def _divisors(form: Graph) -> list[bool]:
-    """Return for each constant of a form whether something is divided by it."""
-    return [k >= 0 and form.steps[k].operation == ca.OP_DIV and place == 1 for k, place in _operands(form)]
-
-
 def _constants(form: Graph, other: Graph, name: str) -> list[float]:
     """Return the constants with which a form gives the same operations as another graph; refuse others."""
     reading = _Reading(form, other, name)
@@ -237,18 +257,18 @@ class _Reading:
 
     def _is(self, k: int, candidate: int) -> bool:
         """Take an operation as it is; its constants are noted."""
-        step, found = self.form.steps[k], self.other.steps[candidate]
-        if step.operation != found.operation:
+        step, candidate_step = self.form.steps[k], self.other.steps[candidate]
+        if step.operation != candidate_step.operation:
             return False
         values = []
-        for mine, its in zip(step.operands, found.operands, strict=True):
-            if (self.form.steps[mine].operation == ca.OP_CONST) != (
+        for operand, its in zip(step.operands, candidate_step.operands, strict=True):
+            if (self.form.steps[operand].operation == ca.OP_CONST) != (
                 self.other.steps[its].operation == ca.OP_CONST
             ):
                 return False
-            if self.form.steps[mine].operation == ca.OP_CONST:
+            if self.form.steps[operand].operation == ca.OP_CONST:
                 values.append(float(self.other.steps[its].extra))
-            elif self.at[mine] != its:
+            elif self.at[operand] != its:
                 return False
         self.values += values
         return True
@@ -277,10 +297,10 @@ class _Reading:
         """Return all constants; refuse a graph with further operations or other results."""
         places = sorted(self.form.results.items())
         agree = not self.following and [p for p, _ in places] == sorted(self.other.results)
-        for place, mine in places if agree else ():
+        for place, number in places if agree else ():
             its = self.other.results[place]
-            if self.form.steps[mine].operation != ca.OP_CONST:
-                agree = agree and self.at[mine] == its
+            if self.form.steps[number].operation != ca.OP_CONST:
+                agree = agree and self.at[number] == its
             elif self.other.steps[its].operation == ca.OP_CONST:
                 self.values.append(float(self.other.steps[its].extra))
             else:

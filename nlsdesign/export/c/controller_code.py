@@ -6,6 +6,7 @@ and outputs stay finite, the status word says what was held. The arithmetic is C
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import casadi as ca
@@ -14,10 +15,7 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import write_all
-from .block_code import block_declarations, block_functions
-from .block_layout import block_layout
 from .c_text import Real, comment, identifier, signature
-from .coefficients import LoadableModel
 from .elementary import elementary_functions
 from .guarded_step import STATUS_BITS, first_outputs, index_bit
 from .programs import selftest_source
@@ -27,27 +25,25 @@ from .writer import (
     CWriter,
     derived_statements,
     guard_functions,
-    paths_in_memory,
     settled_functions,
     step_body,
     take_statements,
 )
 
+_PLACES = ("block", "loaded", "load_head", "default_block", "block_check", "take_block", "load", "noted")
+WITHOUT_BLOCKS: Mapping[str, list[str]] = {name: [] for name in _PLACES}
+"""What header and source of code whose numbers are fixed say of blocks of numbers."""
+
 
 def export_c(
-    model: FlatModel | LoadableModel,
-    folder: str | Path,
-    *,
-    real: Real | str = Real.DOUBLE,
-    name: str | None = None,
+    model: FlatModel, folder: str | Path, *, real: Real | str = Real.DOUBLE, name: str | None = None
 ) -> CSource:
     """Write ``<name>.h``, ``<name>.c`` and ``<name>_selftest.c`` for a discrete model.
 
     Parameters
     ----------
     model
-        Discrete model: observer or controller. The code of a :class:`LoadableModel` takes over blocks of
-        other numbers at run time, by its function ``<name>_load``.
+        Discrete model: observer or controller.
     folder
         Folder of the files; it is made if it is missing.
     real
@@ -65,19 +61,19 @@ def export_c(
     ExportError
         If the model is continuous, depends on time, cannot be written in C, or the folder cannot be written.
     """
-    number = Real.named(real)
-    if isinstance(model, LoadableModel):
-        prefix = identifier(name or model.model.name)
-        layout = block_layout(model, prefix, number, paths_in_memory)
-        model = model.model
-    else:
-        prefix, layout = identifier(name or model.name), None
+    return write_step(
+        CWriter(model, identifier(name or model.name), Real.named(real)), folder, WITHOUT_BLOCKS
+    )
+
+
+def write_step(c: CWriter, folder: str | Path, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) -> CSource:
+    """Write header, source and self-test of a step; ``blocks``: as :data:`WITHOUT_BLOCKS`."""
+    model = c.model
     check_discrete(model)
-    c = CWriter(model, prefix, number, layout)
     header, source, selftest = (Path(folder) / f"{c.name}{end}" for end in (".h", ".c", "_selftest.c"))
-    texts = {header: header_text(c), source: source_text(c), selftest: selftest_source(c)}
+    texts = {header: header_text(c, blocks), source: source_text(c, blocks), selftest: selftest_source(c)}
     write_all({path: stamped(text, model) for path, text in texts.items()})
-    return CSource(c.name, model, c.real, header, source, selftest, layout)
+    return CSource(c.name, model, c.real, header, source, selftest, c.coefficients)
 
 
 def check_discrete(model: FlatModel) -> None:
@@ -103,7 +99,7 @@ def check_discrete(model: FlatModel) -> None:
         )
 
 
-def header_text(c: CWriter) -> str:
+def header_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) -> str:
     """Return the header file, its parts in the order of the file."""
     upper, count, derived = c.name.upper(), len(c.readings), c.equations.numbers.numel()
     values: dict[str, str | list[str]] = {
@@ -124,14 +120,14 @@ def header_text(c: CWriter) -> str:
         else [],
         "derived": [f"{c.real} derived[{derived}]; /* follows from the parameters */"] if derived else [],
         **_heads(c.name),
-        **block_declarations(c),
+        **blocks,
     }
     version_of_interface = "@interface@"  # known once all else is written
     text = c.filled("controller.h", values | {"interface": version_of_interface})
     return text.replace(version_of_interface, interface_version(text, c.model))
 
 
-def source_text(c: CWriter) -> str:
+def source_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) -> str:
     """Return the C file, its parts in the order of the file."""
     model, real = c.model, c.real
     title, outputs = _title(model), first_outputs(model, real)
@@ -171,7 +167,7 @@ def source_text(c: CWriter) -> str:
         "settled": settled,
         "take": take_statements(c),
         "body": body,
-        **block_functions(c, bool(derived)),
+        **blocks,
     }
     return c.filled("controller.c", _heads(c.name) | values)
 

@@ -19,7 +19,6 @@ import casadi as ca
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Symbols, Variable
 from ..files import filled
-from .block_layout import BlockLayout
 from .c_text import Real, comment, identifier
 from .elementary import own_functions
 from .guarded_step import (
@@ -56,8 +55,9 @@ class CSource:
         Number type; it is also the text ``"double"`` or ``"float"``.
     header, source, selftest
         Paths of the interface, of the functions, and of a program that tests them.
-    layout
-        Of the blocks of numbers that the code takes at run time; ``None`` where its numbers are fixed.
+    coefficients
+        How many of the last parameters are coefficients, which blocks of numbers replace at run time;
+        ``None`` where the numbers of the code are fixed.
     """
 
     name: str
@@ -66,12 +66,12 @@ class CSource:
     header: Path
     source: Path
     selftest: Path
-    layout: BlockLayout | None = None
+    coefficients: int | None = None
 
     @property
     def writer(self) -> CWriter:
         """What the files were written with."""
-        return CWriter(self.model, self.name, self.real, self.layout)
+        return CWriter(self.model, self.name, self.real, self.coefficients)
 
 
 class MemberPaths(NamedTuple):
@@ -113,13 +113,12 @@ class CWriter:
     model: FlatModel
     name: str
     real: Real = Real.DOUBLE
-    layout: BlockLayout | None = None
+    coefficients: int | None = None
 
     @property
     def parameters(self) -> tuple[Variable, ...]:
         """Parameters of the model that are members of a structure; coefficients are none."""
-        last = len(self.layout.coefficients) if self.layout else 0
-        return self.model.parameters[: len(self.model.parameters) - last]
+        return self.model.parameters[: len(self.model.parameters) - (self.coefficients or 0)]
 
     @cached_property
     def paths(self) -> MemberPaths:
@@ -145,7 +144,7 @@ class CWriter:
     @cached_property
     def tables(self) -> list[CTable]:
         """Tables of the model."""
-        return c_tables(self.model, self.real, owner="state->" if self.layout else "")
+        return c_tables(self.model, self.real, owner="" if self.coefficients is None else "state->")
 
     @cached_property
     def arguments(self) -> dict[str, str]:

@@ -51,7 +51,7 @@ void @name@_defaults(@name@_parameters *parameters);
 /* Takes over parameters, each only if it is within its range. Returns a status word; before init nothing is taken. */
 @set_parameters@;
 
-@load@
+@load_head@
 /* Computes the outputs of this sample and the state of the next. Returns a status word. Before init, with a state
    of any content, all outputs are 0 and the word is @NAME@_NOT_STARTED. */
 @step@;

@@ -25,8 +25,8 @@ TYPES = {"FLOAT32_IEEE": "f", "FLOAT64_IEEE": "d", "ULONG": "I"}
 def joint(request, tmp_path_factory):
     """Return the code of the published machine and its description without addresses."""
     folder = tmp_path_factory.mktemp(request.param)
-    source, _ = exported(folder, request.param)
-    return source, write_a2l(source.layout, folder / "joint.a2l"), folder
+    _, code = exported(folder, request.param)
+    return code.layout, write_a2l(code.layout, folder / "joint.a2l"), folder
 
 
 class Block:
@@ -91,8 +91,8 @@ def entries(found: Block) -> dict[str, tuple[str, int, str]]:
 
 
 def test_every_offset_and_type_is_that_of_the_compiler(joint):
-    source, path, folder = joint
-    layout, found = source.layout, entries(module(path))
+    layout, path, folder = joint
+    found = entries(module(path))
     members = {f"joint.block.{w}": ("block", w) for w in ("magic", "version", "size", "checksum")}
     members |= {f"joint.block.digest[{i}]": ("block", f"digest[{i}]") for i in range(4)}
     members |= {f"joint.block.deck[{i}]": ("block", f"deck[{i}]") for i in range(2)}
@@ -109,7 +109,7 @@ def test_every_offset_and_type_is_that_of_the_compiler(joint):
         for j, v in enumerate(table.columns)
     }
     for group in ("inputs", "states", "outputs"):
-        paths = paths_in_memory(getattr(source.model, group))
+        paths = paths_in_memory(getattr(layout, group))
         members |= {f"joint.{group}.{name}": ("state", f"{group}.{path}") for name, path in paths.items()}
     members |= {f"joint.{name}": ("state", name) for name in ("status", "loaded")}
     assert members.keys() == found.keys()
@@ -131,17 +131,17 @@ def test_every_offset_and_type_is_that_of_the_compiler(joint):
 
 
 def test_units_ranges_and_axes_are_those_of_the_model(joint):
-    source, path, _ = joint
+    layout, path, _ = joint
     found = module(path)
     assert "MSB_LAST" in found.of("MOD_COMMON")[0].after("BYTE_ORDER", 1)
     by_name = {each.items[0]: each for each in found.of("CHARACTERISTIC")}
     shown = {each.items[0]: each.items[-1].strip('"') for each in found.of("COMPU_METHOD")}
-    for v in source.layout.parameters:
+    for v in layout.parameters:
         each = by_name[f"joint.{v.name}"]
         assert shown[each.items[6]] == ("" if v.unit == "1" else v.unit)
-        assert float(each.items[7]) == max(v.minimum, -source.real.largest)
-        assert float(each.items[8]) == min(v.maximum, source.real.largest)
-    (table, *_) = source.layout.tables
+        assert float(each.items[7]) == max(v.minimum, -layout.real.largest)
+        assert float(each.items[8]) == min(v.maximum, layout.real.largest)
+    (table, *_) = layout.tables
     curve = by_name[f"joint.table_0.{table.columns[0].name}"]
     (axis,) = curve.of("AXIS_DESCR")
     assert axis.items[:3] == ["FIX_AXIS", "joint.inputs.motor.angle", "unit_rad"]
@@ -166,7 +166,7 @@ def test_an_independent_reader_finds_nothing_wrong(joint, tmp_path):
 
 @pytest.mark.parametrize("target", ["x86_64-freestanding", "thumb-freestanding-eabihf"])
 def test_addresses_come_from_the_program(joint, target, tmp_path):
-    source, _, folder = joint
+    layout, _, folder = joint
     main, elf = tmp_path / "main.c", tmp_path / "main.elf"
     main.write_text(
         '#include "joint.h"\njoint_block block;\njoint_state state;\n'
@@ -178,7 +178,7 @@ def test_addresses_come_from_the_program(joint, target, tmp_path):
     )
     places = elf_symbols(elf, ("block", "state"))
     assert min(places.values()) > 0
-    found = module(write_a2l(source.layout, tmp_path / "placed.a2l", elf=elf))
+    found = module(write_a2l(layout, tmp_path / "placed.a2l", elf=elf))
     for each in found.of("MEASUREMENT"):
         offset = int(each.after("SYMBOL_LINK", 2)[1])
         assert int(each.after("ECU_ADDRESS", 1)[0], 16) == places["state"] + offset
@@ -194,14 +194,14 @@ def test_addresses_come_from_the_program(joint, target, tmp_path):
 
 
 def test_programs_without_the_symbols_are_refused(joint, tmp_path):
-    source, path, _ = joint
+    layout, path, _ = joint
     with pytest.raises(ExportError, match="is no ELF file"):
-        write_a2l(source.layout, tmp_path / "x.a2l", elf=path)
+        write_a2l(layout, tmp_path / "x.a2l", elf=path)
     (tmp_path / "short.elf").write_bytes(b"\x7fELF\x01\x01")
     with pytest.raises(ExportError, match="is no ELF file"):
-        write_a2l(source.layout, tmp_path / "x.a2l", elf=tmp_path / "short.elf")
+        write_a2l(layout, tmp_path / "x.a2l", elf=tmp_path / "short.elf")
     with pytest.raises(ExportError, match="cannot be read"):
-        write_a2l(source.layout, tmp_path / "x.a2l", elf=tmp_path / "none.elf")
+        write_a2l(layout, tmp_path / "x.a2l", elf=tmp_path / "none.elf")
     with pytest.raises(ExportError, match="is no name of a variable"):
-        write_a2l(source.layout, tmp_path / "x.a2l", block="my block")
+        write_a2l(layout, tmp_path / "x.a2l", block="my block")
     assert not (tmp_path / "x.a2l").exists()

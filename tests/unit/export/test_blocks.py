@@ -6,12 +6,13 @@ import struct
 import zlib
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.export import export_c, read_parameter_block, write_parameter_block
+from nlsdesign.export import export_c, loadable_model, read_parameter_block, write_parameter_block
 from nlsdesign.foundation.errors import ExportError
-from nlsdesign.model import flatten
+from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.regeneration import block_for
 from tests.blocks import BETTER, Running, controller, exported, machine, motion, recipe
 
@@ -70,10 +71,11 @@ def test_both_halves_of_a_joined_step_get_the_numbers(joint):
     Where the controller alone knows that the motor is weaker, the observer expects another motion.
     """
     source, code, _, _ = joint
+    layout = code.layout
     weaker = block_for(code, machine().with_values({"motor.torque_constant": 0.0495}), controller)
     whole, half, design = started(joint), started(joint), started(joint)
     assert whole.load(weaker.packed()) == FITS
-    given = np.array([weaker.values[v.name] for v in source.layout.parameters], np.float32)
+    given = np.array([weaker.values[v.name] for v in layout.parameters], np.float32)
     assert half.call("set_parameters", given) == 0
     names = [v.name for v in source.model.outputs]
     current, speed = names.index("motor.current"), names.index("motor.speed")
@@ -120,8 +122,9 @@ def test_any_flipped_bit_is_refused(joint):
 
 
 def test_a_number_out_of_range_at_the_end_of_a_table_is_seen(joint):
-    source, _, better, _ = joint
-    place = source.layout.offset("checksum") - 4
+    _, _, better, _ = joint
+    layout = better.layout
+    place = layout.offset("checksum") - 4
     assert started(joint).load(resealed(better.packed(), place, "<f", 1e4)) == OUT_OF_RANGE
 
 
@@ -131,13 +134,14 @@ def test_before_init_nothing_is_taken(joint):
 
 
 def test_files_come_back_as_they_were(joint, tmp_path):
-    source, code, better, _ = joint
+    _, code, better, _ = joint
+    layout = code.layout
     for block in (code, better):
         for ending in (".bin", ".json"):
             file = write_parameter_block(block, tmp_path / f"block{ending}")
-            again = read_parameter_block(file, source.layout)
+            again = read_parameter_block(file, layout)
             assert again.packed() == block.packed()
-    assert read_parameter_block(tmp_path / "block.json").layout.record == source.layout.record
+    assert read_parameter_block(tmp_path / "block.json").layout.record == layout.record
     assert (tmp_path / "block.bin").read_bytes() == better.packed()
 
 
@@ -166,21 +170,22 @@ def test_the_block_in_c_is_the_bytes_of_the_file(joint, tmp_path):
 
 
 def test_reading_refuses_damaged_and_foreign_files(joint, tmp_path):
-    source, _, better, _ = joint
+    _, _, better, _ = joint
+    layout = better.layout
     content = better.packed()
     file = tmp_path / "block.bin"
-    foreign = replace(source.layout, digest="0" * 32, deck="other")
-    for changed, layout, says in (
-        (content[:-1], source.layout, "bytes"),
-        (b"x" + content[1:], source.layout, "no block"),
-        (content[:100] + bytes([content[100] ^ 1]) + content[101:], source.layout, "checksum"),
+    foreign = replace(layout, digest="0" * 32, deck="other")
+    for changed, wanted, says in (
+        (content[:-1], layout, "bytes"),
+        (b"x" + content[1:], layout, "no block"),
+        (content[:100] + bytes([content[100] ^ 1]) + content[101:], layout, "checksum"),
         (content, foreign, "digest .* is of other code; 'joint' of deck 'other'"),
-        (resealed(content, 40, "<f", -1.0), source.layout, "'controller.stiffness_floor' is -1"),
+        (resealed(content, 40, "<f", -1.0), layout, "'controller.stiffness_floor' is -1"),
         (content, None, "code must be named"),
     ):
         file.write_bytes(changed)
         with pytest.raises(ExportError, match=says):
-            read_parameter_block(file, layout)
+            read_parameter_block(file, wanted)
     text = write_parameter_block(better, tmp_path / "block.json").read_text()
     for before, after, says in (
         ('"value": 12.0', '"value": 11.0', "damaged or edited"),
@@ -213,3 +218,30 @@ def test_a_deck_of_another_form_is_refused(joint):
         block_for(code, machine().with_values({"spring.cam.last_angle": 1.0}), controller)
     with pytest.raises(ExportError, match="export the code again"):
         block_for(code, machine("test_rig"), controller)
+
+
+def sampled(a: float, b: float, name: str = "k") -> FlatModel:
+    """Return x⁺ = a·x and y = b·u·p by hand."""
+    t, x, u, p, w = (ca.SX.sym(n, k) for n, k in zip("txupw", (1, 1, 1, 1, 0), strict=True))
+    equations = ca.Function(
+        "equations", [t, x, u, p, w], [a * x, b * u * p, ca.SX(0, 1), ca.SX(0, 1)],
+        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    )  # fmt: skip
+    one = Variable("x", "rad", "a state")
+    parameter = Variable(name, "1", "a parameter", start=1.5, minimum=0.0)
+    return FlatModel("hand", "by hand", (one,), (Variable("u", "A", "an input"),), (parameter,),
+                     (Variable("y", "rad", "an output"),), (), equations, 1e-3)  # fmt: skip
+
+
+def test_what_moves_with_the_numbers_is_a_coefficient_and_what_stays_is_not():
+    made = loadable_model(sampled(1.0, 3.0), sampled(1.01, 3.0))
+    assert [v.start for v in made.model.parameters] == [1.5, 1.0]
+    for value in (0.4, 1.0, -1.0, 2.0):
+        assert made.numbers_of(sampled(value, 3.0)).coefficients == (value,)
+    for other, says in (
+        (sampled(0.4, 3.1), r"constant 3\.1 in place of 3"),
+        (sampled(0.0, 3.0), "other operations|other results"),
+        (sampled(0.4, 3.0, name="q"), "other parameters: k .* is lacking, q .* is added"),
+    ):
+        with pytest.raises(ExportError, match=says):
+            made.numbers_of(other)
