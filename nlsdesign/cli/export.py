@@ -100,9 +100,12 @@ def export_code(
         part = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     name, model, sentences = part.name, part.model, part.sentences
     if with_block:
-        source, file = _with_blocks(
-            part, declared, out, {**chosen, "what": what, "sample_time": sample_time, "real": real}
+        options = {**chosen, "what": what, "sample_time": sample_time, "real": real}
+        source, file, size = _with_blocks(part, declared, out, options)
+        words = (
+            f"a block has {size} B, an instance keeps its own copy; the flash above is that without blocks"
         )
+        sentences = (*sentences, words)
     else:
         source, file = export_c(model, out, real=real, name=name), None
     written = [source.header, source.source, source.selftest, *([file] if file else [])]
@@ -124,8 +127,8 @@ class SampledPart(NamedTuple):
 
 def _with_blocks(
     part: SampledPart, declared: Assembly, out: Path, chosen: Mapping[str, Any]
-) -> tuple[CSource, Path]:
-    """Write code that takes blocks; return its files and that of the block of its design."""
+) -> tuple[CSource, Path, int]:
+    """Write code that takes blocks; return its files, that of the block of its design, and its bytes."""
     from ..components import deck_text
     from ..export import export_c_with_blocks, write_parameter_block
     from ..model import flatten
@@ -143,7 +146,7 @@ def _with_blocks(
     )
     source, layout = export_c_with_blocks(loadable, out, real=chosen["real"], name=part.name)
     block = replace(layout.default, recipe=recipe.to_dict())
-    return source, write_parameter_block(block, out / f"{part.name}_block.json")
+    return source, write_parameter_block(block, out / f"{part.name}_block.json"), layout.size
 
 
 def sampled_part(plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]) -> SampledPart:
