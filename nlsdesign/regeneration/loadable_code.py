@@ -90,7 +90,7 @@ class SameTable(Grid):
         Parameters
         ----------
         entries
-            Takes angles of shape (N,) and returns the entries there.
+            Of the step, as functions of the angle.
         draft
             The observer, with which the torque error of the table is measured.
 

@@ -57,7 +57,7 @@ def write_a2l(
     Returns
     -------
     Path
-        The file.
+        That of the description.
 
     Raises
     ------
@@ -169,7 +169,7 @@ class _Description:
             for j, column in enumerate(table.columns):
                 at = layout.offset(f"table_{k}") + j * rows * self.width
                 name = f"{layout.name}.table_{k}.{column.name}"
-                yield from self._curve(name, column, at, (table.argument, unit, table.grid.tolist()))
+                yield from self.curve(name, column, at, (table.argument, unit, table.grid.tolist()))
 
     def _value(self, name: str, v: Variable, at: int, record: str = "number") -> Iterator[str]:
         yield f"    /begin CHARACTERISTIC {_identifier(name)}"
@@ -178,14 +178,12 @@ class _Description:
         yield f'      SYMBOL_LINK "{self.block.name}" {at}'
         yield "    /end CHARACTERISTIC"
 
-    def _curve(
-        self, name: str, v: Variable, at: int, axis: tuple[str, str, Sequence[float]]
-    ) -> Iterator[str]:
+    def curve(self, name: str, v: Variable, at: int, axis: tuple[str, str, Sequence[float]]) -> Iterator[str]:
         argument, unit, points = axis
         yield f"    /begin CHARACTERISTIC {_identifier(name)}"
         yield f"      {_string(v.description)} CURVE {self._address(self.block, at)} number 0"
         yield f"      {_method(v.unit)} {self._limits(v)}"
-        yield f"      /begin AXIS_DESCR FIX_AXIS {self._measured(argument)} {_method(unit)} {len(points)}"
+        yield f"      /begin AXIS_DESCR FIX_AXIS {self.quantity(argument)} {_method(unit)} {len(points)}"
         yield f"        {points[0]!r} {points[-1]!r}"
         yield "        /begin FIX_AXIS_PAR_LIST"
         for first in range(0, len(points), 6):
@@ -195,7 +193,7 @@ class _Description:
         yield f'      SYMBOL_LINK "{self.block.name}" {at}'
         yield "    /end CHARACTERISTIC"
 
-    def _measured(self, argument: str) -> str:
+    def quantity(self, argument: str) -> str:
         """Return the name of the measurement of what a table is read over."""
         of = next(
             (g for g in ("inputs", "states") if argument in [v.name for v in getattr(self.layout, g)]), None
@@ -260,7 +258,7 @@ def elf_symbols(path: Path, wanted: Sequence[str]) -> Mapping[str, int]:
     try:
         if path.stat().st_size > _LARGEST_ELF:
             raise ExportError(str(path), f"has more than {_LARGEST_ELF >> 20} MB, no firmware has")
-        addresses = dict(_symbols(path.read_bytes()))
+        addresses = dict(symbols_in(path.read_bytes()))
     except OSError as error:
         raise ExportError(str(path), f"cannot be read: {error.strerror or error}") from None
     except (struct.error, IndexError, ValueError) as error:
@@ -277,7 +275,7 @@ def elf_symbols(path: Path, wanted: Sequence[str]) -> Mapping[str, int]:
     return {name: addresses[name] for name in wanted}
 
 
-def _symbols(content: bytes) -> Iterator[tuple[str, int]]:
+def symbols_in(content: bytes) -> Iterator[tuple[str, int]]:
     if content[:4] != b"\x7fELF" or content[4] not in (1, 2) or content[5] != 1:
         raise ValueError("its head is another one")
     wide = content[4] == 2

@@ -26,11 +26,11 @@ def export_c_with_blocks(
     loadable
         Discrete model with its coefficients.
     folder
-        Folder of the files; it is made if it is missing.
+        Where the files are written.
     real
-        ``"double"`` or ``"float"``.
+        Type of the numbers, ``"double"`` or ``"float"``.
     name
-        Prefix of all C names; made from the name of the model by default.
+        With which all C names begin; that of the model if it is left out.
 
     Returns
     -------

@@ -39,7 +39,7 @@ def write_parameter_block(block: ParameterBlock, path: str | Path) -> Path:
     Returns
     -------
     Path
-        The file.
+        As it was given.
 
     Raises
     ------
