@@ -101,7 +101,7 @@ def export_code(
     name, model, sentences = part.name, part.model, part.sentences
     if with_block:
         options = {**chosen, "what": what, "sample_time": sample_time, "real": real}
-        source, file, size = _with_blocks(part, declared, out, options)
+        source, file, size = code_with_blocks(part, declared, out, options)
         words = (
             f"a block has {size} B, an instance keeps its own copy; the flash above is that without blocks"
         )
@@ -125,7 +125,7 @@ class SampledPart(NamedTuple):
     designed: DesignedObserver | None = None
 
 
-def _with_blocks(
+def code_with_blocks(
     part: SampledPart, declared: Assembly, out: Path, chosen: Mapping[str, Any]
 ) -> tuple[CSource, Path, int]:
     """Write code that takes blocks; return its files, that of the block of its design, and its bytes."""

@@ -104,7 +104,7 @@ def export_block(
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
 
-    given = dict(map(_value, values))
+    given = dict(map(named_number, values))
     if deck_name is None:
         block = read_parameter_block(code)
     else:
@@ -122,7 +122,8 @@ def export_block(
     show_written(as_json, words, files, digest=block.layout.digest, checksum=f"0x{block.checksum:08x}")
 
 
-def _value(text: str) -> tuple[str, float]:
+def named_number(text: str) -> tuple[str, float]:
+    """Return name and number of NAME=NUMBER."""
     name, _, number = text.partition("=")
     try:
         return name.strip(), float(number)

@@ -123,9 +123,25 @@ class SameTable(Grid):
         table = Compact(grid, columns, at_points, places, {}, 0.0, self.uniform)
         if draft is None or not self.judged:
             return table
-        return self._judged(table, TableTrial(draft, fine), draft)
+        return self.with_error(table, TableTrial(draft, fine), draft)
 
-    def _judged(self, table: Compact, trial: TableTrial, draft: Draft) -> Compact:
+    def with_error(self, table: Compact, trial: TableTrial, draft: Draft) -> Compact:
+        """Return a table with its torque error; one that is too large is refused.
+
+        Parameters
+        ----------
+        table
+            Over these points.
+        trial
+            Compares it with exact functions of the angle.
+        draft
+            The observer.
+
+        Raises
+        ------
+        ExportError
+            If it moves the torque by more than 2 % of the largest.
+        """
         error, unit = trial.error(table), typeset_unit(draft.plant.estimate.unit)
         if not error.share <= MOST_SHARE:
             raise ExportError(

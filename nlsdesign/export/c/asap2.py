@@ -179,6 +179,7 @@ class _Description:
         yield "    /end CHARACTERISTIC"
 
     def curve(self, name: str, v: Variable, at: int, axis: tuple[str, str, Sequence[float]]) -> Iterator[str]:
+        """Yield a column of a table over its grid points: argument, unit and points of the axis."""
         argument, unit, points = axis
         yield f"    /begin CHARACTERISTIC {_identifier(name)}"
         yield f"      {_string(v.description)} CURVE {self._address(self.block, at)} number 0"
@@ -276,6 +277,7 @@ def elf_symbols(path: Path, wanted: Sequence[str]) -> Mapping[str, int]:
 
 
 def symbols_in(content: bytes) -> Iterator[tuple[str, int]]:
+    """Yield names and addresses from the tables of symbols of an ELF file."""
     if content[:4] != b"\x7fELF" or content[4] not in (1, 2) or content[5] != 1:
         raise ValueError("its head is another one")
     wide = content[4] == 2

@@ -45,10 +45,10 @@ def export_c_with_blocks(
     number, prefix = Real.named(real), identifier(name or loadable.model.name)
     layout = block_layout(loadable, prefix, number, paths_in_memory)
     c = CWriter(loadable.model, prefix, number, loadable.coefficients)
-    return write_step(c, folder, {**_declarations(c, layout), **_functions(c, layout)}), layout
+    return write_step(c, folder, {**block_declarations(c, layout), **block_functions(c, layout)}), layout
 
 
-def _declarations(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
+def block_declarations(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
     """Return what the header says of blocks."""
     count = len(layout.coefficients)
     own = f"{c.real} coefficients[{count}]; /* constants of the equations that follow from the deck */"
@@ -73,7 +73,7 @@ def _declarations(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
     }
 
 
-def _functions(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
+def block_functions(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
     """Return what the source has for blocks."""
     crc = list(range(16))
     for _ in range(4):
@@ -81,8 +81,8 @@ def _functions(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
     values: dict[str, str | list[str]] = {
         "half_bytes": _lines([f"0x{k:08x}u" for k in crc]),
         "bytes": str(layout.offset("checksum")),
-        "ranges": _ranges(layout),
-        "taken": _taken(layout),
+        "ranges": range_checks(layout),
+        "taken": taken_numbers(layout),
         "load": _head(c.name),
         "derived": [f"{c.name}_derive(state);"] if c.equations.numbers.numel() else [],
     }
@@ -109,7 +109,9 @@ def _table_members(layout: BlockLayout, *, by_row: bool) -> list[str]:
     return lines
 
 
-def _ranges(layout: BlockLayout) -> list[str]:
+def range_checks(layout: BlockLayout) -> list[str]:
+    """Return the statements that compare every number with its range."""
+
     def call(v: Variable, text: str) -> str:
         limits = f"{layout.real.bound(v.minimum)}, {layout.real.bound(v.maximum)}"
         return f"wrong |= outside(block->{text}, {limits});"
@@ -123,7 +125,8 @@ def _ranges(layout: BlockLayout) -> list[str]:
     return lines
 
 
-def _taken(layout: BlockLayout) -> list[str]:
+def taken_numbers(layout: BlockLayout) -> list[str]:
+    """Return the statements that copy the numbers of a block into an instance."""
     lines = ["state->parameters = block->parameters;"] if layout.parameters else []
     if count := len(layout.coefficients):
         lines += [f"for (uint32_t i = 0u; i < {count}u; ++i) {{",

@@ -90,7 +90,7 @@ def read_parameter_block(path: str | Path, code: BlockLayout | None = None) -> P
     except OSError as error:
         raise ExportError(place, f"cannot be read: {error.strerror or error}") from None
     if file.suffix == ".json":
-        return _from_json(content, code, place)
+        return block_from_json(content, code, place)
     if code is None:
         raise ExportError(
             place, "holds no names, so the code must be named that it is for",
@@ -99,7 +99,8 @@ def read_parameter_block(path: str | Path, code: BlockLayout | None = None) -> P
     return unpacked(content, code, place)
 
 
-def _as_c(block: ParameterBlock) -> bytes:
+def block_in_c(block: ParameterBlock) -> bytes:
+    """Return a block as a constant in C."""
     name = block.layout.name
     own = f"{name}_block_of_{identifier(block.deck or 'no_deck')}"
     lines = [
@@ -110,7 +111,8 @@ def _as_c(block: ParameterBlock) -> bytes:
     return "\n".join(lines).encode()
 
 
-def _as_json(block: ParameterBlock) -> bytes:
+def block_in_json(block: ParameterBlock) -> bytes:
+    """Return a block with names, units and ranges as JSON."""
     layout = block.layout
     numbers = [_described(v) | {"value": block.values[v.name]} for v in layout.parameters]
     coefficients = [_described(v) | {"value": block.values[v.name]} for v in layout.coefficients]
@@ -154,13 +156,14 @@ def _described(v: Variable) -> dict[str, Any]:
 
 
 _WRITERS: Mapping[str, Callable[[ParameterBlock], bytes]] = {
-    ".json": _as_json,
+    ".json": block_in_json,
     ".bin": ParameterBlock.packed,
-    ".c": _as_c,
+    ".c": block_in_c,
 }
 
 
-def _from_json(content: bytes, code: BlockLayout | None, place: str) -> ParameterBlock:
+def block_from_json(content: bytes, code: BlockLayout | None, place: str) -> ParameterBlock:
+    """Return the block in a JSON file; a damaged or foreign one is an ``ExportError``."""
     try:
         raw = json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -171,7 +174,7 @@ def _from_json(content: bytes, code: BlockLayout | None, place: str) -> Paramete
             next_step="take the NAME_block.json that nlsdesign export c --block writes beside the code",
         )  # fmt: skip
     try:
-        block, stated = _restored(raw), int(raw["checksum"], 16)
+        block, stated = block_of_fields(raw), int(raw["checksum"], 16)
         check_sum(stated, block.checksum, place)
     except NlsError:
         raise
@@ -183,9 +186,10 @@ def _from_json(content: bytes, code: BlockLayout | None, place: str) -> Paramete
     return block
 
 
-def _restored(raw: Mapping[str, Any]) -> ParameterBlock:
+def block_of_fields(raw: Mapping[str, Any]) -> ParameterBlock:
+    """Return the block that the fields of a JSON file describe."""
     parameters, coefficients = (tuple(map(_variable, raw[group])) for group in ("parameters", "coefficients"))
-    tables = tuple(map(_table, raw["tables"]))
+    tables = tuple(map(table_of_fields, raw["tables"]))
     states, inputs, outputs = (tuple(map(_variable, raw[group])) for group in _SEEN)
     code = raw["code_deck"]
     layout = BlockLayout(
@@ -212,7 +216,8 @@ def _variable(raw: Mapping[str, Any]) -> Variable:
     )  # fmt: skip
 
 
-def _table(raw: Mapping[str, Any]) -> Table:
+def table_of_fields(raw: Mapping[str, Any]) -> Table:
+    """Return a table of such fields."""
     columns, values = tuple(map(_variable, raw["columns"])), np.array(raw["values"], dtype=float)
     if values.shape != (len(raw["grid"]), len(columns)):
         raise ValueError(f"a table has the shape {values.shape}")

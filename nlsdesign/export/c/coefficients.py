@@ -125,7 +125,9 @@ def loadable_model(model: FlatModel, moved: FlatModel) -> LoadableModel:
     numbered: dict[tuple[float, float], int] = {}
     members: dict[str, tuple[int | float, ...]] = {}
     for name, form in forms.items():
-        pairs = zip(_constants(form, _form(getattr(model, name)), model.name), _own(form), strict=True)
+        pairs = zip(
+            _constants(form, _form(getattr(model, name)), model.name), constants_of(form), strict=True
+        )
         members[name] = tuple(
             value if _same(value, other) else numbered.setdefault((value, other), len(numbered))
             for value, other in pairs
@@ -136,16 +138,17 @@ def loadable_model(model: FlatModel, moved: FlatModel) -> LoadableModel:
         for n, (k, place) in enumerate(_operands(form))
         if k >= 0 and form.steps[k].operation == ca.OP_DIV and place == 1
     }
-    added = tuple(_coefficient(i, *pair, i in divisors) for i, pair in enumerate(numbered))
+    added = tuple(coefficient_of(i, *pair, i in divisors) for i, pair in enumerate(numbered))
     symbols = ca.SX.sym(COEFFICIENT, len(added))
     functions: dict[str, Any] = {
-        n: _rewritten(getattr(model, n), forms[n], members[n], symbols) for n in names
+        n: with_coefficients(getattr(model, n), forms[n], members[n], symbols) for n in names
     }
     whole = replace(model, parameters=(*model.parameters, *added), **functions)
     return LoadableModel(whole, len(added), forms, members)
 
 
-def _coefficient(number: int, value: float, moved: float, divides: bool) -> Variable:
+def coefficient_of(number: int, value: float, moved: float, divides: bool) -> Variable:
+    """Return a coefficient with its range; one by which something is divided keeps its sign."""
     size = WIDER * max(abs(value), abs(moved))
     low, high = (sorted((value / WIDER, value * WIDER))) if divides else (-size, size)
     return Variable(
@@ -211,7 +214,7 @@ def _operands(form: Graph) -> list[tuple[int, int]]:
     return inside + [(-1, number) for _, number in sorted(form.results.items()) if constant[number]]
 
 
-def _own(form: Graph) -> list[float]:
+def constants_of(form: Graph) -> list[float]:
     """Return the constants of a form, in order."""
     return [
         float(form.steps[place if k < 0 else form.steps[k].operands[place]].extra)
@@ -245,17 +248,17 @@ class _Reading:
         if step.operation == ca.OP_INPUT:
             self.at[k] = self.given.get(step.extra, -1)
             return
-        if self.following and self._is(k, self.following[-1]):
+        if self.following and self.takes(k, self.following[-1]):
             self.at[k] = self.following.pop()
             return
         fixed = [self.form.steps[i].operation == ca.OP_CONST for i in step.operands]
         if len(fixed) == 2 and sum(fixed) == 1:
             kept = self.at[step.operands[1 - fixed.index(True)]]
-            if self._without(k, fixed.index(True), kept):
+            if self.takes_shorter(k, fixed.index(True), kept):
                 return
         raise _other_form(self.name, f"has other operations, from number {len(self.at) + 1} on")
 
-    def _is(self, k: int, candidate: int) -> bool:
+    def takes(self, k: int, candidate: int) -> bool:
         """Take an operation as it is; its constants are noted."""
         step, candidate_step = self.form.steps[k], self.other.steps[candidate]
         if step.operation != candidate_step.operation:
@@ -273,7 +276,7 @@ class _Reading:
         self.values += values
         return True
 
-    def _without(self, k: int, place: int, kept: int) -> bool:
+    def takes_shorter(self, k: int, place: int, kept: int) -> bool:
         """Take an operation whose constant makes it another one, or none at all."""
         operation = self.form.steps[k].operation
         following = self.other.steps[self.following[-1]] if self.following else None
@@ -310,7 +313,7 @@ class _Reading:
         return self.values
 
 
-def _rewritten(
+def with_coefficients(
     function: ca.Function, form: Graph, members: Sequence[int | float], coefficients: Expression
 ) -> ca.Function:
     """Return a function of a model in its form, with coefficients behind its parameters."""
