@@ -151,7 +151,7 @@ def named_number(text: str) -> tuple[str, float]:
 def export_description(
     code: Path, elf: Path | None, block: str, instance: str, out: Path, as_json: bool
 ) -> None:
-    """Describe block and signals of exported code as A2L, ASAP2 1.7, for XCP tools."""
+    """Describe blocks and signals of exported code as A2L. XCP tools read it."""
     from ..export import read_parameter_block, write_a2l
 
     layout = read_parameter_block(code).layout

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...model.flat import Variable
+from ..files import filled
 from .block_layout import MAGIC, VERSION, BlockLayout, ParameterBlock, block_layout
 from .c_text import Real, comment, identifier, signature
 from .coefficients import LoadableModel
@@ -120,8 +121,8 @@ def range_checks(layout: BlockLayout) -> list[str]:
     lines = [call(v, f"parameters.{paths[v.name]}") for v in layout.parameters]
     lines += [call(v, f"coefficients[{i}]") for i, v in enumerate(layout.coefficients)]
     for k, table in enumerate(layout.tables):
-        rows = [f"    {call(v, f'table_{k}[{j}][row]')}" for j, v in enumerate(table.columns)]
-        lines += [f"for (uint32_t row = 0u; row < {len(table.values)}u; ++row) {{", *rows, "}"]
+        rows = [call(v, f"table_{k}[{j}][row]") for j, v in enumerate(table.columns)]
+        lines += _for_rows(len(table.values), rows)
     return lines
 
 
@@ -129,14 +130,16 @@ def taken_numbers(layout: BlockLayout) -> list[str]:
     """Return the statements that copy the numbers of a block into an instance."""
     lines = ["state->parameters = block->parameters;"] if layout.parameters else []
     if count := len(layout.coefficients):
-        lines += [f"for (uint32_t i = 0u; i < {count}u; ++i) {{",
-                  "    state->coefficients[i] = block->coefficients[i];", "}"]  # fmt: skip
+        lines += _for_rows(count, ["state->coefficients[row] = block->coefficients[row];"])
     for k, table in enumerate(layout.tables):
-        lines.append(f"for (uint32_t row = 0u; row < {len(table.values)}u; ++row) {{")
         columns = range(len(table.columns))
-        lines += [f"    state->table_{k}[row][{j}] = block->table_{k}[{j}][row];" for j in columns]
-        lines.append("}")
+        rows = [f"state->table_{k}[row][{j}] = block->table_{k}[{j}][row];" for j in columns]
+        lines += _for_rows(len(table.values), rows)
     return [*lines, "state->loaded = block->deck[0];"]
+
+
+def _for_rows(count: int, body: list[str]) -> list[str]:
+    return filled("block_loop.c", {"count": str(count), "body": body}).splitlines()
 
 
 def initialised(block: ParameterBlock, name: str) -> list[str]:

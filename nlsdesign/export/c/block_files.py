@@ -14,6 +14,7 @@ from ...foundation.errors import ExportError, NlsError, nearest
 from ...foundation.locations import version
 from ...foundation.text_files import draft
 from ...model.flat import Table, Variable
+from ..files import filled
 from .block_code import initialised
 from .block_layout import BlockLayout, ParameterBlock, check_digest, check_sum, unpacked
 from .c_text import Real, comment, identifier
@@ -103,12 +104,14 @@ def block_in_c(block: ParameterBlock) -> bytes:
     """Return a block as a constant in C."""
     name = block.layout.name
     own = f"{name}_block_of_{identifier(block.deck or 'no_deck')}"
-    lines = [
-        f"/* Block for {name}.c of {comment(block.layout.deck)}, layout {block.layout.digest}.",
-        f"   Written by nlsdesign {version()}; do not edit: its checksum is that of its numbers. */",
-        f'#include "{name}.h"', "", f"extern const {name}_block {own};", "", *initialised(block, own), "",
-    ]  # fmt: skip
-    return "\n".join(lines).encode()
+    values: dict[str, str | list[str]] = {
+        "title": f"Block for {name}.c of {comment(block.layout.deck)}, layout {block.layout.digest}.",
+        "version": version(),
+        "name": name,
+        "own": own,
+        "numbers": initialised(block, own),
+    }
+    return filled("block_constant.c", values).encode()
 
 
 def block_in_json(block: ParameterBlock) -> bytes:
