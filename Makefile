@@ -108,7 +108,7 @@ lock:
 	'$(or $(PYTHON),python3)' -m venv .venv-lock
 	.venv-lock/bin/python -m pip install --quiet '$(UV)'
 	.venv-lock/bin/uv pip compile pyproject.toml \
-		--extra export --extra tables --extra records --extra robots --extra modelica --extra scale --extra sensitivity --extra live --extra cma --extra masters --extra rigs --extra docs \
+		--extra export --extra tables --extra records --extra robots --extra modelica --extra a2l --extra scale --extra sensitivity --extra live --extra cma --extra masters --extra rigs --extra docs \
 		--extra test --extra lint --group build \
 		--universal --python-version 3.11 --generate-hashes --only-binary :all: \
 		--custom-compile-command 'make lock' --quiet $(UPGRADE) \

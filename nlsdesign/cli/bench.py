@@ -13,6 +13,7 @@ import click
 from ..foundation.command_words import typed_command
 from ..foundation.errors import MeasurementError
 from ..foundation.quantity import typeset_unit, with_error
+from .export_block import block_option, written_block
 from .options import (
     DECK_HELP,
     deck_option,
@@ -203,6 +204,7 @@ def _questions(deck: str | None, joints: Sequence[str], out: Path) -> list[tuple
 @spring_option
 @measured_option
 @workers_option
+@block_option
 @out_option("out/diagnosis", writes=_diagnosis_files)
 @json_option
 def diagnose(
@@ -264,6 +266,9 @@ def _diagnosed(
             machine = export_machine(flatten(verdict.actuator), out, observer=observer, **roles)
         content |= machine.content()
         sentences += machine.findings()
+    blocks, lacking = written_block(options["code"], verdict.actuator, out)
+    content |= _named(options["code"], blocks, lacking)
+    sentences += [*([f"block: {', '.join(map(str, blocks))}"] if blocks else []), *lacking]
     if verdict.experiment is not None:
         sentences.append(f"command of the next record: {out / 'next_record.csv'}")
     return content, [*sentences, f"report: {page}"]
@@ -283,6 +288,7 @@ def _diagnosed(
 @click.option("--known", type=NamedPath(dir_okay=False), default=None,
               help="joint_numbers.json of an earlier calibration, as what is known before.")  # fmt: skip
 @click.option("--plan", is_flag=True, help="Rank calibrations by what they would buy; needs no records.")
+@block_option
 @out_option(
     "out/calibration",  # and the deck, whose name is read
     writes=lambda given: ["plan.json"] if given["plan"] else ["joint_numbers.json", "calibration.json"],
@@ -294,8 +300,8 @@ def calibrate(
     folders: tuple[Path, ...],
     known: Path | None,
     plan: bool,
-    out: Path,
     as_json: bool,
+    **files: Path,
 ) -> None:
     """Turn bench tests into smaller spreads, or plan them. An afternoon is enough."""
     from ..bench.calibration import (
@@ -316,6 +322,7 @@ def calibrate(
     from ..regeneration import errors_while_running
 
     _check_calibration(kinds, folders, plan)
+    out, code = files["out"], files["code"]
     deck = load_deck(deck_name)
     actuator = declare(deck)
     prior = read_joint_numbers(known) if known else None
@@ -335,13 +342,20 @@ def calibrate(
     with steps.step("estimate"):
         result = calibrated(actuator, estimate(actuator, tests, prior=prior))
     paths = write_calibration(result, out, deck=deck.path)
+    blocks, lacking = written_block(code, result.actuator, out)
     if as_json:
-        show_json({**result.to_dict(), "deck": str(paths["deck"]), "joint": str(paths["joint"])})
+        named = {"deck": str(paths["deck"]), "joint": str(paths["joint"]), **_named(code, blocks, lacking)}
+        show_json({**result.to_dict(), **named})
         return
     heads = ("name", "before", "after", "unit", "moved, in spreads", "known from")
     show_table("Numbers", heads, shown_numbers(result.numbers))
-    show_lines((*record_findings(tests), *result.words()))
-    click.echo(f"written: {', '.join(map(str, paths.values()))}")
+    show_lines((*record_findings(tests), *result.words(), *lacking))
+    click.echo(f"written: {', '.join(map(str, [*paths.values(), *blocks]))}")
+
+
+def _named(code: Path | None, blocks: Sequence[Path], lacking: Sequence[str]) -> dict[str, list[str]]:
+    """Return the files of a block for JSON, and why there are none; nothing where none was asked for."""
+    return {} if code is None else {"block": list(map(str, blocks)), "no_block": list(lacking)}
 
 
 def _check_calibration(kinds: tuple[str, ...], folders: tuple[Path, ...], plan: bool) -> None:

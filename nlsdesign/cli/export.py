@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -28,8 +28,12 @@ from .overwriting import c_names, out_file_option, out_option
 from .typed_values import NamedPath
 
 if TYPE_CHECKING:
+    from ..components import Assembly
+    from ..export import CSource
+    from ..feedback.observer import DesignedObserver
     from ..model import FlatModel
 
+_LAW = ("law", "bandwidth", "velocity_bandwidth")
 OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 
 
@@ -43,7 +47,8 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     name = "torque_loop" if given["what"] == BOTH else given["what"]
     further = (".hpp", "_example_posix.c", "_example_cortex_m.c", ".mk") if given["examples"] else ()
     build = ["CMakeLists.txt"] if further else []
-    return [*c_names(name), *(f"{name}{ending}" for ending in further), *build]
+    blocks = [f"{name}_block.json"] if given["with_block"] else []
+    return [*c_names(name), *(f"{name}{ending}" for ending in further), *build, *blocks]
 
 
 @export.command(
@@ -72,6 +77,8 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @real_option
 @flash_options
 @click.option("--examples", is_flag=True, help="Write main programs, a C++ class and build files beside it.")
+@click.option("--block", "with_block", is_flag=True, help="The code takes blocks of other numbers while it "
+              "runs; NAME_block.json tells `export block` how to make them.")  # fmt: skip
 @json_option
 def export_code(
     deck_name: str, what: str, sample_time: float, out: Path, real: str, as_json: bool, **chosen: Any
@@ -87,11 +94,20 @@ def export_code(
 
     declared = machine_of(deck_name)
     plant = flatten(declared)
-    with_examples = chosen.pop("examples")
+    with_examples, with_block = chosen.pop("examples"), chosen.pop("with_block")
     with Steps().step(what):
-        name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
-    source = export_c(model, out, real=real, name=name)
-    written = [source.header, source.source, source.selftest]
+        part = sampled_part(plant, what, sample_time, {**chosen, "real": real})
+    name, model, sentences = part.name, part.model, part.sentences
+    if with_block:
+        options = {**chosen, "what": what, "sample_time": sample_time, "real": real}
+        source, file, size = code_with_blocks(part, declared, out, options)
+        words = (
+            f"a block has {size} B, an instance keeps its own copy; the flash above is that without blocks"
+        )
+        sentences = (*sentences, words)
+    else:
+        source, file = export_c(model, out, real=real, name=name), None
+    written = [source.header, source.source, source.selftest, *([file] if file else [])]
     if with_examples:
         written += write_examples(source)
     remarks = range_remarks(declared, measured=chosen["measured"])
@@ -99,29 +115,61 @@ def export_code(
     show_written(as_json, (model.description, *sentences), written, name=name, warnings=remarks)
 
 
-def sampled_part(
-    plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]
-) -> tuple[str, FlatModel, tuple[str, ...]]:
-    """Return what a controller runs, what its files are called, and what is to be known of its size."""
+class SampledPart(NamedTuple):
+    """What a controller runs, the name of its files, what is to be known of its size, and its observer."""
+
+    name: str
+    model: FlatModel
+    sentences: tuple[str, ...]
+    designed: DesignedObserver | None = None
+
+
+def code_with_blocks(
+    part: SampledPart, declared: Assembly, out: Path, chosen: Mapping[str, Any]
+) -> tuple[CSource, Path, int]:
+    """Write code that takes blocks; return its files, that of the block of its design, and its bytes."""
+    from ..components import deck_text
+    from ..export import export_c_with_blocks, write_parameter_block
+    from ..model import flatten
+    from ..regeneration import CodeRecipe, SameTable
+
+    law = {name: chosen[name] for name in _LAW}
+    designed = part.designed
+    recipe = CodeRecipe(
+        what=chosen["what"], kind=designed.kind if designed else None, sample_time=chosen["sample_time"],
+        spring=chosen["spring"], measured=chosen["measured"],
+        table=SameTable.of(designed.design.compact) if designed else None, law=law, deck=deck_text(declared),
+    )  # fmt: skip
+    loadable = recipe.loadable(
+        flatten(declared), lambda plant: controller_of(plant, chosen["sample_time"], **law)[0]
+    )
+    source, layout = export_c_with_blocks(loadable, out, real=chosen["real"], name=part.name)
+    block = replace(layout.default, recipe=recipe.to_dict())
+    return source, write_parameter_block(block, out / f"{part.name}_block.json"), layout.size
+
+
+def sampled_part(plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]) -> SampledPart:
+    """Return what a controller runs."""
     from ..feedback.control import joined
     from ..regeneration import require_flash, sized_observer
 
-    law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
+    law = {name: chosen[name] for name in _LAW}
     others = {name: value for name, value in chosen.items() if name not in law}
     if what == CONTROLLER:
         if chosen["table_error"] is not None:
             raise click.BadParameter("--table-error is of an observer; leave it out, or take --what both")
         controller, margins = controller_of(plant, sample_time, **law)
         flash = require_flash(controller, chosen["real"], chosen["flash"])
-        return CONTROLLER, controller, (flash, margins)
+        return SampledPart(CONTROLLER, controller, (flash, margins))
     if what == OBSERVER:
         sized = sized_observer(plant, sample_time, **others)
-        return OBSERVER, sized.designed.model, sized.findings()
+        return SampledPart(OBSERVER, sized.designed.model, sized.findings(), sized.designed)
     controller, margins = controller_of(plant, sample_time, **law)
     sized = sized_observer(
         plant, sample_time, part_of=lambda observer: joined(observer, controller), **others
     )
-    return "torque_loop", joined(sized.designed.model, controller), (*sized.findings(), margins)
+    whole = joined(sized.designed.model, controller)
+    return SampledPart("torque_loop", whole, (*sized.findings(), margins), sized.designed)
 
 
 @export.command(

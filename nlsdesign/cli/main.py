@@ -25,6 +25,7 @@ from .decks import deck
 from .describe import records
 from .design import design
 from .export import export
+from .export_block import export_block as export_block
 from .export_fmu import export_fmus as export_fmus
 from .look_up import docs, materials, parts
 from .observer import observer

@@ -17,6 +17,7 @@ from .assembly.deck_template import motor_inertia as motor_inertia
 from .assembly.deck_template import plain_name as plain_name
 from .assembly.deck_writer import deck_digest as deck_digest
 from .assembly.deck_writer import deck_problems as deck_problems
+from .assembly.deck_writer import deck_text as deck_text
 from .assembly.deck_writer import declare as declare
 from .assembly.deck_writer import write_deck as write_deck
 from .assembly.library_rubber import with_rubber

@@ -3,6 +3,11 @@
 Presentation and commands may import it; it reads models, and designs nothing.
 """
 
+from .c.asap2 import write_a2l
+from .c.block_code import export_c_with_blocks
+from .c.block_files import read_parameter_block, write_parameter_block
+from .c.block_layout import BlockLayout, ParameterBlock
+from .c.coefficients import LoadableModel, loadable_model
 from .c.controller_code import export_c
 from .c.packages import write_package
 from .c.programs import write_examples
@@ -32,6 +37,7 @@ __all__ = [
     "CORTEX_M7",
     "PROCESSORS",
     "Authorship",
+    "BlockLayout",
     "CSource",
     "CoSimulation",
     "Convergence",
@@ -40,6 +46,8 @@ __all__ = [
     "Held",
     "Iterated",
     "Late",
+    "LoadableModel",
+    "ParameterBlock",
     "Processor",
     "SamplesOf",
     "Stepping",
@@ -47,16 +55,21 @@ __all__ = [
     "convergence",
     "cosimulate",
     "export_c",
+    "export_c_with_blocks",
     "export_fmu",
     "export_modelica",
     "export_mujoco",
+    "loadable_model",
     "measure_on_target",
     "natively",
     "quickest",
     "read_exports",
+    "read_parameter_block",
     "read_ssp",
+    "write_a2l",
     "write_examples",
     "write_package",
+    "write_parameter_block",
     "write_reference",
     "write_ssp",
 ]

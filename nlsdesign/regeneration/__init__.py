@@ -9,6 +9,7 @@ from .exported_machine import MACHINE as MACHINE
 from .exported_machine import export_machine
 from .flash import require_flash as require_flash
 from .flash import sized_observer
+from .loadable_code import CodeRecipe, SameTable, block_for
 from .range_remarks import beyond_contour as beyond_contour
 from .range_remarks import range_remarks
 from .range_remarks import swept_angle as swept_angle
@@ -19,8 +20,11 @@ from .readiness import readiness
 from .regenerated_observer import ObserverChoice, Regeneration, regenerate, write_regeneration
 
 __all__ = [
+    "CodeRecipe",
     "ObserverChoice",
     "Regeneration",
+    "SameTable",
+    "block_for",
     "export_machine",
     "range_remarks",
     "readiness",

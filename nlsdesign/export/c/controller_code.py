@@ -6,6 +6,7 @@ and outputs stay finite, the status word says what was held. The arithmetic is C
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import casadi as ca
@@ -28,6 +29,10 @@ from .writer import (
     step_body,
     take_statements,
 )
+
+_PLACES = ("block", "loaded", "load_head", "default_block", "block_check", "take_block", "load", "noted")
+WITHOUT_BLOCKS: Mapping[str, list[str]] = {name: [] for name in _PLACES}
+"""What header and source of code whose numbers are fixed say of blocks of numbers."""
 
 
 def export_c(
@@ -56,12 +61,19 @@ def export_c(
     ExportError
         If the model is continuous, depends on time, cannot be written in C, or the folder cannot be written.
     """
-    c = CWriter(model, identifier(name or model.name), Real.named(real))
+    return write_step(
+        CWriter(model, identifier(name or model.name), Real.named(real)), folder, WITHOUT_BLOCKS
+    )
+
+
+def write_step(c: CWriter, folder: str | Path, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) -> CSource:
+    """Write header, source and self-test of a step; ``blocks``: as :data:`WITHOUT_BLOCKS`."""
+    model = c.model
     check_discrete(model)
     header, source, selftest = (Path(folder) / f"{c.name}{end}" for end in (".h", ".c", "_selftest.c"))
-    texts = {header: header_text(c), source: source_text(c), selftest: selftest_source(c)}
+    texts = {header: header_text(c, blocks), source: source_text(c, blocks), selftest: selftest_source(c)}
     write_all({path: stamped(text, model) for path, text in texts.items()})
-    return CSource(c.name, model, c.real, header, source, selftest)
+    return CSource(c.name, model, c.real, header, source, selftest, c.coefficients)
 
 
 def check_discrete(model: FlatModel) -> None:
@@ -87,7 +99,7 @@ def check_discrete(model: FlatModel) -> None:
         )
 
 
-def header_text(c: CWriter) -> str:
+def header_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) -> str:
     """Return the header file, its parts in the order of the file."""
     upper, count, derived = c.name.upper(), len(c.readings), c.equations.numbers.numel()
     values: dict[str, str | list[str]] = {
@@ -108,13 +120,14 @@ def header_text(c: CWriter) -> str:
         else [],
         "derived": [f"{c.real} derived[{derived}]; /* follows from the parameters */"] if derived else [],
         **_heads(c.name),
+        **blocks,
     }
     version_of_interface = "@interface@"  # known once all else is written
     text = c.filled("controller.h", values | {"interface": version_of_interface})
     return text.replace(version_of_interface, interface_version(text, c.model))
 
 
-def source_text(c: CWriter) -> str:
+def source_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) -> str:
     """Return the C file, its parts in the order of the file."""
     model, real = c.model, c.real
     title, outputs = _title(model), first_outputs(model, real)
@@ -127,7 +140,7 @@ def source_text(c: CWriter) -> str:
             *elementary_functions(real, [*body, *settled, *derived]),
             *(line for table in c.tables if table.columns(looked_up) for line in (*table.data(), "")),
         ],
-        "start_parameters": c.initialiser("parameters", [v.start for v in model.parameters]),
+        "start_parameters": c.initialiser("parameters", [v.start for v in c.parameters]),
         "start_states": c.initialiser("states", [v.start for v in model.states]),
         "start_inputs": c.initialiser("inputs", inputs),
         "start_outputs": c.initialiser("outputs", outputs),
@@ -138,7 +151,7 @@ def source_text(c: CWriter) -> str:
         "assignments": [
             f"take_over(parameters->{path}, {real.bound(v.minimum)}, {real.bound(v.maximum)}, "
             f"&state->parameters.{path}, 0x{index_bit(i):x}u, &status);"
-            for i, (v, path) in enumerate(zip(model.parameters, c.paths.parameters, strict=True))
+            for i, (v, path) in enumerate(zip(c.parameters, c.paths.parameters, strict=True))
         ]
         or ["(void)parameters;"],
         "derived": [f"{c.name}_derive(state);"] if derived else [],
@@ -154,6 +167,7 @@ def source_text(c: CWriter) -> str:
         "settled": settled,
         "take": take_statements(c),
         "body": body,
+        **blocks,
     }
     return c.filled("controller.c", _heads(c.name) | values)
 

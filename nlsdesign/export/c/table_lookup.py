@@ -31,13 +31,14 @@ class CTable:
     """A table of a model in C.
 
     ``number`` is that of the table in the model, ``first`` the index of its first column in the looked-up
-    numbers of the model.
+    numbers of the model. ``owner`` is what its values are a member of; nothing where they are constants.
     """
 
     table: Table
     number: int
     first: int
     real: Real
+    owner: str = ""
 
     @property
     def grid(self) -> _Grid:
@@ -58,6 +59,8 @@ class CTable:
         Two breakpoints that are the same number in this type are an ``ExportError``.
         """
         table, k = self.table, self.number
+        if self.owner:
+            return self._breakpoint_data() if table.breakpoints is not None else []
         names = ", ".join(f"{variable.name} [{variable.unit}]" for variable in table.columns)
         if table.breakpoints is None:
             grid = f"from {table.lower!r} by {table.step!r}"
@@ -178,11 +181,11 @@ class CTable:
         return self.real.round(parts / float(self._points[-1] - self._points[0]))
 
 
-def c_tables(model: FlatModel, real: Real) -> list[CTable]:
-    """Return the tables of a model, in order."""
+def c_tables(model: FlatModel, real: Real, *, owner: str = "") -> list[CTable]:
+    """Return the tables of a model, in order, as constants or as members of something."""
     tables, first = [], 0
     for number, table in enumerate(model.tables):
-        tables.append(CTable(table, number, first, real))
+        tables.append(CTable(table, number, first, real, owner))
         first += len(table.columns)
     return tables
 
@@ -202,8 +205,8 @@ def look_up(tables: Sequence[CTable], arguments: Mapping[str, str], used: set[in
             indexed[table.grid] = table.number
             lines += table.index(arguments[table.table.argument])
         k, n = indexed[table.grid], f"row_{table.number}"
-        lines.append(f"const {real} *const {n} = table_{table.number}[left_{k}];")
-        lines.append(f"const {real} *const {n}_next = table_{table.number}[left_{k} + 1];")
+        lines.append(f"const {real} *const {n} = {table.owner}table_{table.number}[left_{k}];")
+        lines.append(f"const {real} *const {n}_next = {table.owner}table_{table.number}[left_{k} + 1];")
         lines += [
             f"const {real} w{table.first + c} = {n}[{c}] + share_{k} * ({n}_next[{c}] - {n}[{c}]);"
             for c in columns

@@ -55,6 +55,9 @@ class CSource:
         Number type; it is also the text ``"double"`` or ``"float"``.
     header, source, selftest
         Paths of the interface, of the functions, and of a program that tests them.
+    coefficients
+        How many of the last parameters are coefficients, which blocks of numbers replace at run time;
+        ``None`` where the numbers of the code are fixed.
     """
 
     name: str
@@ -63,11 +66,12 @@ class CSource:
     header: Path
     source: Path
     selftest: Path
+    coefficients: int | None = None
 
     @property
     def writer(self) -> CWriter:
         """What the files were written with."""
-        return CWriter(self.model, self.name, self.real)
+        return CWriter(self.model, self.name, self.real, self.coefficients)
 
 
 class MemberPaths(NamedTuple):
@@ -109,12 +113,18 @@ class CWriter:
     model: FlatModel
     name: str
     real: Real = Real.DOUBLE
+    coefficients: int | None = None
+
+    @property
+    def parameters(self) -> tuple[Variable, ...]:
+        """Parameters of the model that are members of a structure; coefficients are none."""
+        return self.model.parameters[: len(self.model.parameters) - (self.coefficients or 0)]
 
     @cached_property
     def paths(self) -> MemberPaths:
         """Paths of the members of the structures."""
         m = self.model
-        groups = (m.inputs, m.outputs, m.parameters, m.states)
+        groups = (m.inputs, m.outputs, self.parameters, m.states)
         return MemberPaths(*(tuple(member_paths(group).values()) for group in groups))
 
     @cached_property
@@ -134,7 +144,7 @@ class CWriter:
     @cached_property
     def tables(self) -> list[CTable]:
         """Tables of the model."""
-        return c_tables(self.model, self.real)
+        return c_tables(self.model, self.real, owner="" if self.coefficients is None else "state->")
 
     @cached_property
     def arguments(self) -> dict[str, str]:
@@ -174,7 +184,7 @@ class CWriter:
 
     def structure(self, group: Group, title: str, *, numbered: bool = False) -> list[str]:
         """Return the type of a group of variables, numbered in the order of the model or not."""
-        variables: Sequence[Variable] = getattr(self.model, group)
+        variables = self.parameters if group == "parameters" else getattr(self.model, group)
         numbers = {variable.name: f"{i}: " if numbered else "" for i, variable in enumerate(variables)}
         lines = [f"/* {comment(title)} */", "typedef struct {"]
         if not variables:
@@ -223,8 +233,13 @@ class CWriter:
         """Return the constants that statements read: inputs, states, parameters, in this order."""
         lines, following = [], list(following)
         for letter, group in (("u", "inputs"), ("x", "states"), ("p", "parameters")):
-            used, paths = named_indices(following, letter), getattr(self.paths, group)
-            lines += [f"const {self.real} {letter}{i} = state->{group}.{paths[i]};" for i in sorted(used)]
+            used, paths = (
+                named_indices(following, letter),
+                [f"{group}.{p}" for p in getattr(self.paths, group)],
+            )
+            if group == "parameters":
+                paths += [f"coefficients[{i}]" for i in range(len(self.model.parameters) - len(paths))]
+            lines += [f"const {self.real} {letter}{i} = state->{paths[i]};" for i in sorted(used)]
         return lines
 
 
@@ -247,7 +262,7 @@ def guard_functions(c: CWriter) -> list[str]:
         "controller_guard.c": len(c.model.inputs) > len(c.readings),
         "controller_command.c": any(v.largest_rate < inf for v in c.model.inputs if v.name not in c.readings),
         "controller_reading.c": bool(c.readings),
-        "controller_parameter.c": bool(c.model.parameters),
+        "controller_parameter.c": bool(c.parameters),
     }
     texts = [c.filled(template, values) for template, is_wanted in wanted.items() if is_wanted]
     return [line for text in texts for line in (*text.splitlines(), "")]
@@ -423,6 +438,12 @@ def _leaf_name(member: str, branch: _Branch) -> str:
 
 def member_paths(variables: Sequence[Variable]) -> dict[str, str]:
     """Return the path of each variable inside its structure in C; two of one path are an ``ExportError``."""
+    paths = paths_in_memory(variables)
+    return {variable.name: paths[variable.name] for variable in variables}
+
+
+def paths_in_memory(variables: Sequence[Variable]) -> dict[str, str]:
+    """Return the path of each variable inside its structure in C, in the order of the members."""
     paths: dict[str, str] = {}
 
     def walk(branch: _Branch, path: str) -> None:
@@ -432,7 +453,7 @@ def member_paths(variables: Sequence[Variable]) -> dict[str, str]:
             walk(below, f"{path}{member}.")
 
     walk(_tree(variables), "")
-    return {variable.name: paths[variable.name] for variable in variables}
+    return paths
 
 
 def _remark(variable: Variable) -> str:

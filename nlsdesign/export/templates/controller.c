@@ -26,6 +26,7 @@ static const @name@_outputs start_outputs = {
     @start_outputs@
 };
 
+@default_block@
 @guards@
 void @name@_defaults(@name@_parameters *parameters)
 {
@@ -46,12 +47,14 @@ void @name@_defaults(@name@_parameters *parameters)
     return status;
 }
 
+@block_check@
 @init@
 {
     state->parameters = start_parameters;
     state->states = start_states;
     state->inputs = start_inputs;
     state->outputs = start_outputs;
+    @take_block@
     @start_readings@
     state->begun = 0u;
     state->started = @NAME@_INTERFACE_VERSION;
@@ -59,6 +62,7 @@ void @name@_defaults(@name@_parameters *parameters)
     return parameters == NULL ? 0u : @name@_set_parameters(state, parameters);
 }
 
+@load@
 @settled@
 /* Takes the inputs of a sample; begins with the first usable readings. */
 static uint32_t @name@_take(@name@_state *state, const @name@_inputs *inputs)
@@ -93,5 +97,6 @@ static uint32_t @name@_advance(@name@_state *state, @name@_outputs *outputs)
             status |= @name@_advance(state, outputs);
         }
     }
+    @noted@
     return status;
 }

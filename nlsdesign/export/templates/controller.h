@@ -25,12 +25,14 @@ extern "C" {
 @states@
 
 @reading@
+@block@
 /* One running instance; the caller owns it, there may be many. */
 typedef struct {
     @name@_parameters parameters;
     @name@_states states;
     @name@_inputs inputs; /* as they were taken */
     @name@_outputs outputs; /* last good */
+    @loaded@
     @readings@
     @derived@
     uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
@@ -49,6 +51,7 @@ void @name@_defaults(@name@_parameters *parameters);
 /* Takes over parameters, each only if it is within its range. Returns a status word; before init nothing is taken. */
 @set_parameters@;
 
+@load_head@
 /* Computes the outputs of this sample and the state of the next. Returns a status word. Before init, with a state
    of any content, all outputs are 0 and the word is @NAME@_NOT_STARTED. */
 @step@;

@@ -1,0 +1,3 @@
+for (uint32_t row = 0u; row < @count@u; ++row) {
+    @body@
+}
