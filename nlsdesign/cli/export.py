@@ -48,7 +48,8 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     further = (".hpp", "_example_posix.c", "_example_cortex_m.c", ".mk") if given["examples"] else ()
     build = ["CMakeLists.txt"] if further else []
     blocks = [f"{name}_block.json"] if given["with_block"] else []
-    return [*c_names(name), *(f"{name}{ending}" for ending in further), *build, *blocks]
+    packed = [f"{name}_library/library.json"] if given["package"] else []
+    return [*c_names(name), *(f"{name}{ending}" for ending in further), *build, *blocks, *packed]
 
 
 @export.command(
@@ -77,6 +78,12 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @real_option
 @flash_options
 @click.option("--examples", is_flag=True, help="Write main programs, a C++ class and build files beside it.")
+@click.option(
+    "--package", is_flag=True, help="Also write it as a library for PlatformIO, Arduino, Zephyr, CMake."
+)
+@click.option(
+    "--prove", is_flag=True, help="Prove with Frama-C: nothing undefined, all finite, for all inputs."
+)
 @click.option("--block", "with_block", is_flag=True, help="The code takes blocks of other numbers while it "
               "runs; NAME_block.json tells `export block` how to make them.")  # fmt: skip
 @json_option
@@ -87,7 +94,7 @@ def export_code(
 
     The observer is by default the one that is best over the spread of the deck.
     """
-    from ..export import export_c, write_examples
+    from ..export import export_c, prove_step, write_examples, write_package
     from ..foundation.progress import Steps
     from ..model import flatten
     from ..regeneration import range_remarks
@@ -95,6 +102,7 @@ def export_code(
     declared = machine_of(deck_name)
     plant = flatten(declared)
     with_examples, with_block = chosen.pop("examples"), chosen.pop("with_block")
+    packed, proved = chosen.pop("package"), chosen.pop("prove")
     with Steps().step(what):
         part = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     name, model, sentences = part.name, part.model, part.sentences
@@ -110,9 +118,18 @@ def export_code(
     written = [source.header, source.source, source.selftest, *([file] if file else [])]
     if with_examples:
         written += write_examples(source)
+    if packed:
+        written += write_package(source, out / f"{name}_library")
+    proof = None
+    if proved:
+        with Steps().step("proof"):
+            proof = prove_step(source)
+        sentences = (*sentences, *proof.words())
     remarks = range_remarks(declared, measured=chosen["measured"])
     warn(remarks)
     show_written(as_json, (model.description, *sentences), written, name=name, warnings=remarks)
+    if proof is not None and not proof.holds:
+        raise click.exceptions.Exit(1)
 
 
 class SampledPart(NamedTuple):

@@ -15,6 +15,8 @@ from .c.writer import CSource
 from .compilation.compiled_step import natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS
 from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
+from .compilation.proof import StepProof as StepProof
+from .compilation.proof import prove_step
 from .compilation.target_build import controller_sizes as controller_sizes
 from .compilation.target_run import measure_on_target
 from .cosimulation.convergence import Convergence, convergence
@@ -62,6 +64,7 @@ __all__ = [
     "loadable_model",
     "measure_on_target",
     "natively",
+    "prove_step",
     "quickest",
     "read_exports",
     "read_parameter_block",

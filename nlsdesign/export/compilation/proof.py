@@ -75,6 +75,13 @@ class StepProof:
         """Whether nothing is undefined and all that is given and remembered stays finite."""
         return not self.alarms and not self.open_members
 
+    def words(self) -> tuple[str, ...]:
+        """Return what was proved, or what is open, in sentences."""
+        if self.holds:
+            return ("proved for all inputs and any number of steps: nothing is undefined, all stays finite",)
+        open_members = [f"not proved finite: {', '.join(self.open_members)}"] if self.open_members else []
+        return (*(f"may be undefined: {alarm}" for alarm in self.alarms), *open_members)
+
 
 def missing_prover() -> str:
     """Return why nothing can be proved, or an empty text."""
@@ -124,8 +131,8 @@ def prove_step(source: CSource) -> StepProof:
     # In both runs: of any content a number may be anything, so a conversion that fits there always fits.
     alarms = tuple(
         f"line {line}: {' '.join(text.split())}"
-        for said in (anything, induction)
-        for line, text in _ALARM.findall(said)
+        for output in (anything, induction)
+        for line, text in _ALARM.findall(output)
     )
     reached, statements = (int(number) for number in (_REACHED.findall(induction) or [(0, 0)])[-1])
     seconds = time.perf_counter() - begin
@@ -188,7 +195,7 @@ def with_numbers_admitted(code: str) -> str:
 
 
 def _members(source: CSource) -> dict[str, str]:
-    """Return all that has to be finite, as C text, by a word that Eva repeats with its values."""
+    """Return all that has to be finite, as C text, by a label that Eva repeats with its values."""
     paths, readings = source.writer.paths, source.writer.readings
     remembered = ("last", "slope", "candidate", "mover")
     groups = {
@@ -203,8 +210,8 @@ def _members(source: CSource) -> dict[str, str]:
 
 def _harness(source: CSource, members: dict[str, str]) -> str:
     """Return the program whose values Eva computes."""
-    inside = {word: path for word, path in members.items() if path.startswith("state.")}
-    at_first = {word: path for word, path in inside.items() if not word.startswith(("states", "inputs"))}
+    inside = {label: path for label, path in members.items() if path.startswith("state.")}
+    at_first = {label: path for label, path in inside.items() if not label.startswith(("states", "inputs"))}
     unknown = ["Frama_C_make_unknown((char *)&state.readings, sizeof state.readings);"]
     values = {
         "name": source.name,
@@ -221,17 +228,17 @@ def _harness(source: CSource, members: dict[str, str]) -> str:
 
 
 def _shown(prefix: str, members: dict[str, str]) -> list[str]:
-    return [f"Frama_C_show_each_{prefix}{word}(0, {path});" for word, path in members.items()]
+    return [f"Frama_C_show_each_{prefix}{label}(0, {path});" for label, path in members.items()]
 
 
-def _open(said: str, members: dict[str, str]) -> tuple[str, ...]:
+def _open(output: str, members: dict[str, str]) -> tuple[str, ...]:
     """Return the members that were not shown finite wherever they were shown, or not shown at all."""
     finite: dict[str, bool] = {}
-    for word, _, values in _SHOWN.findall(said):
+    for label, _, values in _SHOWN.findall(output):
         good = "NaN" not in values and "inf" not in values and "--" not in values
-        finite[word] = finite.get(word, True) and good
-    at_first = [word.removeprefix("at_first_") for word, good in finite.items() if not good]
-    return tuple(path for word, path in members.items() if not finite.get(word, False) or word in at_first)
+        finite[label] = finite.get(label, True) and good
+    at_first = [label.removeprefix("at_first_") for label, good in finite.items() if not good]
+    return tuple(path for label, path in members.items() if not finite.get(label, False) or label in at_first)
 
 
 def _run(words: Sequence[str] | Iterable[str], folder: Path) -> str:

@@ -13,6 +13,9 @@ import nlsdesign as nls
 from nlsdesign.export import CSource, export_c
 from nlsdesign.export.compilation.proof import missing_prover, prove_step, with_numbers_admitted
 from nlsdesign.foundation.errors import ExportError
+from tests.command_line import Run, run
+
+__all__ = ["run"]
 
 needs_prover = pytest.mark.skipif(bool(missing_prover()), reason=missing_prover())
 
@@ -101,3 +104,14 @@ def test_what_a_comparison_implies_stands_behind_it() -> None:
     assert "{ /*@ admit !\\is_NaN((double)f); */" in said
     wrapped = "  if (a.very.long.name <=\n      other) x = 1;\n"
     assert "admit !\\is_NaN((double)a.very.long.name)" in with_numbers_admitted(wrapped)
+
+
+def test_the_command_writes_the_library_and_says_what_a_proof_needs(
+    run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", "")
+    words = ("export", "c", "--deck", "test_rig", "--what", "controller", "--out", str(tmp_path / "c"))
+    status, _, errors = run(*words, "--package", "--prove")
+    assert status != 0
+    assert "needs Frama-C" in errors
+    assert (tmp_path / "c" / "controller_library" / "src" / "controller.c").is_file()
