@@ -38,29 +38,16 @@ _DIGEST = re.compile("[0-9a-f]{64}")
 
 @dataclass(frozen=True)
 class ExportedFile:
-    """One file and what it says.
-
-    Parameters
-    ----------
-    path
-        The file.
-    kind
-        ``"C"``, ``"Modelica"``, ``"FMU"`` or ``"deck"``.
-    deck, digest
-        Of the deck that it is from, or is; the digest with 64 or, where the file has no more, 12 digits. Both
-        empty where it names none.
-    parent
-        Digest of the deck before that one; empty where there is none.
-    edited
-        Why it is not as it was written; empty where it is.
-    """
+    """One file and what it says."""
 
     path: Path
-    kind: str
+    kind: str  # "C", "Modelica", "FMU" or "deck"
+    # deck, digest: of the deck that it is from, or is; the digest with 64 or, where the file has no more, 12
+    # digits. Both empty where it names none.
     deck: str = ""
     digest: str = ""
-    parent: str = ""
-    edited: str = ""
+    parent: str = ""  # digest of the deck before that one; empty where there is none
+    edited: str = ""  # why it is not as it was written; empty where it is
 
     @property
     def short(self) -> str:
@@ -70,23 +57,12 @@ class ExportedFile:
 
 @dataclass(frozen=True)
 class ExportedFolder:
-    """The exported files and decks of a folder, and whether they belong together.
+    """The exported files and decks of a folder, and whether they belong together."""
 
-    Parameters
-    ----------
-    folder
-        That was looked through.
-    files
-        Files that this package wrote.
-    problems
-        Of files that could not be read.
-    reference
-        Digest of the deck that they are to belong to; empty if they are only to belong together.
-    """
-
-    folder: Path
-    files: tuple[ExportedFile, ...]
-    problems: tuple[ExportError, ...]
+    folder: Path  # that was looked through
+    files: tuple[ExportedFile, ...]  # files that this package wrote
+    problems: tuple[ExportError, ...]  # of files that could not be read
+    # reference: digest of the deck that they are to belong to; empty if they are only to belong together
     reference: str = ""
 
     @property

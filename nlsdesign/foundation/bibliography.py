@@ -13,31 +13,16 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Reference:
-    """A publication.
+    """A publication."""
 
-    Parameters
-    ----------
-    key
-        As texts cite it, for instance ``"Hunt and Crossley 1975"``.
-    authors
-        Family name first.
-    title, published
-        What, and in which journal, conference or by which publisher.
-    year
-        Of publication; ``None`` for a standard that is cited as it stands.
-    number
-        Of a report or standard, where there is one.
-    doi
-        Digital object identifier, where there is one and it was checked.
-    """
-
-    key: str
-    authors: tuple[str, ...]
+    key: str  # as texts cite it, for instance "Hunt and Crossley 1975"
+    authors: tuple[str, ...]  # family name first
+    # title, published: what, and in which journal, conference or by which publisher
     title: str
     published: str
-    year: int | None = None
-    number: str = ""
-    doi: str = ""
+    year: int | None = None  # of publication; None for a standard that is cited as it stands
+    number: str = ""  # of a report or standard, where there is one
+    doi: str = ""  # digital object identifier, where there is one and it was checked
 
     def __str__(self) -> str:
         year = f" ({self.year})" if self.year else ""

@@ -51,27 +51,13 @@ def heads_with_units(file: str, heads: Sequence[str], units: Mapping[str, str]) 
 
 @dataclass(frozen=True)
 class CsvTable:
-    """Columns of a text file.
+    """Columns of a text file."""
 
-    Parameters
-    ----------
-    heads
-        In the order of the file; they differ.
-    units
-        Of the columns, by head, where a row below the heads gives them.
-    columns
-        Numbers by head, shape (n,); those that end early are shorter.
-    lines
-        Number of the line of each row, counted from 1.
-    remarks
-        What was assumed about the file.
-    """
-
-    heads: tuple[str, ...]
-    units: dict[str, str]
-    columns: dict[str, Array]
-    lines: Sequence[int]
-    remarks: tuple[str, ...] = ()
+    heads: tuple[str, ...]  # in the order of the file; they differ
+    units: dict[str, str]  # of the columns, by head, where a row below the heads gives them
+    columns: dict[str, Array]  # numbers by head, shape (n,); those that end early are shorter
+    lines: Sequence[int]  # number of the line of each row, counted from 1
+    remarks: tuple[str, ...] = ()  # what was assumed about the file
 
 
 @contextlib.contextmanager

@@ -11,19 +11,12 @@ _EXTRA = "tables"
 
 
 class Axis(NamedTuple):
-    """What rows are numbered by.
+    """What rows are numbered by."""
 
-    Parameters
-    ----------
-    name, unit
-        For instance ``"time"`` and ``"s"``; no unit for words.
-    values
-        One for each row.
-    """
-
+    # name, unit: for instance "time" and "s"; no unit for words
     name: str
     unit: str
-    values: Any
+    values: Any  # one for each row
 
 
 def data_frame(

@@ -53,24 +53,12 @@ class Written(float):
 
 @dataclass(frozen=True)
 class ParentDeck:
-    """The deck that another deck was made from, as ``[deck]`` names it.
-
-    Parameters
-    ----------
-    name
-        Of the earlier deck.
-    digest
-        SHA-256 of its parts, 64 hexadecimal digits.
-    change
-        What was done to it, such as ``"diagnosed"``.
-    parent
-        The deck that it was made from itself.
-    """
+    """The deck that another deck was made from, as ``[deck]`` names it."""
 
     name: str
-    digest: str
-    change: str = ""
-    parent: ParentDeck | None = None
+    digest: str  # SHA-256 of its parts, 64 hexadecimal digits
+    change: str = ""  # what was done to it, such as "diagnosed"
+    parent: ParentDeck | None = None  # the deck that it was made from itself
 
     def __post_init__(self) -> None:
         for field_name in ("name", "digest", "change"):

@@ -99,21 +99,11 @@ _POWER = re.compile(r"^(?P<atom>[^\d^\-]+|1)(?:\^?(?P<power>-?\d+))?$")
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit as a factor to SI and exponents of the base units.
+    """A unit as a factor to SI and exponents of the base units."""
 
-    Parameters
-    ----------
-    text
-        The unit as written.
-    factor
-        Value in SI = value in this unit × factor.
-    exponents
-        Exponents of kg, m, s, A, K, rad, in this order.
-    """
-
-    text: str
-    factor: float
-    exponents: tuple[int, ...]
+    text: str  # the unit as written
+    factor: float  # value in SI = value in this unit × factor
+    exponents: tuple[int, ...]  # exponents of kg, m, s, A, K, rad, in this order
 
     @property
     def mechanical(self) -> tuple[int, ...]:

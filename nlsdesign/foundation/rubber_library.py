@@ -25,27 +25,14 @@ _FILE = "materials.toml"
 
 @dataclass(frozen=True)
 class Property:
-    """One thing that is known of a material.
+    """One thing that is known of a material."""
 
-    Parameters
-    ----------
-    name
-        Within the material.
-    measures
-        What the value is, in words.
-    quantity
-        Value or row of values; for the evidence ``"range"`` the lowest and the highest.
-    evidence
-        One of ``EVIDENCE``.
-    conditions
-        By name, one of ``CONDITIONS``; a row goes with the row of values, for a range it is one too. What is
-        not stated is missing.
-    """
-
-    name: str
-    measures: str
-    quantity: Quantity
-    evidence: str
+    name: str  # within the material
+    measures: str  # what the value is, in words
+    quantity: Quantity  # value or row of values; for the evidence "range" the lowest and the highest
+    evidence: str  # one of EVIDENCE
+    # conditions: by name, one of CONDITIONS; a row goes with the row of values, for a range it is one too.
+    # What is not stated is missing.
     conditions: Mapping[str, Quantity]
 
     def at(self, condition: str) -> str:

@@ -75,23 +75,12 @@ WORDS: Final[dict[FileState, str]] = {
 
 @dataclass
 class Keeping:
-    """What a command may replace in one folder and below, and what it wrote beside instead.
+    """What a command may replace in one folder and below, and what it wrote beside instead."""
 
-    Parameters
-    ----------
-    folder
-        Where it writes; other places are not looked at.
-    force
-        Whether everything may be replaced.
-    command
-        Name of the command, which the list holds beside the files that it wrote.
-    beside
-        Where the new file stands, by the file that was kept.
-    """
-
-    folder: Path
-    force: bool = False
-    command: str = ""
+    folder: Path  # where it writes; other places are not looked at
+    force: bool = False  # whether everything may be replaced
+    command: str = ""  # name of the command, which the list holds beside the files that it wrote
+    # beside: where the new file stands, by the file that was kept
     beside: dict[Path, Path] = field(default_factory=dict)
 
     def covers(self, path: Path) -> bool:

@@ -17,18 +17,10 @@ MACHINE = ("plant", "observer", "controller", "torque_loop")
 
 
 class ExportedMachine(NamedTuple):
-    """What was written of a machine.
+    """What was written of a machine."""
 
-    Parameters
-    ----------
-    files
-        Paths with a few words on each.
-    reasons
-        What could not be written, and why.
-    """
-
-    files: dict[Path, str]
-    reasons: tuple[str, ...]
+    files: dict[Path, str]  # paths with a few words on each
+    reasons: tuple[str, ...]  # what could not be written, and why
 
     def content(self) -> dict[str, list[str]]:
         """Return both for JSON."""

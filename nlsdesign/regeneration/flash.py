@@ -25,24 +25,12 @@ ATTEMPTS = 3
 
 @dataclass(frozen=True, eq=False)
 class SizedObserver:
-    """An observer and what it takes.
-
-    Parameters
-    ----------
-    designed
-        The observer.
-    code
-        Flash of the code in bytes, without tables; ``None`` where no compiler is installed.
-    tables
-        Flash of the tables in bytes.
-    processor
-        For which it was measured.
-    """
+    """An observer and what it takes."""
 
     designed: DesignedObserver
-    code: int | None
-    tables: int
-    processor: Processor
+    code: int | None  # flash of the code in bytes, without tables; None where no compiler is installed
+    tables: int  # flash of the tables in bytes
+    processor: Processor  # for which it was measured
 
     @property
     def flash(self) -> int:

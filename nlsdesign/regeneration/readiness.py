@@ -37,18 +37,10 @@ _POINTS = 33
 
 
 class Readiness(NamedTuple):
-    """Whether a command takes a deck.
+    """Whether a command takes a deck."""
 
-    Parameters
-    ----------
-    command
-        As it is typed, without ``nlsdesign``.
-    reason
-        Why not, with the next step; ``None`` where the deck is ready.
-    """
-
-    command: str
-    reason: NlsError | None
+    command: str  # as it is typed, without nlsdesign
+    reason: NlsError | None  # why not, with the next step; None where the deck is ready
 
     @property
     def ready(self) -> bool:

@@ -70,23 +70,14 @@ class ObserverChoice:
 
 
 class ObserverTorqueError(NamedTuple):
-    """Root mean square error of the estimated torque on one record, in its unit.
-
-    Parameters
-    ----------
-    record, role
-        Which.
-    before, after
-        Of the observers from the declared and from the better model.
-    torque
-        Root mean square of the measured torque.
-    """
+    """Root mean square error of the estimated torque on one record, in its unit."""
 
     record: str
     role: str
+    # before, after: of the observers from the declared and from the better model
     before: float
     after: float
-    torque: float
+    torque: float  # root mean square of the measured torque
 
 
 @dataclass(frozen=True, eq=False)

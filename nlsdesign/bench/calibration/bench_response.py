@@ -26,73 +26,37 @@ BALANCE = "balance of the drive"
 
 
 class BenchCourse(NamedTuple):
-    """What is known of a run at evenly spaced times, arrays of shape (n,).
+    """What is known of a run at evenly spaced times, arrays of shape (n,)."""
 
-    Parameters
-    ----------
-    step
-        Time between samples in s.
-    motion, rate
-        Of the driven body.
-    command
-        What drives it, for instance a current.
-    weight
-        Torque of a hung weight, positive against positive motion.
-    """
-
-    step: float
+    step: float  # time between samples in s
     motion: Array
     rate: Array
-    command: Array
-    weight: Array
+    command: Array  # what drives it, for instance a current
+    weight: Array  # torque of a hung weight, positive against positive motion
 
 
 class Shown(NamedTuple):
-    """What the machine should show at each sample.
+    """What the machine should show at each sample."""
 
-    Parameters
-    ----------
-    value
-        Acceleration of the drive at the measured command, its derivative with respect to the command, and the
-        channels; shape (2 + channels, n).
-    slope
-        Over the factors, shape (2 + channels, n, factors).
-    by_motion
-        Derivative with respect to the motion, shape (2 + channels, n).
-    """
-
+    # value: acceleration of the drive at the measured command, its derivative with respect to the command,
+    # and the channels; shape (2 + channels, n)
     value: Array
-    slope: Array
-    by_motion: Array
+    slope: Array  # over the factors, shape (2 + channels, n, factors)
+    by_motion: Array  # derivative with respect to the motion, shape (2 + channels, n)
 
 
 @dataclass(frozen=True, eq=False)
 class BenchResponse:
-    """Functions of a machine on the bench over factors: the logarithms of its numbers over their values.
-
-    Parameters
-    ----------
-    model
-        Of the bench.
-    channels
-        Measured efforts that are compared with the model.
-    balanced
-        Whether the command is measured, and compared with what the motion needs.
-    factors
-        Names of the numbers that vary; of those that share one factor the first stands for all. Three follow
-        for the instruments: zero of the motion, offset of the command, factor of the weight.
-    inner
-        Names of the states that the motion drives.
-    inertia
-        Which turns acceleration into effort, SI.
-    """
+    """Functions of a machine on the bench over factors: the logarithms of its numbers over their values."""
 
     model: FlatModel
-    channels: tuple[str, ...]
-    balanced: bool
+    channels: tuple[str, ...]  # measured efforts that are compared with the model
+    balanced: bool  # whether the command is measured, and compared with what the motion needs
+    # factors: names of the numbers that vary; of those that share one factor the first stands for all. Three
+    # follow for the instruments: zero of the motion, offset of the command, factor of the weight.
     factors: tuple[str, ...]
-    inner: tuple[str, ...]
-    inertia: float
+    inner: tuple[str, ...]  # names of the states that the motion drives
+    inertia: float  # which turns acceleration into effort, SI
     _rest: ca.Function
     _step: ca.Function
     _shown: ca.Function

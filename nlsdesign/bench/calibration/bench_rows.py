@@ -29,75 +29,36 @@ _MOVING = 5.0
 
 
 class SampleNoise(NamedTuple):
-    """Standard deviations of a sample.
-
-    Parameters
-    ----------
-    motion, command
-        Of the drive.
-    quantum
-        Count of the motion; zero where there is none.
-    channels
-        Of the measured efforts.
-    window
-        Length of a window in s.
-    """
+    """Standard deviations of a sample."""
 
     motion: float
     command: float
-    quantum: float
-    channels: tuple[float, ...]
-    window: float
+    quantum: float  # count of the motion; zero where there is none
+    channels: tuple[float, ...]  # of the measured efforts
+    window: float  # length of a window in s
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothWindows:
-    """Smooth windows over samples.
+    """Smooth windows over samples."""
 
-    Parameters
-    ----------
-    mean
-        Shape (rows, n): weighted means.
-    second
-        Shape (rows, n): second derivatives of the windowed mean over time, in 1/s².
-    centres
-        Sample in the middle of each row.
-    length
-        Samples of a window.
-    """
-
-    mean: csr_matrix
-    second: csr_matrix
-    centres: NDArray[np.int64]
-    length: int
+    mean: csr_matrix  # shape (rows, n): weighted means
+    second: csr_matrix  # shape (rows, n): second derivatives of the windowed mean over time, in 1/s²
+    centres: NDArray[np.int64]  # sample in the middle of each row
+    length: int  # samples of a window
 
 
 class BenchRows(NamedTuple):
-    """Rows of one channel of one record.
-
-    Parameters
-    ----------
-    channel
-        Name.
-    centres
-        Sample in the middle of each.
-    residual, sigma
-        Measured minus shown in the unit of the channel, and its noise; shape (rows,).
-    slope
-        Of the residual over the factors, shape (rows, columns).
-    shown
-        What the model shows, in the unit of the channel, shape (rows,).
-    size
-        Root mean square of what is compared, in its unit.
-    """
+    """Rows of one channel of one record."""
 
     channel: str
-    centres: NDArray[np.int64]
+    centres: NDArray[np.int64]  # sample in the middle of each
+    # residual, sigma: measured minus shown in the unit of the channel, and its noise; shape (rows,)
     residual: Array
     sigma: Array
-    slope: Array
-    shown: Array
-    size: float
+    slope: Array  # of the residual over the factors, shape (rows, columns)
+    shown: Array  # what the model shows, in the unit of the channel, shape (rows,)
+    size: float  # root mean square of what is compared, in its unit
 
 
 def windows(count: int, step: float, seconds: float) -> SmoothWindows:
@@ -150,24 +111,12 @@ def window_length(motion: Array, step: float) -> float:
 
 
 class RecordedRun(NamedTuple):
-    """A record on a bench.
+    """A record on a bench."""
 
-    Parameters
-    ----------
-    course
-        Motion, command and weight as measured.
-    measured
-        Efforts, shape (channels, n).
-    noise
-        Of a sample.
-    masked
-        Samples that are faulty, shape (n,).
-    """
-
-    course: BenchCourse
-    measured: Array
+    course: BenchCourse  # motion, command and weight as measured
+    measured: Array  # efforts, shape (channels, n)
     noise: SampleNoise
-    masked: Mask
+    masked: Mask  # samples that are faulty, shape (n,)
 
 
 def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRows]:

@@ -34,55 +34,29 @@ _RARE = 0.0027
 
 
 class CalibratedNumber(NamedTuple):
-    """One number before and after.
-
-    Parameters
-    ----------
-    name, unit
-        Which.
-    before, after
-        Values in SI.
-    spread_before, spread_after
-        Relative.
-    strain
-        How far it moved, in standard deviations of what was known.
-    told_by
-        What it is known from; empty where the records say nothing of it.
-    members
-        How many numbers of a row share its factor; the first stands for all.
-    """
+    """One number before and after."""
 
     name: str
     unit: str
+    # before, after: values in SI
     before: float
     after: float
+    # spread_before, spread_after: relative
     spread_before: float
     spread_after: float
-    strain: float
-    told_by: str
-    members: int = 1
+    strain: float  # how far it moved, in standard deviations of what was known
+    told_by: str  # what it is known from; empty where the records say nothing of it
+    members: int = 1  # how many numbers of a row share its factor; the first stands for all
 
 
 @dataclass(frozen=True, eq=False)
 class CalibratedMachine:
-    """A machine with calibrated numbers.
+    """A machine with calibrated numbers."""
 
-    Parameters
-    ----------
-    actuator
-        With new values, spreads and sources.
-    estimate
-        What was found.
-    numbers
-        Those that became better known or moved, in the order of the deck.
-    kept
-        Numbers that the deck cannot take as they were found, with the reason.
-    """
-
-    actuator: Assembly
-    estimate: Estimate
-    numbers: tuple[CalibratedNumber, ...]
-    kept: tuple[str, ...] = ()
+    actuator: Assembly  # with new values, spreads and sources
+    estimate: Estimate  # what was found
+    numbers: tuple[CalibratedNumber, ...]  # those that became better known or moved, in the order of the deck
+    kept: tuple[str, ...] = ()  # numbers that the deck cannot take as they were found, with the reason
 
     @property
     def declared_name(self) -> str:

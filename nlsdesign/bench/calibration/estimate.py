@@ -51,42 +51,23 @@ _SUSPECT = 3.0
 
 @dataclass(frozen=True, eq=False)
 class CalibrationRecords:
-    """Records of one kind of calibration.
+    """Records of one kind of calibration."""
 
-    Parameters
-    ----------
-    kind
-        How the machine stood on the bench.
-    records
-        Each begins at rest, with the rubber relaxed.
-    source
-        File or folder, for the deck.
-    """
-
-    kind: CalibrationTest
-    records: RecordSet
-    source: str = ""
+    kind: CalibrationTest  # how the machine stood on the bench
+    records: RecordSet  # each begins at rest, with the rubber relaxed
+    source: str = ""  # file or folder, for the deck
 
 
 class ChannelMisfit(NamedTuple):
-    """How well one channel of one record fits.
-
-    Parameters
-    ----------
-    record, channel, unit
-        Which.
-    residual, noise
-        Root mean square of what the model leaves over, and what noise alone would.
-    rows
-        How many windows of the record counted.
-    """
+    """How well one channel of one record fits."""
 
     record: str
     channel: str
     unit: str
+    # residual, noise: root mean square of what the model leaves over, and what noise alone would
     residual: float
     noise: float
-    rows: int
+    rows: int  # how many windows of the record counted
 
     @property
     def ratio(self) -> float:
@@ -96,35 +77,21 @@ class ChannelMisfit(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Numbers after a calibration.
+    """Numbers after a calibration."""
 
-    Parameters
-    ----------
-    before, after
-        What was known, and is; the values of ``after`` are the estimates.
-    strain
-        How far each number has moved, in standard deviations of the prior, by name.
-    doubt
-        The same, in standard deviations of what such records would move it by chance: several numbers of one
-        product are in doubt alike.
-    chance
-        How often a machine as declared would need numbers as far from the declared ones, all taken together.
-    misfits
-        Of each channel and record.
-    told_by
-        What each number is known from, by name; no entry where nothing was added.
-    files
-        Where the records came from.
-    """
-
+    # before, after: what was known, and is; the values of after are the estimates
     before: Prior
     after: Prior
-    strain: dict[str, float]
+    strain: dict[str, float]  # how far each number has moved, in standard deviations of the prior, by name
+    # doubt: the same, in standard deviations of what such records would move it by chance: several numbers of
+    # one product are in doubt alike
     doubt: dict[str, float]
+    # chance: how often a machine as declared would need numbers as far from the declared ones, all taken
+    # together
     chance: float
-    misfits: tuple[ChannelMisfit, ...]
-    told_by: dict[str, str]
-    files: tuple[str, ...]
+    misfits: tuple[ChannelMisfit, ...]  # of each channel and record
+    told_by: dict[str, str]  # what each number is known from, by name; no entry where nothing was added
+    files: tuple[str, ...]  # where the records came from
 
     @property
     def suspects(self) -> tuple[str, ...]:

@@ -34,24 +34,12 @@ _NARROWED = 0.9
 
 
 class BoughtBy(NamedTuple):
-    """What one calibration, or several together, would leave.
+    """What one calibration, or several together, would leave."""
 
-    Parameters
-    ----------
-    titles
-        What is done.
-    known
-        Of the numbers, afterwards.
-    torque
-        Standard deviation of the torque of the resting spring at each angle, N·m.
-    errors
-        Other errors in N·m, by name.
-    """
-
-    titles: tuple[str, ...]
-    known: Prior
-    torque: Array
-    errors: Mapping[str, float]
+    titles: tuple[str, ...]  # what is done
+    known: Prior  # of the numbers, afterwards
+    torque: Array  # standard deviation of the torque of the resting spring at each angle, N·m
+    errors: Mapping[str, float]  # other errors in N·m, by name
 
     @property
     def title(self) -> str:

@@ -29,33 +29,16 @@ _PER_WINDOW = 24
 
 @dataclass(frozen=True, eq=False)
 class BenchEvidence:
-    """A machine on the bench, its records, and what its instruments add to the unknowns.
+    """A machine on the bench, its records, and what its instruments add to the unknowns."""
 
-    Parameters
-    ----------
-    title
-        What was done.
-    source
-        Where the records come from.
-    response
-        Of the machine on the bench.
-    own
-        What is known of its numbers, those of the bench included.
-    runs
-        Name, and what was recorded or is expected.
-    units
-        Of each channel.
-    deviations
-        Of the instruments: zero of the motion, offset of the command, factor of the weight, then offset and
-        gain of each channel.
-    """
-
-    title: str
-    source: str
-    response: BenchResponse
-    own: Prior
-    runs: tuple[tuple[str, RecordedRun], ...]
+    title: str  # what was done
+    source: str  # where the records come from
+    response: BenchResponse  # of the machine on the bench
+    own: Prior  # what is known of its numbers, those of the bench included
+    runs: tuple[tuple[str, RecordedRun], ...]  # name, and what was recorded or is expected
     units: dict[str, str]
+    # deviations: of the instruments: zero of the motion, offset of the command, factor of the weight, then
+    # offset and gain of each channel
     deviations: Array
 
     @property
@@ -206,21 +189,9 @@ def _deviation(record: Record, signal: str) -> float:
 class Unknowns:
     """All benches over unknowns that are independent unit normals before anything is measured.
 
-    Parameters
-    ----------
-    known
-        Of the numbers of the machine.
-    benches
-        One or more.
-
-    Attributes
-    ----------
-    shapes
-        Names of the factors of the machine, which come first.
-    root
-        From the unknowns of the machine to its factors.
-    count
-        Number of unknowns, with those of the instruments.
+    ``known``: of the numbers of the machine. ``shapes``: names of the factors of the machine, which come
+    first. ``root``: from the unknowns of the machine to its factors. ``count``: number of unknowns, with
+    those of the instruments.
     """
 
     def __init__(self, known: Prior, benches: Sequence[BenchEvidence]) -> None:

@@ -42,18 +42,10 @@ def shown_values(model: FlatModel, record: Record, signal: str) -> Array:
 
 
 class BandError(NamedTuple):
-    """The error of a prediction in the band of frequencies that the record shows, beside the noise there.
+    """The error of a prediction in the band of frequencies that the record shows, beside the noise there."""
 
-    Parameters
-    ----------
-    error
-        Measured minus predicted, filtered as a fit filters it, root mean square.
-    noise_floor
-        What measurement noise alone would cause in it, root mean square.
-    """
-
-    error: float
-    noise_floor: float
+    error: float  # measured minus predicted, filtered as a fit filters it, root mean square
+    noise_floor: float  # what measurement noise alone would cause in it, root mean square
 
 
 def band_errors(actuator: Assembly, records: RecordSet, name: str) -> dict[str, BandError]:

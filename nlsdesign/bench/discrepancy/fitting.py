@@ -49,24 +49,13 @@ _DIVERGING = 0.5
 
 
 class Tally(NamedTuple):
-    """What one block leaves over on one record.
+    """What one block leaves over on one record."""
 
-    Parameters
-    ----------
-    squares
-        Sum of squared residuals in units of the noise floor.
-    rows
-        Number of residuals.
-    effective_size
-        How many independent residuals these are equivalent to, coloured as they are.
-    segments
-        Sum of squares where the numbers come from the other records, one for each piece of the record in
-        time. Empty where no record was left out.
-    """
-
-    squares: float
-    rows: int
-    effective_size: float
+    squares: float  # sum of squared residuals in units of the noise floor
+    rows: int  # number of residuals
+    effective_size: float  # how many independent residuals these are equivalent to, coloured as they are
+    # segments: sum of squares where the numbers come from the other records, one for each piece of the record
+    # in time. Empty where no record was left out.
     segments: tuple[float, ...] = ()
 
     @property
@@ -154,44 +143,34 @@ class Budget:
     """How much work fits may be: it counts evaluations and operations, never seconds.
 
     So every machine gives the same verdict.
-
-    Parameters
-    ----------
-    full_starts
-        So many starts are fitted to the end, the best by a linear look ahead; the others promise less.
-    evaluations, coarse_evaluations
-        Bounds of evaluations; fits of laws that suit the records end well below them by themselves.
-    long_evaluations
-        The same where a step takes so many operations that each evaluation lasts seconds.
-    coarse_tolerance
-        A coarse fit ends where it promises to gain less than this share of the cost: enough to compare.
-    polished_tolerance
-        The same for a fit to all samples of a hypothesis with effects; the declared model is fitted to the
-        end.
-    least_gain
-        Where a body flies freely, a coarse fit ends too where it promises to gain less than this share of the
-        cost without the effect: more is not known there.
-    long_step
-        Operations per step beyond which evaluations are few.
-    expensive_step
-        Operations per step beyond which a further effect is skipped: its fit would take minutes.
-    most_starts
-        Starts beyond which a further effect is skipped where a body flies freely, for the same reason.
-    least_explained
-        Share of the excess over the noise that a continuation must explain for the whole effect to be fitted:
-        a named effect explains at least half.
     """
 
+    # full_starts: so many starts are fitted to the end, the best by a linear look ahead; the others promise
+    # less
     full_starts: int = 3
+    # evaluations, coarse_evaluations: bounds of evaluations; fits of laws that suit the records end well
+    # below them by themselves
     evaluations: int = 40
     coarse_evaluations: int = 20
+    # long_evaluations: the same where a step takes so many operations that each evaluation lasts seconds
     long_evaluations: int = 6
+    # coarse_tolerance: a coarse fit ends where it promises to gain less than this share of the cost: enough
+    # to compare
     coarse_tolerance: float = 1e-3
+    # polished_tolerance: the same for a fit to all samples of a hypothesis with effects; the declared model
+    # is fitted to the end
     polished_tolerance: float = 2e-5
+    # least_gain: where a body flies freely, a coarse fit ends too where it promises to gain less than this
+    # share of the cost without the effect: more is not known there
     least_gain: float = 1e-3
-    long_step: int = 30_000
+    long_step: int = 30_000  # operations per step beyond which evaluations are few
+    # expensive_step: operations per step beyond which a further effect is skipped: its fit would take minutes
     expensive_step: int = 100_000
+    # most_starts: starts beyond which a further effect is skipped where a body flies freely, for the same
+    # reason
     most_starts: int = 8
+    # least_explained: share of the excess over the noise that a continuation must explain for the whole
+    # effect to be fitted: a named effect explains at least half
     least_explained: float = 0.3
 
 
@@ -202,64 +181,29 @@ _HELD = 1e-4
 
 @dataclass(frozen=True)
 class Limits:
-    """Where a fit may stop.
+    """Where a fit may stop."""
 
-    Parameters
-    ----------
-    evaluations
-        Bound on the number of evaluations.
-    tolerance
-        Share of the cost below which a promised gain is not pursued.
-    least
-        Gain of cost below which it is not either.
-    """
-
-    evaluations: int
-    tolerance: float
-    least: float = 0.0
+    evaluations: int  # bound on the number of evaluations
+    tolerance: float  # share of the cost below which a promised gain is not pursued
+    least: float = 0.0  # gain of cost below which it is not either
 
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """The free numbers of a group of blocks, and everything that the records say of them.
+    """The free numbers of a group of blocks, and everything that the records say of them."""
 
-    Parameters
-    ----------
-    bench
-        Records with filters and noise floors.
-    assembly
-        With the effect in it.
-    blocks
-        Names of the blocks; they share free numbers.
-    starts
-        Where a fit may begin; all of the same numbers in the same order.
-    evidence
-        What all records say.
-    new
-        Names of the free numbers that the newest effect has brought.
-    before
-        What was left over by block and record without the effect; empty where nothing was fitted yet.
-    unpredictable
-        Blocks and records that no fit should follow.
-    effects
-        Number of effects in the assembly that were not declared.
-    beside_free_flight
-        Whether a body flew freely without the newest effect already.
-    coarse
-        Whether this is a first look at thinned records.
-    """
-
-    bench: Bench
-    assembly: Assembly
-    blocks: tuple[str, ...]
-    starts: tuple[Start, ...]
-    evidence: tuple[Evidence, ...]
-    new: tuple[str, ...]
+    bench: Bench  # records with filters and noise floors
+    assembly: Assembly  # with the effect in it
+    blocks: tuple[str, ...]  # names of the blocks; they share free numbers
+    starts: tuple[Start, ...]  # where a fit may begin; all of the same numbers in the same order
+    evidence: tuple[Evidence, ...]  # what all records say
+    new: tuple[str, ...]  # names of the free numbers that the newest effect has brought
+    # before: what was left over by block and record without the effect; empty where nothing was fitted yet
     before: Mapping[Key, Tally]
-    unpredictable: frozenset[Key]
-    effects: int
-    beside_free_flight: bool
-    coarse: bool
+    unpredictable: frozenset[Key]  # blocks and records that no fit should follow
+    effects: int  # number of effects in the assembly that were not declared
+    beside_free_flight: bool  # whether a body flew freely without the newest effect already
+    coarse: bool  # whether this is a first look at thinned records
 
     @property
     def fitted(self) -> list[Evidence]:
@@ -313,14 +257,9 @@ class Strategy(ABC):
 
 @dataclass(frozen=True)
 class Plain(Strategy):
-    """Begin where the unknowns of the effect say.
+    """Begin where the unknowns of the effect say."""
 
-    Parameters
-    ----------
-    takes_long
-        Set where the effect moves faster than the samples, so that each evaluation takes long.
-    """
-
+    # takes_long: set where the effect moves faster than the samples, so that each evaluation takes long
     takes_long: bool = False
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
@@ -335,20 +274,11 @@ class Continuation(Strategy):
     Numbers of the same name and the same declared value carry over. Slow motion can hardly tell more of the
     effect from more of what it acts on, so each new number is held a little above as well: without the
     inertia behind it, backlash looks smaller than it is.
-
-    Parameters
-    ----------
-    through
-        The assembly with the simpler form of the effect.
-    hold
-        Multiple of each new number at which it is held while the others are fitted once more.
-    takes_long
-        Two forms are fitted, one after the other.
     """
 
-    through: Assembly
-    hold: float = 1.2
-    takes_long: bool = True
+    through: Assembly  # the assembly with the simpler form of the effect
+    hold: float = 1.2  # multiple of each new number at which it is held while the others are fitted once more
+    takes_long: bool = True  # two forms are fitted, one after the other
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return the starts that the simpler form leaves; nothing where it has no response."""

@@ -40,24 +40,12 @@ MOTION, RATE, ACCELERATION = 0, 1, 2
 
 @dataclass(frozen=True)
 class Measured:
-    """A measured signal and what it stands for.
+    """A measured signal and what it stands for."""
 
-    Parameters
-    ----------
-    reading
-        What it shows, through which sensors.
-    shown
-        Name of the variable that follows from it: a state or input, or the signal that is shown.
-    body
-        The body whose motion that is, ``None`` if it is none.
-    order
-        Of a motion: 0 for the motion itself, 1 for the rate, 2 for the acceleration.
-    """
-
-    reading: ReadingNames
-    shown: str
-    body: MovingBody | None = None
-    order: int = MOTION
+    reading: ReadingNames  # what it shows, through which sensors
+    shown: str  # name of the variable that follows from it: a state or input, or the signal that is shown
+    body: MovingBody | None = None  # the body whose motion that is, None if it is none
+    order: int = MOTION  # of a motion: 0 for the motion itself, 1 for the rate, 2 for the acceleration
 
     @property
     def signal(self) -> str:
@@ -116,24 +104,14 @@ _LEAST_SLOPE = 0.1
 
 
 class BalanceTerms(NamedTuple):
-    """A balance and what stands in it.
+    """A balance and what stands in it."""
 
-    Parameters
-    ----------
-    balance
-        Inertia times acceleration less all efforts.
-    derivative, state
-        Of the states left in the block, columns.
-    readings
-        Symbols of all measured signals and their derivatives.
-    parameter, declared
-        Symbols and numbers.
-    """
-
-    balance: Expression
+    balance: Expression  # inertia times acceleration less all efforts
+    # derivative, state: of the states left in the block, columns
     derivative: Expression
     state: Expression
-    readings: Expression
+    readings: Expression  # symbols of all measured signals and their derivatives
+    # parameter, declared: symbols and numbers
     parameter: Expression
     declared: Array
 
@@ -275,23 +253,14 @@ def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
 
 
 class _Sorted(NamedTuple):
-    """Measured signals by what they are used for.
+    """Measured signals by what they are used for."""
 
-    Parameters
-    ----------
-    drives
-        Motions, rates, commands and other inputs, inner states: they replace these variables.
-    efforts
-        Signals where the model is cut: predicted, and acting in place of the predicted ones elsewhere.
-    targets
-        Predicted only: what is measured twice, and what does not show a value.
-    accelerations
-        Measured accelerations by name of the body whose motion or rate is measured too.
-    """
-
+    # drives: motions, rates, commands and other inputs, inner states: they replace these variables
     drives: list[Measured]
+    # efforts: signals where the model is cut: predicted, and acting in place of the predicted ones elsewhere
     efforts: list[Measured]
-    targets: list[Measured]
+    targets: list[Measured]  # predicted only: what is measured twice, and what does not show a value
+    # accelerations: measured accelerations by name of the body whose motion or rate is measured too
     accelerations: dict[str, Measured]
 
 

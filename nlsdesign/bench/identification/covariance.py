@@ -33,23 +33,12 @@ be known."""
 
 
 class Piece(NamedTuple):
-    """Residuals of one block on one record.
+    """Residuals of one block on one record."""
 
-    Parameters
-    ----------
-    block
-        Its name.
-    record
-        Its name.
-    time
-        Of each row, in s from the begin of the record, shape (n,).
-    residual, slope
-        Shapes (n,) and (n, parameters).
-    """
-
-    block: str
-    record: str
-    time: Array
+    block: str  # its name
+    record: str  # its name
+    time: Array  # of each row, in s from the begin of the record, shape (n,)
+    # residual, slope: shapes (n,) and (n, parameters)
     residual: Array
     slope: Array
 

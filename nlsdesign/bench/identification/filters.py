@@ -144,22 +144,13 @@ class Smoothing:
     """A filter that keeps one sample of several: ``smoothing @ signal`` are its rows.
 
     Only its weights are kept, so that it takes no memory beside its rows, however long the record.
-
-    Parameters
-    ----------
-    count
-        Number of samples that it filters.
-    weights
-        To be convolved with the samples around the middle of a row, of odd number.
-    stride
-        Samples from one row to the next, before rows were left out.
-    places
-        Index of the sample in the middle of each row; every one is the first plus a multiple of the stride.
     """
 
-    count: int
-    weights: Array
-    stride: int
+    count: int  # number of samples that it filters
+    weights: Array  # to be convolved with the samples around the middle of a row, of odd number
+    stride: int  # samples from one row to the next, before rows were left out
+    # places: index of the sample in the middle of each row; every one is the first plus a multiple of the
+    # stride
     places: NDArray[np.int64]
 
     @property

@@ -159,21 +159,11 @@ Rows = Callable[[Array], tuple[Array, Array]]
 
 
 class Minimum(NamedTuple):
-    """Where the descent ended.
+    """Where the descent ended."""
 
-    Parameters
-    ----------
-    x
-        Point inside the bounds.
-    cost
-        Half the sum of squares there.
-    converged
-        Whether no step promised any more; otherwise the number of evaluations ran out.
-    """
-
-    x: Array
-    cost: float
-    converged: bool
+    x: Array  # point inside the bounds
+    cost: float  # half the sum of squares there
+    converged: bool  # whether no step promised any more; otherwise the number of evaluations ran out
 
 
 def minimise(
@@ -296,34 +286,19 @@ def _root(matrix: Array, largest: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Fitted numbers and how well they are known.
+    """Fitted numbers and how well they are known."""
 
-    Parameters
-    ----------
-    parameters
-        In the order of the vectors.
-    values
-        In SI by name.
-    covariance
-        In the fitted scale, ordered as the parameters; from the scatter of the residuals as they are, see
-        :func:`~.covariance.robust_covariance`.
-    cost
-        Half the sum of squares of residuals and priors.
-    misfit
-        Half the sum of squares of the residuals alone, per block and record.
-    converged
-        Whether the fit ended by itself.
-    white
-        What the covariance would be if the residuals were white noise of unit size, the information inverted;
-        ``None`` where that is not told.
-    """
-
-    parameters: tuple[Parameter, ...]
-    values: Mapping[str, float]
+    parameters: tuple[Parameter, ...]  # in the order of the vectors
+    values: Mapping[str, float]  # in SI by name
+    # covariance: in the fitted scale, ordered as the parameters; from the scatter of the residuals as they
+    # are, see robust_covariance
     covariance: Array
-    cost: float
+    cost: float  # half the sum of squares of residuals and priors
+    # misfit: half the sum of squares of the residuals alone, per block and record
     misfit: Mapping[tuple[str, str], float]
-    converged: bool
+    converged: bool  # whether the fit ended by itself
+    # white: what the covariance would be if the residuals were white noise of unit size, the information
+    # inverted; None where that is not told
     white: Array | None = None
 
     def standard_error(self, name: str) -> float:
@@ -526,22 +501,14 @@ def covariance_of(residual: Array, slope: Array, priors: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """The profile of one number.
-
-    Parameters
-    ----------
-    name
-        Of the number.
-    value, rise
-        Held values in SI, ascending, and how much the cost lies above its minimum; shape (n,).
-    lower, upper
-        Ends of the 95 % interval, where the rise passes 1.92; infinite where it never does: there the records
-        leave the number open.
-    """
+    """The profile of one number."""
 
     name: str
+    # value, rise: held values in SI, ascending, and how much the cost lies above its minimum; shape (n,)
     value: Array
     rise: Array
+    # lower, upper: ends of the 95 % interval, where the rise passes 1.92; infinite where it never does: there
+    # the records leave the number open
     lower: float
     upper: float
 

@@ -40,24 +40,12 @@ _STEP = 0.3
 
 @dataclass(frozen=True, eq=False)
 class SimulatedFit:
-    """A fit by simulation.
+    """A fit by simulation."""
 
-    Parameters
-    ----------
-    fit
-        Fitted numbers and how well they are known.
-    point
-        Fitted scale, and the state at the beginning of each window.
-    problem
-        What was minimised; its ``residual`` can be asked at other points.
-    iterations
-        Steps taken.
-    """
-
-    fit: Fit
-    point: Point
-    problem: SimulationError
-    iterations: int
+    fit: Fit  # fitted numbers and how well they are known
+    point: Point  # fitted scale, and the state at the beginning of each window
+    problem: SimulationError  # what was minimised; its residual can be asked at other points
+    iterations: int  # steps taken
 
     @property
     def first_states(self) -> dict[str, Array]:
@@ -306,21 +294,11 @@ def predict_in_windows(
 
 @dataclass(frozen=True)
 class Evolved:
-    """Where CMA-ES ended.
+    """Where CMA-ES ended."""
 
-    Parameters
-    ----------
-    values
-        In SI by name.
-    cost
-        Half the sum of squares of residuals and priors, as of :func:`fit_by_simulation`.
-    simulations
-        How often all records were simulated.
-    """
-
-    values: dict[str, float]
-    cost: float
-    simulations: int
+    values: dict[str, float]  # in SI by name
+    cost: float  # half the sum of squares of residuals and priors, as of fit_by_simulation
+    simulations: int  # how often all records were simulated
 
 
 def fit_by_cma(

@@ -195,28 +195,16 @@ def agreement(measured: Array, predicted: Array, *, noise: float = 0.0) -> Agree
 
 
 class Loop(NamedTuple):
-    """Work over a path that comes back to where it began.
+    """Work over a path that comes back to where it began."""
 
-    Parameters
-    ----------
-    work
-        ∮F dδ in J: what the piece has taken.
-    share
-        Of ∮|F dδ|, the work that went in and out.
-    uncertainty
-        Standard deviation of the work, from the noise of the force, in J.
-    first, last
-        Indices of the samples between which the path is closed.
-    late_by
-        Least delay of the force against the extension in s that turns the sign: with the force read so much
-        earlier the loop is empty. Zero where the work is not negative.
-    """
-
-    work: float
-    share: float
-    uncertainty: float
+    work: float  # ∮F dδ in J: what the piece has taken
+    share: float  # of ∮|F dδ|, the work that went in and out
+    uncertainty: float  # standard deviation of the work, from the noise of the force, in J
+    # first, last: indices of the samples between which the path is closed
     first: int
     last: int
+    # late_by: least delay of the force against the extension in s that turns the sign: with the force read so
+    # much earlier the loop is empty. Zero where the work is not negative.
     late_by: float
 
     @property

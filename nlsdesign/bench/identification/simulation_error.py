@@ -86,36 +86,19 @@ class Carry(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """Residuals and their derivatives at a point, gaps between windows eliminated.
+    """Residuals and their derivatives at a point, gaps between windows eliminated."""
 
-    Parameters
-    ----------
-    residual
-        Priors first, then the records, in standard deviations.
-    closing
-        What closing the gaps adds to the residuals.
-    slope
-        Over parameters and first states, shape (rows, unknowns).
-    defect
-        Sum of the gaps relative to the size of the states.
-    carries
-        One for each record.
-    """
-
-    residual: Array
-    closing: Array
-    slope: Array
-    defect: float
-    carries: tuple[Carry, ...]
+    residual: Array  # priors first, then the records, in standard deviations
+    closing: Array  # what closing the gaps adds to the residuals
+    slope: Array  # over parameters and first states, shape (rows, unknowns)
+    defect: float  # sum of the gaps relative to the size of the states
+    carries: tuple[Carry, ...]  # one for each record
 
 
 class SimulationError:
     """Records against a model with some parameters free.
 
-    Attributes
-    ----------
-    priors
-        How many of the residuals are those of priors; they come first.
+    ``priors``: how many of the residuals are those of priors; they come first.
     """
 
     def __init__(

@@ -30,22 +30,15 @@ from .records.measurement import Record
 
 @dataclass(frozen=True)
 class Wiring:
-    """Wires between the measured signals of records and a model.
+    """Wires between the measured signals of records and a model."""
 
-    Parameters
-    ----------
-    inputs
-        How each driven input of the model follows from a measured signal, by name of the input. Others rest
-        at their start value.
-    outputs
-        Signal or state of the model that predicts each measured signal, by name of the measured one.
-    late_by
-        Name of a parameter of the fit that says by how many seconds a measured signal comes late, by name of
-        the measured one.
-    """
-
+    # inputs: how each driven input of the model follows from a measured signal, by name of the input. Others
+    # rest at their start value.
     inputs: Mapping[str, Drive]
+    # outputs: signal or state of the model that predicts each measured signal, by name of the measured one
     outputs: Mapping[str, str]
+    # late_by: name of a parameter of the fit that says by how many seconds a measured signal comes late, by
+    # name of the measured one
     late_by: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -77,26 +70,14 @@ def wired(model: FlatModel, measured: Sequence[str], late_by: Mapping[str, str] 
 
 
 class Shot(NamedTuple):
-    """What the windows of one record predict.
+    """What the windows of one record predict."""
 
-    Parameters
-    ----------
-    output
-        Shape (outputs, samples).
-    by_start
-        Derivatives with respect to the beginning of the own window, shape (outputs, states, samples).
-    by_parameter
-        Shape (outputs, parameters, samples).
-    end
-        State at the end of each window, shape (windows, states).
-    end_by_start, end_by_parameter
-        Shapes (windows, states, states) and (windows, states, parameters).
-    """
-
-    output: Array
+    output: Array  # shape (outputs, samples)
+    # by_start: derivatives with respect to the beginning of the own window, shape (outputs, states, samples)
     by_start: Array
-    by_parameter: Array
-    end: Array
+    by_parameter: Array  # shape (outputs, parameters, samples)
+    end: Array  # state at the end of each window, shape (windows, states)
+    # end_by_start, end_by_parameter: shapes (windows, states, states) and (windows, states, parameters)
     end_by_start: Array
     end_by_parameter: Array
 
@@ -169,18 +150,9 @@ def _seen(model: FlatModel, wiring: Wiring, record: Record) -> dict[int, Array]:
 class Shooter:
     """A model as it is shot through windows of records.
 
-    Parameters
-    ----------
-    model
-        Continuous, without tables.
-    free
-        Names of the parameters with respect to which derivatives are taken.
-    wiring
-        Names the outputs.
-    substeps
-        Integration steps from sample to sample.
-    slopes
-        Whether derivatives are wanted; without them their arrays have no columns.
+    ``free``: names of the parameters with respect to which derivatives are taken. ``substeps``: integration
+    steps from sample to sample. ``slopes``: whether derivatives are wanted; without them their arrays have no
+    columns.
     """
 
     def __init__(

@@ -87,25 +87,16 @@ MOST = 1_000_000
 
 @dataclass(frozen=True)
 class ReadingNumbers:
-    """Numbers of one measured input, per sample.
+    """Numbers of one measured input, per sample."""
 
-    Parameters
-    ----------
-    lowest, highest
-        Range of the reading.
-    change
-        Largest change from sample to sample.
-    noticeable
-        Change of what moves the machine that the reading cannot fail to show; negative where that is unknown.
-    patience
-        Samples without change after which the reading is stale.
-    """
-
+    # lowest, highest: range of the reading
     lowest: float
     highest: float
-    change: float
+    change: float  # largest change from sample to sample
+    # noticeable: change of what moves the machine that the reading cannot fail to show; negative where that
+    # is unknown
     noticeable: float
-    patience: int
+    patience: int  # samples without change after which the reading is stale
 
 
 def reading_numbers(variable: Variable, sample_time: float, real: Real) -> ReadingNumbers | None:

@@ -62,18 +62,10 @@ _WRITTEN = frozenset([0.0, 0.5, 1.0, 2.0])
 
 
 class ColumnsInC(NamedTuple):
-    """Code of a run, and what is given to it.
+    """Code of a run, and what is given to it."""
 
-    Parameters
-    ----------
-    text
-        C code with a function ``run``.
-    numbers
-        Constants, then grid and values of each table.
-    """
-
-    text: str
-    numbers: Array
+    text: str  # C code with a function run
+    numbers: Array  # constants, then grid and values of each table
 
 
 class _Given:

@@ -41,17 +41,12 @@ from .cross_compiler import (
 class CompiledStep:
     """A controller's step, compiled for this machine and loaded; one object is one instance.
 
-    Parameters
-    ----------
-    source
-        Generated C files.
-    parameters
-        Parameters in the order of the model; those of the design by default.
-
     Examples
     --------
     >>> step = CompiledStep(export_c(observer, "out/c"))  # doctest: +SKIP
     >>> outputs, status = step([0.1, 1.5])  # doctest: +SKIP
+
+    ``parameters``: parameters in the order of the model; those of the design by default.
     """
 
     def __init__(self, source: CSource, parameters: Sequence[float] | None = None) -> None:
@@ -164,12 +159,8 @@ def quickest() -> Translate:
 class CompiledColumns:
     """Compiled code that runs samples of many columns.
 
-    Parameters
-    ----------
-    code
-        With a function ``run``, and the numbers that are given to it.
-    kept
-        How many values are kept of a sample.
+    ``code``: with a function ``run``, and the numbers that are given to it. ``kept``: how many values are
+    kept of a sample.
     """
 
     def __init__(self, code: ColumnsInC, kept: int) -> None:

@@ -32,24 +32,13 @@ THIS_PROCESSOR = ("-mcpu=native",)
 
 @dataclass(frozen=True)
 class Platform:
-    """A machine that binaries are built for.
+    """A machine that binaries are built for."""
 
-    Parameters
-    ----------
-    name
-        Name as FMI 3.0 writes it: architecture-system.
-    target
-        Target triple of the compiler; glibc 2.17 of 2012 and macOS 11 are the oldest that are served.
-    extension
-        Of a shared library.
-    fmi2
-        Folder in the binaries of an FMI 2.0 unit.
-    """
-
-    name: str
+    name: str  # name as FMI 3.0 writes it: architecture-system
+    # target: target triple of the compiler; glibc 2.17 of 2012 and macOS 11 are the oldest that are served
     target: str
     extension: str
-    fmi2: str
+    fmi2: str  # folder in the binaries of an FMI 2.0 unit
 
 
 PLATFORMS: Mapping[str, Platform] = MappingProxyType(

@@ -47,25 +47,14 @@ static {real} copysign_({real} x, {real} y)
 
 @dataclass(frozen=True)
 class StepProof:
-    """What was proved of a generated step, for all inputs, accepted parameters and numbers of steps.
-
-    Parameters
-    ----------
-    name
-        Of the step.
-    alarms
-        What may be undefined, as Eva says it, with the line of the copy that it read; empty where nothing is.
-    open_members
-        Members that were not proved finite after a step; empty where all were.
-    reached, statements
-        How many statements the analysis reached, and of how many.
-    seconds
-        Of both analyses.
-    """
+    """What was proved of a generated step, for all inputs, accepted parameters and numbers of steps."""
 
     name: str
+    # alarms: what may be undefined, as Eva says it, with the line of the copy that it read; empty where
+    # nothing is
     alarms: tuple[str, ...]
-    open_members: tuple[str, ...]
+    open_members: tuple[str, ...]  # members that were not proved finite after a step; empty where all were
+    # reached, statements: how many statements the analysis reached, and of how many
     reached: int
     statements: int
     seconds: float

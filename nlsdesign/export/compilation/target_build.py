@@ -22,21 +22,11 @@ _NO_BITS = 8
 
 @dataclass(frozen=True)
 class SectionSizes:
-    """What an object or image takes.
+    """What an object or image takes."""
 
-    Parameters
-    ----------
-    constant
-        Code and constants in bytes.
-    preset
-        Variables with a start value in bytes: in flash and in working memory.
-    cleared
-        Variables that start at zero in bytes.
-    """
-
-    constant: int
-    preset: int
-    cleared: int
+    constant: int  # code and constants in bytes
+    preset: int  # variables with a start value in bytes: in flash and in working memory
+    cleared: int  # variables that start at zero in bytes
 
     @property
     def flash(self) -> int:

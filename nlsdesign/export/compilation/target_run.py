@@ -82,58 +82,28 @@ _KNOWN, _NOTHING = 2003, 2  # instructions of the two functions of the template
 
 @dataclass(frozen=True, eq=False)
 class TargetRun:
-    """One run of the vectors of the self-test on the processor.
+    """One run of the vectors of the self-test on the processor."""
 
-    Parameters
-    ----------
-    instructions
-        Of the step at each sample, the return included, to one part in 4000, shape (samples,).
-    stack
-        Deepest use at each sample in bytes, without interrupts, shape (samples,).
-    outputs
-        Shape (samples, outputs).
-    status
-        Status words, shape (samples,).
-    same
-        Whether all outputs and status words are those of the same code on this machine, bit by bit.
-    """
-
+    # instructions: of the step at each sample, the return included, to one part in 4000, shape (samples,)
     instructions: NDArray[np.int64]
-    stack: NDArray[np.int64]
-    outputs: Array
-    status: NDArray[np.int64]
-    same: bool
+    stack: NDArray[np.int64]  # deepest use at each sample in bytes, without interrupts, shape (samples,)
+    outputs: Array  # shape (samples, outputs)
+    status: NDArray[np.int64]  # status words, shape (samples,)
+    same: bool  # whether all outputs and status words are those of the same code on this machine, bit by bit
 
 
 @dataclass(frozen=True, eq=False)
 class TargetMeasurement:
-    """What a controller costs on a processor.
-
-    Parameters
-    ----------
-    source
-        The controller.
-    processor
-        Where.
-    alone
-        Its own code, tables and variables.
-    added
-        What it adds to a program, with all that it calls, for instance arithmetic in software.
-    state
-        Size of the structure that the caller owns, in bytes.
-    run
-        What was seen in the emulator; ``None`` where there is none.
-    reason
-        Why it was not run; empty otherwise.
-    """
+    """What a controller costs on a processor."""
 
     source: CSource
-    processor: Processor
-    alone: SectionSizes
+    processor: Processor  # where
+    alone: SectionSizes  # its own code, tables and variables
+    # added: what it adds to a program, with all that it calls, for instance arithmetic in software
     added: SectionSizes
-    state: int
-    run: TargetRun | None
-    reason: str = ""
+    state: int  # size of the structure that the caller owns, in bytes
+    run: TargetRun | None  # what was seen in the emulator; None where there is none
+    reason: str = ""  # why it was not run; empty otherwise
 
     @property
     def flash(self) -> int:

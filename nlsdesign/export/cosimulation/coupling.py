@@ -48,14 +48,10 @@ class Feed(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class GivenFeed:
-    """A signal from outside.
+    """A signal from outside."""
 
-    Parameters
-    ----------
-    values, left, middle
-        Value at each communication point, just before it, and to be held over the step from it.
-    """
-
+    # values, left, middle: value at each communication point, just before it, and to be held over the step
+    # from it
     values: Array
     left: Array
     middle: Array
@@ -110,24 +106,14 @@ class HeldFeed:
 
 @dataclass(eq=False)
 class LateFeed:
-    """An earlier value of a sampled output.
+    """An earlier value of a sampled output."""
 
-    Parameters
-    ----------
-    held
-        The present value.
-    samples
-        Everything that the source has computed, by sample.
-    period, delay
-        Sample time of the source and delay in s.
-    first
-        Value of the input before the first sample arrives; ``None`` for what the source shows before it.
-    """
-
-    held: HeldFeed
-    samples: list[float]
+    held: HeldFeed  # the present value
+    samples: list[float]  # everything that the source has computed, by sample
+    # period, delay: sample time of the source and delay in s
     period: float
     delay: float
+    # first: value of the input before the first sample arrives; None for what the source shows before it
     first: float | None
     moves: ClassVar[bool] = False
 
@@ -159,18 +145,10 @@ class LateFeed:
 
 @dataclass(eq=False)
 class Curve:
-    """A continuous output over time: known up to the present, and a slope beyond.
+    """A continuous output over time: known up to the present, and a slope beyond."""
 
-    Parameters
-    ----------
-    column
-        In the row of present values.
-    smooth
-        Whether a slope makes sense; that of a discrete output is zero.
-    """
-
-    column: int
-    smooth: bool
+    column: int  # in the row of present values
+    smooth: bool  # whether a slope makes sense; that of a discrete output is zero
     times: list[float] = field(default_factory=list, init=False)
     ends: list[float] = field(default_factory=list, init=False)
     """Values at the end of the step that leads to each time."""

@@ -105,60 +105,29 @@ _KINDS = {"Real": "real", "Float64": "real", "Integer": "integer", "Int32": "int
 
 @dataclass(frozen=True)
 class FmuScalar:
-    """A scalar variable of an FMU.
+    """A scalar variable of an FMU."""
 
-    Parameters
-    ----------
-    name
-        As the FMU states it.
-    reference
-        Value reference.
-    causality, variability
-        As in FMI.
-    kind
-        ``"real"`` or ``"integer"``.
-    unit
-        ``None`` if the FMU gives none.
-    start
-        ``None`` if the FMU gives none.
-    """
-
-    name: str
-    reference: int
+    name: str  # as the FMU states it
+    reference: int  # value reference
     causality: str
     variability: str
-    kind: str
-    unit: str | None
-    start: float | None
+    kind: str  # "real" or "integer"
+    unit: str | None  # none if the FMU gives none
+    start: float | None  # none if the FMU gives none
 
 
 @dataclass(frozen=True)
 class FmuDescription:
-    """A co-simulation FMU that was unpacked.
+    """A co-simulation FMU that was unpacked."""
 
-    Parameters
-    ----------
-    instance
-        Name of the instance.
-    folder
-        Where its files are.
-    version
-        ``"2.0"`` or ``"3.0"``.
-    identifier, token
-        Name of the library, and what it is instantiated with.
-    rolls_back
-        Whether its state can be kept and restored.
-    variables
-        Real and integer scalars by name.
-    """
-
-    instance: str
-    folder: Path
-    version: str
+    instance: str  # name of the instance
+    folder: Path  # where its files are
+    version: str  # "2.0" or "3.0"
+    # identifier, token: name of the library, and what it is instantiated with
     identifier: str
     token: str
-    rolls_back: bool
-    variables: Mapping[str, FmuScalar]
+    rolls_back: bool  # whether its state can be kept and restored
+    variables: Mapping[str, FmuScalar]  # real and integer scalars by name
 
     @property
     def sample_time(self) -> float | None:

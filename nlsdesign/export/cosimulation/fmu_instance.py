@@ -23,12 +23,7 @@ from .isolation import Activity, Watch
 class LoadedFmu:
     """An FMU that has been loaded and instantiated.
 
-    Parameters
-    ----------
-    description
-        Of the FMU.
-    watch
-        Told what is called, so that a crash can be explained.
+    ``watch``: told what is called, so that a crash can be explained.
     """
 
     def __init__(self, description: FmuDescription, watch: Watch) -> None:

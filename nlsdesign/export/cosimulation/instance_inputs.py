@@ -17,14 +17,7 @@ from .wires import split_name
 class InstanceInputs:
     """The driven inputs of one instance.
 
-    Parameters
-    ----------
-    instance
-        Whose they are.
-    feeds
-        What each reads, by variable.
-    columns
-        Of the row of present values, by full name.
+    ``columns``: of the row of present values, by full name.
     """
 
     def __init__(self, instance: FmuInstance, feeds: Mapping[str, Feed], columns: Mapping[str, int]) -> None:
@@ -72,14 +65,7 @@ class InstanceInputs:
 class ConnectedInputs:
     """All inputs of a run, and the values that they keep of the past.
 
-    Parameters
-    ----------
-    plan
-        What is run.
-    instances
-        By name, with their parameters set.
-    now
-        Present values, in the columns of the plan.
+    ``instances``: by name, with their parameters set. ``now``: present values, in the columns of the plan.
     """
 
     def __init__(self, plan: Plan, instances: Mapping[str, FmuInstance], now: Array) -> None:

@@ -68,17 +68,10 @@ _WORDS = {
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """What is being done, in memory that the process and its owner share.
-
-    Parameters
-    ----------
-    names
-        Of the instances.
-    cells
-        Shared integers: number of the instance, activity, row, and a counter of calls.
-    """
+    """What is being done, in memory that the process and its owner share."""
 
     names: tuple[str, ...]
+    # cells: shared integers: number of the instance, activity, row, and a counter of calls
     cells: Any = field(default_factory=lambda: memoryview(mmap.mmap(-1, 32)).cast("q"))
 
     def __call__(self, instance: int, activity: int) -> None:
@@ -105,33 +98,15 @@ class Watch:
 
 @dataclass(frozen=True, eq=False)
 class IsolatedWork:
-    """Work that fills an array, in a process of its own.
+    """Work that fills an array, in a process of its own."""
 
-    Parameters
-    ----------
-    work
-        Fills the array that it is given.
-    watch
-        Which the work tells what it does.
-    times
-        Time of each row in s, for messages.
-    columns
-        Of the array.
-    folder
-        The process works there, and what it prints goes there; its owner removes it.
-    patience
-        Most seconds for one call into a library.
-    progress
-        Told how far the work is.
-    """
-
-    work: Callable[[Array], None]
-    watch: Watch
-    times: Array
+    work: Callable[[Array], None]  # fills the array that it is given
+    watch: Watch  # which the work tells what it does
+    times: Array  # time of each row in s, for messages
     columns: int
-    folder: Path
-    patience: float
-    progress: Progress
+    folder: Path  # the process works there, and what it prints goes there; its owner removes it
+    patience: float  # most seconds for one call into a library
+    progress: Progress  # told how far the work is
 
     def result(self) -> Array:
         """Do the work and return the array, shape (rows, columns)."""

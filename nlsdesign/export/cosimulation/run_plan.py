@@ -80,37 +80,21 @@ def rows_of(points: Array, times: Array) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Link:
-    """A wire with its numbers.
+    """A wire with its numbers."""
 
-    Parameters
-    ----------
-    target, source
-        ``instance.variable``.
-    gain
-        Factor between the numbers of both ends.
-    delay
-        In s.
-    fresh
-        Whether a sampled source has computed already when its target reads at the same time.
-    """
-
+    # target, source: instance.variable
     target: str
     source: str
-    gain: float
-    delay: float
-    fresh: bool
+    gain: float  # factor between the numbers of both ends
+    delay: float  # in s
+    fresh: bool  # whether a sampled source has computed already when its target reads at the same time
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A signal from outside at the communication points.
+    """A signal from outside at the communication points."""
 
-    Parameters
-    ----------
-    values, left, middle
-        At each point, just before it, and in the middle of the step from it.
-    """
-
+    # values, left, middle: at each point, just before it, and in the middle of the step from it
     values: Array
     left: Array
     middle: Array

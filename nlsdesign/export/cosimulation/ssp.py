@@ -249,17 +249,10 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class WrittenSystem:
-    """An SSP archive that was written.
-
-    Parameters
-    ----------
-    path
-        The archive.
-    notes
-        What the standard has no place for: kept in annotations, which other tools may ignore.
-    """
+    """An SSP archive that was written."""
 
     path: Path
+    # notes: what the standard has no place for: kept in annotations, which other tools may ignore
     notes: tuple[str, ...]
 
 

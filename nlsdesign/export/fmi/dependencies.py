@@ -14,38 +14,21 @@ from .fmu_variables import FmuLayout, FmuVariable
 
 @dataclass(frozen=True)
 class FmiUnknown:
-    """One unknown of the model structure, as FMI calls it.
-
-    Parameters
-    ----------
-    variable
-        The unknown.
-    dependencies
-        Value references of the knowns it depends on.
-    kinds
-        Their kinds as FMI names them.
-    """
+    """One unknown of the model structure, as FMI calls it."""
 
     variable: FmuVariable
-    dependencies: tuple[int, ...]
-    kinds: tuple[str, ...]
+    dependencies: tuple[int, ...]  # value references of the knowns it depends on
+    kinds: tuple[str, ...]  # their kinds as FMI names them
 
 
 @dataclass(frozen=True)
 class ModelStructure:
-    """The model structure.
+    """The model structure."""
 
-    Parameters
-    ----------
-    outputs, derivatives
-        Depend on inputs, continuous states and time.
-    initial
-        Computed at the start; these depend also on parameters and start values.
-    """
-
+    # outputs, derivatives: depend on inputs, continuous states and time
     outputs: tuple[FmiUnknown, ...]
     derivatives: tuple[FmiUnknown, ...]
-    initial: tuple[FmiUnknown, ...]
+    initial: tuple[FmiUnknown, ...]  # computed at the start; these depend also on parameters and start values
 
 
 def model_structure(layout: FmuLayout) -> ModelStructure:

@@ -24,21 +24,13 @@ _LINEAR = frozenset([ca.OP_ADD, ca.OP_SUB, ca.OP_NEG, ca.OP_TWICE, ca.OP_ASSIGN,
 
 @dataclass(frozen=True)
 class Dependence:
-    """How a value depends on numbered symbols; sets are the bits of whole numbers.
+    """How a value depends on numbered symbols; sets are the bits of whole numbers."""
 
-    Parameters
-    ----------
-    on
-        All symbols that it depends on.
-    scaled
-        Those whose factor is not a constant: it depends on other symbols, or there is no factor at all.
-    nonlinear
-        Those whose factor changes while the model runs, or for which there is none: rounded, compared,
-        multiplied by another changing value.
-    """
-
-    on: int = 0
+    on: int = 0  # all symbols that it depends on
+    # scaled: those whose factor is not a constant: it depends on other symbols, or there is no factor at all
     scaled: int = 0
+    # nonlinear: those whose factor changes while the model runs, or for which there is none: rounded,
+    # compared, multiplied by another changing value
     nonlinear: int = 0
 
     def joined(self, other: Dependence) -> Dependence:

@@ -66,31 +66,15 @@ _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\]
 
 @dataclass(frozen=True)
 class FmuVariable:
-    """One variable of an FMU.
+    """One variable of an FMU."""
 
-    Parameters
-    ----------
-    reference
-        Value reference.
-    variable
-        Name, unit, description, start, range.
-    causality, variability
-        As FMI names them.
-    initial
-        ``"exact"``, ``"calculated"`` or ``None`` where FMI wants none.
-    derivative_of
-        Value reference of the state whose derivative this is.
-    integer
-        Whether it is an integer, the status word.
-    """
-
-    reference: int
-    variable: Variable
+    reference: int  # value reference
+    variable: Variable  # name, unit, description, start, range
     causality: str
     variability: str
-    initial: str | None = None
-    derivative_of: int | None = None
-    integer: bool = False
+    initial: str | None = None  # "exact", "calculated" or None where FMI wants none
+    derivative_of: int | None = None  # value reference of the state whose derivative this is
+    integer: bool = False  # whether it is an integer, the status word
 
     @property
     def has_start(self) -> bool:
@@ -100,18 +84,12 @@ class FmuVariable:
 
 @dataclass(frozen=True, eq=False)
 class FmuLayout:
-    """All variables of an FMU by group.
-
-    Parameters
-    ----------
-    model
-        The model.
-    time, states, derivatives, inputs, parameters, outputs, signals, indicators, modes, extra, status
-        The groups in the order of the value references. ``outputs`` and ``signals`` leave out states and
-        variables named before; ``extra`` is the tolerance of the integrator, or the sample time.
-    """
+    """All variables of an FMU by group."""
 
     model: FlatModel
+    # time, states, derivatives, inputs, parameters, outputs, signals, indicators, modes, extra, status: the
+    # groups in the order of the value references. outputs and signals leave out states and variables named
+    # before; extra is the tolerance of the integrator, or the sample time.
     time: FmuVariable
     states: tuple[FmuVariable, ...]
     derivatives: tuple[FmuVariable, ...]

@@ -32,21 +32,13 @@ _TOLERANCE = 1e-12  # of the simulation, so that its own error does not show
 
 @dataclass(frozen=True, eq=False)
 class ReferenceResults:
-    """What an importer should find.
+    """What an importer should find."""
 
-    Parameters
-    ----------
-    time
-        Communication points in s, shape (n,).
-    input_names, inputs
-        Inputs, held from each communication point to the next, shape (n, inputs).
-    result_names, results
-        Results at the communication points, shape (n, results).
-    """
-
-    time: Array
+    time: Array  # communication points in s, shape (n,)
+    # input_names, inputs: inputs, held from each communication point to the next, shape (n, inputs)
     input_names: tuple[str, ...]
     inputs: Array
+    # result_names, results: results at the communication points, shape (n, results)
     result_names: tuple[str, ...]
     results: Array
 

@@ -31,20 +31,12 @@ LONGEST = 16
 
 @dataclass
 class ModelicaEquations:
-    """Left and right sides, in the order of computation.
+    """Left and right sides, in the order of computation."""
 
-    Parameters
-    ----------
-    definitions
-        Of variables: outputs, signals and common values, by their Modelica names.
-    derivatives
-        Of states, by their Modelica names.
-    common
-        Names of values that are used more than once and are nothing else.
-    """
-
+    # definitions: of variables: outputs, signals and common values, by their Modelica names
     definitions: dict[str, str] = field(default_factory=dict)
-    derivatives: dict[str, str] = field(default_factory=dict)
+    derivatives: dict[str, str] = field(default_factory=dict)  # of states, by their Modelica names
+    # common: names of values that are used more than once and are nothing else
     common: list[str] = field(default_factory=list)
 
 

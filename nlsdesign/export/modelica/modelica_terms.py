@@ -16,33 +16,19 @@ ATOM, POWER, PRODUCT, SUM, SIGNED, RELATION, AND, OR, CHOICE = range(8, -1, -1)
 
 @dataclass(frozen=True)
 class Term:
-    """Text of a value.
-
-    Parameters
-    ----------
-    text
-        The expression.
-    strength
-        How strongly it holds together.
-    opposite
-        Of a truth value: text and strength of its negation; ``None`` for a number.
-    events
-        Whether a tool would look for events in it, which the equations are not meant to have.
-    size
-        Number of operations in it.
-    choice
-        Of a number that is zero unless a condition holds: the condition, whether it is negated, the number.
-    number
-        Of a truth value that is kept in a variable: the variable, which is 1 or 0.
-    """
+    """Text of a value."""
 
     text: str
-    strength: int = ATOM
+    strength: int = ATOM  # how strongly it holds together
+    # opposite: of a truth value: text and strength of its negation; None for a number
     opposite: tuple[str, int] | None = None
+    # events: whether a tool would look for events in it, which the equations are not meant to have
     events: bool = False
-    size: int = 0
+    size: int = 0  # number of operations in it
+    # choice: of a number that is zero unless a condition holds: the condition, whether it is negated, the
+    # number
     choice: tuple[str, bool, str] | None = None
-    number: str = ""
+    number: str = ""  # of a truth value that is kept in a variable: the variable, which is 1 or 0
 
     def inside(self, least: int) -> str:
         """Return the text, in brackets where it holds together less than is needed."""

@@ -97,15 +97,9 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class Chunk:
-    """Points that one worker computes in one go.
+    """Points that one worker computes in one go."""
 
-    Parameters
-    ----------
-    points
-        Pairs of number and point.
-    """
-
-    points: tuple[tuple[int, Any], ...]
+    points: tuple[tuple[int, Any], ...]  # pairs of number and point
 
 
 @dataclass(frozen=True)
@@ -135,18 +129,10 @@ class PointOutcome:
 
 @dataclass(frozen=True)
 class ChunkLoss:
-    """A chunk that came to no end.
+    """A chunk that came to no end."""
 
-    Parameters
-    ----------
-    reason
-        What became of its worker.
-    deaths
-        Of workers that computed it; 0 where only the connection was lost.
-    """
-
-    reason: str
-    deaths: int = 1
+    reason: str  # what became of its worker
+    deaths: int = 1  # of workers that computed it; 0 where only the connection was lost
 
 
 @dataclass(frozen=True)

@@ -33,18 +33,11 @@ _LARGEST: Final = 4096
 
 @dataclass(frozen=True)
 class ChunkSizes:
-    """How many points make a chunk.
+    """How many points make a chunk."""
 
-    Parameters
-    ----------
-    seconds
-        That a chunk is to take: short against what may be lost, long against what a message costs.
-    largest
-        Most points of a chunk.
-    """
-
+    # seconds: that a chunk is to take: short against what may be lost, long against what a message costs
     seconds: float = 1.0
-    largest: int = _LARGEST
+    largest: int = _LARGEST  # most points of a chunk
 
 
 def shared_map(

@@ -72,21 +72,11 @@ class _Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class _Place:
-    """Where the part goes.
+    """Where the part goes."""
 
-    Parameters
-    ----------
-    path
-        Body on which it acts, or element beside which it stands.
-    domain
-        Motion and effort.
-    on_body
-        Whether the path is that of a body.
-    """
-
-    path: str
-    domain: Domain
-    on_body: bool
+    path: str  # body on which it acts, or element beside which it stands
+    domain: Domain  # motion and effort
+    on_body: bool  # whether the path is that of a body
 
 
 @dataclass(frozen=True)
@@ -340,16 +330,8 @@ def _chosen(
 class _Regression:
     """Bounded ridge regression of a table, and of the free numbers, on the records.
 
-    Parameters
-    ----------
-    columns
-        Regressors of each record: those of the table, then those of the numbers.
-    targets
-        What each record leaves over.
-    ridge
-        Priors of the numbers, smoothness of the table.
-    bounds
-        Lower and upper ones.
+    ``columns``: regressors of each record: those of the table, then those of the numbers. ``ridge``: priors
+    of the numbers, smoothness of the table.
     """
 
     def __init__(

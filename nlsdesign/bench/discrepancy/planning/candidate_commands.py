@@ -95,18 +95,10 @@ _SMALL_SIDE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """One candidate.
+    """One candidate."""
 
-    Parameters
-    ----------
-    words
-        What it is, without amounts.
-    value
-        Commanded signal at each sample, shape (n,), in SI.
-    """
-
-    words: str
-    value: Array
+    words: str  # what it is, without amounts
+    value: Array  # commanded signal at each sample, shape (n,), in SI
 
 
 def smooth_step(x: Array) -> Array:

@@ -43,24 +43,12 @@ _PROBE = 1e-3
 
 @dataclass(frozen=True)
 class MeasuredSignals:
-    """The measured signals by what they are.
+    """The measured signals by what they are."""
 
-    Parameters
-    ----------
-    motions
-        The body whose motion each shows, by the name of the signal.
-    rates
-        The body whose speed each shows.
-    drives
-        Inputs of the model, such as a current.
-    efforts
-        Forces and torques that the model predicts.
-    """
-
-    motions: Mapping[str, MovingBody]
-    rates: Mapping[str, MovingBody]
-    drives: tuple[str, ...]
-    efforts: tuple[str, ...]
+    motions: Mapping[str, MovingBody]  # the body whose motion each shows, by the name of the signal
+    rates: Mapping[str, MovingBody]  # the body whose speed each shows
+    drives: tuple[str, ...]  # inputs of the model, such as a current
+    efforts: tuple[str, ...]  # forces and torques that the model predicts
 
 
 def measured_signals(model: FlatModel, signals: Sequence[str]) -> MeasuredSignals:
@@ -104,30 +92,14 @@ def check_command(measured: MeasuredSignals, commanded: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """What is needed to say which record an experiment would leave.
+    """What is needed to say which record an experiment would leave."""
 
-    Parameters
-    ----------
-    model
-        Of the hypothesis, with its fitted numbers.
-    driven
-        Its blocks, ready for evaluation.
-    measured
-        The measured signals by what they are.
-    units
-        SI units by signal.
-    rest
-        Value of each signal at rest.
-    largest
-        Largest size of each signal in the records.
-    """
-
-    model: FlatModel
-    driven: tuple[DrivenBlock, ...]
-    measured: MeasuredSignals
-    units: Mapping[str, str]
-    rest: Mapping[str, float]
-    largest: Mapping[str, float]
+    model: FlatModel  # of the hypothesis, with its fitted numbers
+    driven: tuple[DrivenBlock, ...]  # its blocks, ready for evaluation
+    measured: MeasuredSignals  # the measured signals by what they are
+    units: Mapping[str, str]  # SI units by signal
+    rest: Mapping[str, float]  # value of each signal at rest
+    largest: Mapping[str, float]  # largest size of each signal in the records
 
     def record(self, time: Array, commanded: str, value: Array) -> Record:
         """Return the record that a command would leave.
@@ -195,21 +167,15 @@ _DIGITS = 9
 
 @dataclass(frozen=True)
 class Separation:
-    """How well an experiment tells two hypotheses apart.
+    """How well an experiment tells two hypotheses apart."""
 
-    Parameters
-    ----------
-    one, other
-        Effects of each, joined by " + ".
-    standard_errors
-        Expected distance of their predictions in standard errors of the noise, after each was refitted.
-    block, time
-        Where, and when, they are furthest apart.
-    """
-
+    # one, other: effects of each, joined by " + "
     one: str
     other: str
+    # standard_errors: expected distance of their predictions in standard errors of the noise, after each was
+    # refitted
     standard_errors: float
+    # block, time: where, and when, they are furthest apart
     block: str
     time: float
 
@@ -221,31 +187,17 @@ class Separation:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """A record that is proposed.
+    """A record that is proposed."""
 
-    Parameters
-    ----------
-    motion
-        What is commanded, in words.
-    signal
-        Name of the measured signal that is commanded.
-    head, unit
-        Head and unit of its column in the records.
-    command
-        Of that signal over time, in SI, with the other signals as the best hypothesis expects them.
-    separations
-        One for each pair of hypotheses, the worst first.
-    limits
-        Within which it stays.
-    """
-
-    motion: str
-    signal: str
+    motion: str  # what is commanded, in words
+    signal: str  # name of the measured signal that is commanded
+    # head, unit: head and unit of its column in the records
     head: str
     unit: str
+    # command: of that signal over time, in SI, with the other signals as the best hypothesis expects them
     command: Trace
-    separations: tuple[Separation, ...]
-    limits: MachineLimits
+    separations: tuple[Separation, ...]  # one for each pair of hypotheses, the worst first
+    limits: MachineLimits  # within which it stays
 
     @property
     def duration(self) -> float:

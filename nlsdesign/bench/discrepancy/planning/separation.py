@@ -56,27 +56,16 @@ class BlockResponse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ReadyHypothesis:
-    """A hypothesis made ready to be evaluated on records that were not measured yet.
+    """A hypothesis made ready to be evaluated on records that were not measured yet."""
 
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    driven
-        Its blocks.
-    parameters
-        Free numbers in the order of the covariance, by the name of the block.
-    information
-        Inverse covariance of the numbers, by the name of the block; blocks that share numbers share it.
-    values
-        Fitted numbers, and others with which it explains the records so far as well.
-    """
-
-    hypothesis: Hypothesis
-    driven: tuple[DrivenBlock, ...]
+    hypothesis: Hypothesis  # fitted
+    driven: tuple[DrivenBlock, ...]  # its blocks
+    # parameters: free numbers in the order of the covariance, by the name of the block
     parameters: Mapping[str, tuple[Parameter, ...]]
+    # information: inverse covariance of the numbers, by the name of the block; blocks that share numbers
+    # share it
     information: Mapping[str, Array]
-    values: tuple[Values, ...]
+    values: tuple[Values, ...]  # fitted numbers, and others with which it explains the records so far as well
 
     def responses(self, record: Record, floors: Mapping[str, BlockNoise]) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of the numbers that the hypothesis may have.
@@ -237,21 +226,11 @@ class _Total:
 
 
 class Apart(NamedTuple):
-    """How far two hypotheses are apart on a record.
+    """How far two hypotheses are apart on a record."""
 
-    Parameters
-    ----------
-    squares
-        Expected growth of the sum of squares, in units of the noise.
-    block
-        Where it is largest.
-    row
-        Row of the block's floor at which it is largest.
-    """
-
-    squares: float
-    block: str
-    row: int
+    squares: float  # expected growth of the sum of squares, in units of the noise
+    block: str  # where it is largest
+    row: int  # row of the block's floor at which it is largest
 
 
 def apart(

@@ -12,19 +12,13 @@ from ...identification.records.measurement import RecordSet
 
 
 class RecordOfRun(NamedTuple):
-    """One record as it was read.
+    """One record as it was read."""
 
-    Parameters
-    ----------
-    name, role, source
-        Name, what it was used for, and the file with the changes made to its samples.
-    samples, duration, rate
-        Number of samples, length in s, and samples per second.
-    """
-
+    # name, role, source: name, what it was used for, and the file with the changes made to its samples
     name: str
     role: str
     source: str
+    # samples, duration, rate: number of samples, length in s, and samples per second
     samples: int
     duration: float
     rate: float
@@ -32,28 +26,15 @@ class RecordOfRun(NamedTuple):
 
 @dataclass(frozen=True)
 class DiagnosisRun:
-    """One run of a diagnosis.
+    """One run of a diagnosis."""
 
-    Parameters
-    ----------
-    deck, folder
-        Deck and folder of records, as given.
-    date
-        Day and time, ISO 8601.
-    command
-        Command line that repeats it.
-    version
-        Of nlsdesign.
-    records
-        In the order in which they were read.
-    """
-
+    # deck, folder: deck and folder of records, as given
     deck: str
     folder: str
-    date: str
-    command: str
+    date: str  # day and time, ISO 8601
+    command: str  # command line that repeats it
     version: str
-    records: tuple[RecordOfRun, ...] = ()
+    records: tuple[RecordOfRun, ...] = ()  # in the order in which they were read
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for ``verdict.json``."""

@@ -15,27 +15,17 @@ from ..effects.effect import SOURCE
 
 
 class FittedNumber(NamedTuple):
-    """One refitted number.
+    """One refitted number."""
 
-    Parameters
-    ----------
-    name, unit
-        Full name and SI unit.
-    declared, fitted, standard_error
-        In SI.
-    strain
-        How far it went, in declared standard deviations; the fit stops at 3.
-    spread
-        As declared: 0.15 means ± 15 %; with its unit where it is not relative.
-    """
-
+    # name, unit: full name and SI unit
     name: str
     unit: str
+    # declared, fitted, standard_error: in SI
     declared: float
     fitted: float
     standard_error: float
-    strain: float
-    spread: float | str = 0.0
+    strain: float  # how far it went, in declared standard deviations; the fit stops at 3
+    spread: float | str = 0.0  # as declared: 0.15 means ± 15 %; with its unit where it is not relative
 
     @property
     def at_end(self) -> bool:

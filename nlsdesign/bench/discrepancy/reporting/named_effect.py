@@ -17,31 +17,25 @@ _CLEAR = 2.0
 
 @dataclass(frozen=True)
 class EffectEvidence:
-    """What speaks for an effect, on records that its numbers were not fitted to.
+    """What speaks for an effect, on records that its numbers were not fitted to."""
 
-    Parameters
-    ----------
-    removal_cost, removal_error
-        Predictive log density that is lost without the effect, and its standard error.
-    number, distance
-        The number that says how large the effect is, and how many standard errors it is away from the value
-        at which the effect vanishes.
-    worst_record, worst_change
-        The record that gains least, and the gain of its log-likelihood; below zero it becomes worse.
-    over_simpler
-        The simpler forms of the effect: identifier, log-likelihood that is lost with that form in its
-        place, and its standard error.
-    next_leaves
-        How many times as much of the excess the best other name leaves, with the noise margin on both sides.
-    """
-
+    # removal_cost, removal_error: predictive log density that is lost without the effect, and its standard
+    # error
     removal_cost: float
     removal_error: float
+    # number, distance: the number that says how large the effect is, and how many standard errors it is away
+    # from the value at which the effect vanishes
     number: str = ""
     distance: float = math.nan
+    # worst_record, worst_change: the record that gains least, and the gain of its log-likelihood; below zero
+    # it becomes worse
     worst_record: str = ""
     worst_change: float = math.nan
+    # over_simpler: the simpler forms of the effect: identifier, log-likelihood that is lost with that form in
+    # its place, and its standard error
     over_simpler: tuple[tuple[str, float, float], ...] = ()
+    # next_leaves: how many times as much of the excess the best other name leaves, with the noise margin on
+    # both sides
     next_leaves: float = math.nan
 
     def words(self) -> str:
@@ -89,35 +83,19 @@ def listed_numbers(numbers: Numbers) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that was added.
+    """An effect that was added."""
 
-    Parameters
-    ----------
-    name, location
-        Identifier of the catalogue, and the path of the part.
-    parameters
-        Value, unit and standard error by full name.
-    aliases
-        Effects of the catalogue that explain the records as well.
-    share
-        Share of the excess over the noise, left when it was added, that it explains in prediction.
-    signature, source
-        What it leaves in records, and where its law comes from.
-    probability
-        That the effect is there; not a number where none was worked out.
-    evidence
-        What speaks for it, in numbers.
-    """
-
+    # name, location: identifier of the catalogue, and the path of the part
     name: str
     location: str
-    parameters: Numbers
-    aliases: tuple[str, ...]
-    share: float
+    parameters: Numbers  # value, unit and standard error by full name
+    aliases: tuple[str, ...]  # effects of the catalogue that explain the records as well
+    share: float  # share of the excess over the noise, left when it was added, that it explains in prediction
+    # signature, source: what it leaves in records, and where its law comes from
     signature: str
     source: str
-    probability: float = math.nan
-    evidence: EffectEvidence | None = None
+    probability: float = math.nan  # that the effect is there; not a number where none was worked out
+    evidence: EffectEvidence | None = None  # what speaks for it, in numbers
 
     def headline(self, assembly: Assembly) -> str:
         """Return effect and place in words, such as ``second relaxation in the rubber``."""

@@ -32,21 +32,11 @@ _PER_TERM = 0.02
 
 @dataclass(frozen=True)
 class Formula:
-    """A regression on measured signals.
+    """A regression on measured signals."""
 
-    Parameters
-    ----------
-    terms
-        Coefficient by name of the term, in SI.
-    share
-        Share of the remainder that it explains on records that it was not fitted to.
-    text
-        The sum, written out.
-    """
-
-    terms: Mapping[str, float]
-    share: float
-    text: str
+    terms: Mapping[str, float]  # coefficient by name of the term, in SI
+    share: float  # share of the remainder that it explains on records that it was not fitted to
+    text: str  # the sum, written out
 
 
 def sparse_formula(
@@ -130,29 +120,19 @@ _CHUNK = 200
 
 @dataclass(frozen=True)
 class Remainder:
-    """A significant error that no effect of the catalogue explains.
+    """A significant error that no effect of the catalogue explains."""
 
-    Parameters
-    ----------
-    block, quantity, unit
-        Where it is, and in what.
-    size, floor
-        Root mean square and noise floor, in the unit.
-    kind
-        In words: periodic in time, drifting, ringing, or bound to a measured signal.
-    shapes
-        Share of it that a curve over each signal explains, across records, largest first.
-    formula
-        Sparse regression, no law: marked as unnamed; ``None`` if no short one holds on other records.
-    """
-
+    # block, quantity, unit: where it is, and in what
     block: str
     quantity: str
     unit: str
+    # size, floor: root mean square and noise floor, in the unit
     size: float
     floor: float
-    kind: str
+    kind: str  # in words: periodic in time, drifting, ringing, or bound to a measured signal
+    # shapes: share of it that a curve over each signal explains, across records, largest first
     shapes: tuple[tuple[str, float], ...]
+    # formula: sparse regression, no law: marked as unnamed; None if no short one holds on other records
     formula: Formula | None
 
     def words(self) -> str:

@@ -49,28 +49,19 @@ _HELPS = 0.005
 
 
 class Gap(NamedTuple):
-    """Error of the summed-up block before and after, root mean square, all in one unit.
+    """Error of the summed-up block before and after, root mean square, all in one unit."""
 
-    Parameters
-    ----------
-    block, role
-        Which block, on the records of which role.
-    before, after, noise_floor, signal
-        Errors, noise floor, and standard deviation of what the error is a part of.
-    unit
-        Of the four.
-    beside
-        Name of what the error is a part of.
-    """
-
+    # block, role: which block, on the records of which role
     block: str
     role: str
+    # before, after, noise_floor, signal: errors, noise floor, and standard deviation of what the error is a
+    # part of
     before: float
     after: float
     noise_floor: float
     signal: float
     unit: str
-    beside: str
+    beside: str  # name of what the error is a part of
 
     @property
     def times(self) -> tuple[float, float]:
@@ -123,32 +114,19 @@ class RecordGap:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """One record over time: measured, predicted before and after, all through the filter of the block.
-
-    Parameters
-    ----------
-    record
-        Name.
-    quantity, unit
-        What is shown: a measured signal, or the effort of the drive beside the one that the model needs.
-    time
-        In s, shape (n,).
-    measured, before, after
-        In the unit, shape (n,) each; the rms of the differences are those of :class:`RecordGap`.
-    noise
-        Standard deviation of the filtered noise, in the unit.
-    role
-        Of the record.
-    """
+    """One record over time: measured, predicted before and after, all through the filter of the block."""
 
     record: str
+    # quantity, unit: what is shown: a measured signal, or the effort of the drive beside the one that the
+    # model needs
     quantity: str
     unit: str
-    time: Array
+    time: Array  # in s, shape (n,)
+    # measured, before, after: in the unit, shape (n,) each; the rms of the differences are those of RecordGap
     measured: Array
     before: Array
     after: Array
-    noise: float
+    noise: float  # standard deviation of the filtered noise, in the unit
     role: str = "held_out"
 
 

@@ -54,18 +54,11 @@ def modes_too_quick(assembly: Assembly, step: float) -> tuple[Finding, ...]:
 
 
 class LaggingForces(NamedTuple):
-    """Forces that lag.
+    """Forces that lag."""
 
-    Parameters
-    ----------
-    findings
-        One for each record over which a piece would give work.
-    testable
-        Whether the records are quick and slow enough, side by side, to tell a delayed sensor by what it does
-        at each speed; if not, it cannot be told from channels that do not belong together.
-    """
-
-    findings: tuple[Finding, ...]
+    findings: tuple[Finding, ...]  # one for each record over which a piece would give work
+    # testable: whether the records are quick and slow enough, side by side, to tell a delayed sensor by what
+    # it does at each speed; if not, it cannot be told from channels that do not belong together
     testable: bool
 
 

@@ -42,12 +42,7 @@ class Acting:
     A block with a target is judged beside that signal; a balance of efforts beside the effort of the drive,
     or beside the largest measured effort on a body without a drive, or beside its inertial effort.
 
-    Parameters
-    ----------
-    bench
-        The records.
-    model
-        The whole model; its bodies say which signals drive them.
+    ``model``: the whole model; its bodies say which signals drive them.
     """
 
     def __init__(self, bench: Bench, model: FlatModel) -> None:

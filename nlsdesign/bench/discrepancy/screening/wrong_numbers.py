@@ -131,18 +131,10 @@ _MOST_SHOWN = 4
 
 
 class OtherNumbers(NamedTuple):
-    """What can be told of records that other numbers explain.
+    """What can be told of records that other numbers explain."""
 
-    Parameters
-    ----------
-    words
-        For the verdict; empty where nothing points to another rig.
-    decides
-        Whether other numbers alone explain the records, better than any effect that was added.
-    """
-
-    words: str
-    decides: bool
+    words: str  # for the verdict; empty where nothing points to another rig
+    decides: bool  # whether other numbers alone explain the records, better than any effect that was added
 
 
 def other_numbers(

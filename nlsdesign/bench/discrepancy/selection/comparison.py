@@ -47,24 +47,12 @@ class FreeBlock(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GroupFit:
-    """What fitting a group of blocks gave.
-
-    Parameters
-    ----------
-    fit
-        The numbers.
-    tallies
-        What is left over on each record, by block and record.
-    has_free_flight
-        Whether a body flies freely between contacts.
-    unpredictable
-        Which of the tallies should not count for more than the others.
-    """
+    """What fitting a group of blocks gave."""
 
     fit: Fit
-    tallies: Mapping[Key, Tally]
-    has_free_flight: bool
-    unpredictable: frozenset[Key]
+    tallies: Mapping[Key, Tally]  # what is left over on each record, by block and record
+    has_free_flight: bool  # whether a body flies freely between contacts
+    unpredictable: frozenset[Key]  # which of the tallies should not count for more than the others
 
 
 class HypothesisFit:
@@ -200,23 +188,14 @@ _LONGEST_ROW = 12
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What a fitted hypothesis says of one record, seen by one block.
+    """What a fitted hypothesis says of one record, seen by one block."""
 
-    Parameters
-    ----------
-    block, record, floor
-        Which block, which record, and how it is read.
-    predicted
-        Unfiltered output over the record.
-    residual
-        Filtered error in units of the noise floor.
-    """
-
+    # block, record, floor: which block, which record, and how it is read
     block: Block
     record: Record
     floor: BlockNoise
-    predicted: Array
-    residual: Array
+    predicted: Array  # unfiltered output over the record
+    residual: Array  # filtered error in units of the noise floor
 
     @property
     def error(self) -> Array:
@@ -228,12 +207,8 @@ class Judged:
 class Comparison:
     """The records, and how hypotheses are fitted to them.
 
-    Parameters
-    ----------
-    bench
-        Records with filters and noise floors.
-    sizes
-        Largest value of each signal of the declared model on the records, by name.
+    ``bench``: records with filters and noise floors. ``sizes``: largest value of each signal of the declared
+    model on the records, by name.
     """
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:

@@ -279,30 +279,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Rival(Generic[T]):
-    """A hypothesis among others that each add one effect to the same hypothesis.
+    """A hypothesis among others that each add one effect to the same hypothesis."""
 
-    Parameters
-    ----------
-    hypothesis
-        Whatever stands for it.
-    effect
-        Identifier of the effect it adds.
-    numbers
-        How many numbers it and what it is added to have brought.
-    excesses
-        What it leaves.
-    standing
-        What the fitted numbers say.
-    simpler
-        Effects of which it is a richer form.
-    """
-
-    hypothesis: T
-    effect: str
-    numbers: int
-    excesses: Excesses
-    standing: Standing = field(default_factory=Standing)
-    simpler: tuple[str, ...] = ()
+    hypothesis: T  # whatever stands for it
+    effect: str  # identifier of the effect it adds
+    numbers: int  # how many numbers it and what it is added to have brought
+    excesses: Excesses  # what it leaves
+    standing: Standing = field(default_factory=Standing)  # what the fitted numbers say
+    simpler: tuple[str, ...] = ()  # effects of which it is a richer form
 
     def left_in(self, block: str) -> float:
         """Return the excess that it leaves in a block."""
@@ -387,21 +371,14 @@ def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -
 
 @dataclass(frozen=True)
 class Calibration:
-    """Numbers of the curve, fitted to the calibration seeds of ``docs/decision.md``.
+    """Numbers of the curve, fitted to the calibration seeds of ``docs/decision.md``."""
 
-    Parameters
-    ----------
-    offset, distance, complete, left
-        a, b, c and d of the module's formula.
-    most
-        No more is stated: so many cases cannot show that one in a hundred is wrong.
-    """
-
+    # offset, distance, complete, left: a, b, c and d of the module's formula
     offset: float = 1.0
     distance: float = 1.05
     complete: float = 1.25
     left: float = 0.5
-    most: float = 0.99
+    most: float = 0.99  # no more is stated: so many cases cannot show that one in a hundred is wrong
 
     def probability(self, distance: float, *, complete: bool, times_noise: float = 1.0) -> float:
         """Return the probability that a name is right."""

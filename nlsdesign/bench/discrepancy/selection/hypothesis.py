@@ -18,43 +18,25 @@ from .measures import DECLARED, Excess
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """An assembly fitted to the records.
+    """An assembly fitted to the records."""
 
-    Parameters
-    ----------
-    assembly
-        With declared numbers, and the effects added so far.
-    added
-        The effects, in the order in which they were added.
-    values
-        Fitted numbers by name.
-    fits
-        One for each group of blocks that share parameters, by the names of the blocks.
-    tallies
-        What is left over by block and record; empty where nothing was fitted yet.
-    coarse
-        Whether it was fitted to thinned records only.
-    has_free_flight
-        Whether a body flies freely in it between contacts: one contact at the wrong moment, and the
-        prediction stays wrong for a while, however right the effect.
-    unpredictable
-        Blocks and records that such a body makes unpredictable; they count as the others do.
-    released
-        Declared numbers of which nothing is taken as known, because the records contradict their spread.
-    held
-        Numbers that fits leave as they are in the assembly.
-    """
-
-    assembly: Assembly
-    added: tuple[Candidate, ...] = ()
-    values: Mapping[str, float] = field(default_factory=dict)
+    assembly: Assembly  # with declared numbers, and the effects added so far
+    added: tuple[Candidate, ...] = ()  # the effects, in the order in which they were added
+    values: Mapping[str, float] = field(default_factory=dict)  # fitted numbers by name
+    # fits: one for each group of blocks that share parameters, by the names of the blocks
     fits: Mapping[tuple[str, ...], Fit] = field(default_factory=dict)
+    # tallies: what is left over by block and record; empty where nothing was fitted yet
     tallies: Mapping[Key, Tally] = field(default_factory=dict)
-    coarse: bool = False
+    coarse: bool = False  # whether it was fitted to thinned records only
+    # has_free_flight: whether a body flies freely in it between contacts: one contact at the wrong moment,
+    # and the prediction stays wrong for a while, however right the effect
     has_free_flight: bool = False
+    # unpredictable: blocks and records that such a body makes unpredictable; they count as the others do
     unpredictable: frozenset[Key] = frozenset()
+    # released: declared numbers of which nothing is taken as known, because the records contradict their
+    # spread
     released: frozenset[str] = frozenset()
-    held: frozenset[str] = frozenset()
+    held: frozenset[str] = frozenset()  # numbers that fits leave as they are in the assembly
 
     @property
     def newest(self) -> Candidate:

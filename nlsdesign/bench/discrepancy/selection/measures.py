@@ -21,37 +21,21 @@ DECLARED = "declared numbers"
 
 @dataclass(frozen=True)
 class Excess:
-    """How far a block is from its noise floor.
+    """How far a block is from its noise floor."""
 
-    Parameters
-    ----------
-    block
-        Name of the block, or :data:`DECLARED`.
-    unit
-        Of the residual.
-    floor
-        Noise floor, root mean square over the records, in the unit.
-    fit, predicted
-        Root mean square of the residual in the unit: as fitted, and with numbers from the other records.
-    chi2
-        Sum of squares of the latter in units of the floor.
-    rows, effective
-        Number of residuals, and of independent ones they are equivalent to.
-    open
-        Whether that is more than noise.
-    pieces
-        The sum of squares by record, for each piece of the record in time.
-    """
-
-    block: str
+    block: str  # name of the block, or DECLARED
     unit: str
-    floor: float
+    floor: float  # noise floor, root mean square over the records, in the unit
+    # fit, predicted: root mean square of the residual in the unit: as fitted, and with numbers from the other
+    # records
     fit: float
     predicted: float
-    chi2: float
+    chi2: float  # sum of squares of the latter in units of the floor
+    # rows, effective: number of residuals, and of independent ones they are equivalent to
     rows: int
     effective: float
-    open: bool
+    open: bool  # whether that is more than noise
+    # pieces: the sum of squares by record, for each piece of the record in time
     pieces: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
@@ -75,43 +59,25 @@ Excesses = Mapping[str, Excess]
 
 
 class EffectNumber(NamedTuple):
-    """A fitted number of an effect.
+    """A fitted number of an effect."""
 
-    Parameters
-    ----------
-    name
-        Full name.
-    distance
-        Departure from the value without effect, on a scale where that is finite; zero for a number that only
-        shapes the effect.
-    decides
-        Whether the effect vanishes with it.
-    error
-        Standard error: as a share of the number where its logarithm is fitted, else in the size of its fit.
-    at_bound
-        Whether it stands at a bound of its search that is no limiting form of the effect.
-    """
-
-    name: str
+    name: str  # full name
+    # distance: departure from the value without effect, on a scale where that is finite; zero for a number
+    # that only shapes the effect
     distance: float
-    decides: bool
+    decides: bool  # whether the effect vanishes with it
+    # error: standard error: as a share of the number where its logarithm is fitted, else in the size of its
+    # fit
     error: float
-    at_bound: bool
+    at_bound: bool  # whether it stands at a bound of its search that is no limiting form of the effect
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """What the fitted numbers of an effect say about its existence.
-
-    Parameters
-    ----------
-    numbers
-        Of the effect.
-    covariance
-        Of the numbers that decide, on the scale of their distance, shape (deciding, deciding).
-    """
+    """What the fitted numbers of an effect say about its existence."""
 
     numbers: tuple[EffectNumber, ...] = ()
+    # covariance: of the numbers that decide, on the scale of their distance, shape (deciding, deciding)
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
@@ -141,19 +107,12 @@ def explained(before: Excesses, after: Excesses) -> dict[str, float]:
 
 
 class Gain(NamedTuple):
-    """Gain in prediction, in effective squares of the noise.
+    """Gain in prediction, in effective squares of the noise."""
 
-    Parameters
-    ----------
-    value, error
-        Over all pieces of all records, and its standard error from their scatter.
-    rest
-        The same without the piece that gains most.
-    """
-
+    # value, error: over all pieces of all records, and its standard error from their scatter
     value: float
     error: float
-    rest: float
+    rest: float  # the same without the piece that gains most
 
 
 def gain(before: Excesses, after: Excesses) -> Gain:

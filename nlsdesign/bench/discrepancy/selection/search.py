@@ -213,27 +213,13 @@ of the best; these pairs take about as long as the catalogue did."""
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What the search ended with.
+    """What the search ended with."""
 
-    Parameters
-    ----------
-    last
-        Hypothesis with everything that may be named, fitted to all samples.
-    steps
-        One for each effect.
-    tried
-        What was tried first, the best first.
-    complete
-        Whether nothing is left beyond the noise.
-    skipped
-        What could not be compared, and why.
-    """
-
-    last: Hypothesis
-    steps: tuple[Step, ...] = ()
-    tried: tuple[Tried, ...] = ()
-    complete: bool = False
-    skipped: tuple[Skipped, ...] = ()
+    last: Hypothesis  # hypothesis with everything that may be named, fitted to all samples
+    steps: tuple[Step, ...] = ()  # one for each effect
+    tried: tuple[Tried, ...] = ()  # what was tried first, the best first
+    complete: bool = False  # whether nothing is left beyond the noise
+    skipped: tuple[Skipped, ...] = ()  # what could not be compared, and why
 
 
 def search(

@@ -21,30 +21,16 @@ _UNKNOWN_GAIN = Gain(math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One effect that was added.
+    """One effect that was added."""
 
-    Parameters
-    ----------
-    chosen
-        Hypothesis with the effect in it.
-    block
-        Of whose excess it explains most.
-    share
-        That share of what was left there before.
-    distance
-        How many times as much the best other name leaves, natural logarithm.
-    gain, gains
-        What prediction gains by it, over all records and on each.
-    equals
-        Hypotheses with another last effect that predict as well with as few numbers.
-    """
-
-    chosen: Hypothesis
-    block: str
-    share: float
-    distance: float = 0.0
+    chosen: Hypothesis  # hypothesis with the effect in it
+    block: str  # of whose excess it explains most
+    share: float  # that share of what was left there before
+    distance: float = 0.0  # how many times as much the best other name leaves, natural logarithm
+    # gain, gains: what prediction gains by it, over all records and on each
     gain: Gain = _UNKNOWN_GAIN
     gains: Mapping[str, float] = field(default_factory=dict)
+    # equals: hypotheses with another last effect that predict as well with as few numbers
     equals: tuple[Hypothesis, ...] = ()
 
     @property
@@ -55,23 +41,12 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A candidate that was fitted beside nothing else, and why it was not named.
+    """A candidate that was fitted beside nothing else, and why it was not named."""
 
-    Parameters
-    ----------
-    hypothesis
-        Fitted with it.
-    share
-        Share of the whole excess that it explains alone.
-    objections
-        Clauses of the rule that speak against it; empty for one that may be named.
-    undecided
-        Whether it explains what is missing, but the records do not determine its numbers.
-    """
-
-    hypothesis: Hypothesis
-    share: float
-    objections: tuple[str, ...]
+    hypothesis: Hypothesis  # fitted with it
+    share: float  # share of the whole excess that it explains alone
+    objections: tuple[str, ...]  # clauses of the rule that speak against it; empty for one that may be named
+    # undecided: whether it explains what is missing, but the records do not determine its numbers
     undecided: bool = False
 
     @property
@@ -82,22 +57,12 @@ class Tried:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A candidate that was left out of the comparison.
-
-    Parameters
-    ----------
-    effect, location
-        Which.
-    beside
-        Effects that had been added before.
-    reason
-        Too expensive, or not converged.
-    """
+    """A candidate that was left out of the comparison."""
 
     effect: str
     location: str
-    beside: tuple[str, ...]
-    reason: str
+    beside: tuple[str, ...]  # effects that had been added before
+    reason: str  # too expensive, or not converged
 
     def __str__(self) -> str:
         beside = f" beside {' and '.join(self.beside)}" if self.beside else ""
@@ -106,29 +71,15 @@ class Skipped:
 
 @dataclass(eq=False)
 class Trials:
-    """Fits candidates on all cores, asks the rule, and keeps account of what could not be fitted.
+    """Fits candidates on all cores, asks the rule, and keeps account of what could not be fitted."""
 
-    Parameters
-    ----------
-    comparison
-        Fits hypotheses to the records.
-    catalogue
-        Effects to try.
-    criteria
-        Of the decision.
-    progress
-        Told what is being tried.
-    skipped
-        What could not be compared, and why.
-    on_other_records
-        What hypotheses leave over on records that are left out as a whole, as far as that was asked.
-    """
-
-    comparison: Comparison
-    catalogue: Sequence[EffectFunction]
+    comparison: Comparison  # fits hypotheses to the records
+    catalogue: Sequence[EffectFunction]  # effects to try
     criteria: Criteria
-    progress: Callable[[str], None]
-    skipped: list[Skipped] = field(default_factory=list)
+    progress: Callable[[str], None]  # told what is being tried
+    skipped: list[Skipped] = field(default_factory=list)  # what could not be compared, and why
+    # on_other_records: what hypotheses leave over on records that are left out as a whole, as far as that was
+    # asked
     on_other_records: dict[Hypothesis, Excesses] = field(default_factory=dict)
 
     def excesses_of(self, hypothesis: Hypothesis) -> Excesses:

@@ -24,10 +24,7 @@ class ColumnFunction:
     CasADi would go through all instructions for one column after the other; here each instruction is done for
     many columns at once, which is several times as fast.
 
-    Parameters
-    ----------
-    function
-        SX function with one dense output.
+    ``function``: SX function with one dense output.
     """
 
     def __init__(self, function: ca.Function) -> None:
@@ -125,10 +122,7 @@ class ChainFunction:
 class PointFunction:
     """A function at one point at a time.
 
-    Parameters
-    ----------
-    function
-        With dense inputs: columns are given in shape (rows,), matrices in shape (rows, columns).
+    ``function``: with dense inputs: columns are given in shape (rows,), matrices in shape (rows, columns).
     """
 
     def __init__(self, function: ca.Function) -> None:

@@ -110,27 +110,13 @@ def times_on(record: Record, step: float) -> int:
 
 
 class BlockRecord(NamedTuple):
-    """A record as a block reads it.
+    """A record as a block reads it."""
 
-    Parameters
-    ----------
-    driven
-        The block, ready for evaluation.
-    record
-        As measured.
-    width
-        Standard deviation of the filter in s.
-    rows
-        The filter, with the rows that count.
-    sigma
-        Noise floor of each row.
-    """
-
-    driven: DrivenBlock
-    record: Record
-    width: float
-    rows: Smoothing
-    sigma: Array
+    driven: DrivenBlock  # the block, ready for evaluation
+    record: Record  # as measured
+    width: float  # standard deviation of the filter in s
+    rows: Smoothing  # the filter, with the rows that count
+    sigma: Array  # noise floor of each row
 
 
 def resolving_step(block_records: Sequence[BlockRecord]) -> float:

@@ -18,23 +18,12 @@ from ....model import FlatModel
 
 
 class Drive(NamedTuple):
-    """How an input of a block follows from a record.
+    """How an input of a block follows from a record."""
 
-    Parameters
-    ----------
-    signal
-        Full name of the measured signal.
-    order
-        0 for its value, 1 for its rate, 2 for the derivative of that.
-    late_by
-        Names of the parameters whose sum says by how much the signal comes late.
-    stretched_by
-        Names of the parameters whose sum says by how much per time it becomes late.
-    """
-
-    signal: str
-    order: int = 0
-    late_by: tuple[str, ...] = ()
+    signal: str  # full name of the measured signal
+    order: int = 0  # 0 for its value, 1 for its rate, 2 for the derivative of that
+    late_by: tuple[str, ...] = ()  # names of the parameters whose sum says by how much the signal comes late
+    # stretched_by: names of the parameters whose sum says by how much per time it becomes late
     stretched_by: tuple[str, ...] = ()
 
     @property
@@ -45,33 +34,18 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A model whose inputs are measured, and what its output must equal.
+    """A model whose inputs are measured, and what its output must equal."""
 
-    Parameters
-    ----------
-    name
-        Where it is, for instance ``"spring"``.
-    model
-        All inputs that are not driven rest at their start value.
-    drives
-        By name of the input.
-    output
-        Name of the model's only output.
-    target
-        Full name of the measured signal that the output must equal; ``None`` if it must vanish.
-    moving
-        Name of the input that must be well away from zero for the block to say anything (dry friction at
-        rest can be anything); ``None`` if there is no such input.
-    effort_per_drive
-        Constant factor in the output, where that is the error of a measured signal shown as an effort.
-    """
-
-    name: str
-    model: FlatModel
-    drives: Mapping[str, Drive]
-    output: str
-    target: str | None
+    name: str  # where it is, for instance "spring"
+    model: FlatModel  # all inputs that are not driven rest at their start value
+    drives: Mapping[str, Drive]  # by name of the input
+    output: str  # name of the model's only output
+    target: str | None  # full name of the measured signal that the output must equal; None if it must vanish
+    # moving: name of the input that must be well away from zero for the block to say anything (dry friction
+    # at rest can be anything); None if there is no such input
     moving: str | None = None
+    # effort_per_drive: constant factor in the output, where that is the error of a measured signal shown as
+    # an effort
     effort_per_drive: float = 1.0
 
     def scaled_to(self, effort_per_drive: float) -> Block:

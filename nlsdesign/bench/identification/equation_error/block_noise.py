@@ -101,24 +101,12 @@ standard errors of what is in proportion to it are then twice those of the whole
 
 
 class Filters(NamedTuple):
-    """How a block reads its records.
+    """How a block reads its records."""
 
-    Parameters
-    ----------
-    width
-        Standard deviation in s of the zero-phase Gaussian filter that every term passes.
-    span
-        Time in s over which rates are taken.
-    spacing
-        Time in s from one row to the next.
-    straightened
-        Names of the inputs whose noise the block rectifies, see :func:`rectified`.
-    """
-
-    width: float
-    span: float
-    spacing: float
-    straightened: tuple[str, ...] = ()
+    width: float  # standard deviation in s of the zero-phase Gaussian filter that every term passes
+    span: float  # time in s over which rates are taken
+    spacing: float  # time in s from one row to the next
+    straightened: tuple[str, ...] = ()  # names of the inputs whose noise the block rectifies, see rectified
 
 
 @dataclass(frozen=True, eq=False)

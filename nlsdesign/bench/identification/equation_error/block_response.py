@@ -29,22 +29,13 @@ class Response(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What a record gives to a block, worked out once.
+    """What a record gives to a block, worked out once."""
 
-    Parameters
-    ----------
-    at
-        Everything that neither states nor free parameters enter, at the samples.
-    begin, end
-        The same at both ends of each step, with rates of the straight line in between.
-    step
-        Time between samples in s.
-    """
-
-    at: Array
+    at: Array  # everything that neither states nor free parameters enter, at the samples
+    # begin, end: the same at both ends of each step, with rates of the straight line in between
     begin: Array
     end: Array
-    step: float
+    step: float  # time between samples in s
 
 
 class _Walk(NamedTuple):
@@ -84,23 +75,14 @@ class _Equations(NamedTuple):
 class DrivenBlock:
     """A block made ready for evaluation with some of its parameters free.
 
-    Parameters
-    ----------
-    block
-        Model, drives and output.
-    free
-        Names of the parameters with respect to which derivatives are taken; those on which the output does
-        not depend are left out, see :attr:`free`.
-    records
-        Every record to which the block will be fitted: together, in whatever order, they decide which states
-        move faster than the samples and take short implicit steps. Without records none do.
-    values
-        Free parameters by name at which that is decided; those of the model by default.
-    span
-        Time in s over which rates of measured signals are taken; between neighbours by default.
-    straightened
-        Names of inputs whose noise the output rectifies: it is evaluated where they are smoothed over the
-        span, and what is smoothed away counts with the slope of the output there.
+    ``free``: names of the parameters with respect to which derivatives are taken; those on which the output
+    does not depend are left out, see :attr:`free`. ``records``: every record to which the block will be
+    fitted: together, in whatever order, they decide which states move faster than the samples and take short
+    implicit steps. Without records none do. ``values``: free parameters by name at which that is decided;
+    those of the model by default. ``span``: time in s over which rates of measured signals are taken; between
+    neighbours by default. ``straightened``: names of inputs whose noise the output rectifies: it is evaluated
+    where they are smoothed over the span, and what is smoothed away counts with the slope of the output
+    there.
     """
 
     def __init__(

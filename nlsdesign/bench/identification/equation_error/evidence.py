@@ -73,21 +73,13 @@ class Evidence:
 class Bench:
     """The records as every hypothesis sees them: same order, same filter, same rows, same noise floor.
 
-    Parameters
-    ----------
-    records
-        All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
-    blocks
-        Of the declared model; they fix rows and noise floor.
-    noise
-        Of the measured signals, where it is known from other records of the same bench.
-    filters
-        By name of the block, where they were chosen for other records of the same bench.
-    clock
-        Time in s between samples at which the blocks show what they do, where that is known from other
-        records of the same bench.
-    sampling
-        How inputs run between their samples, where that is known from other records of the same bench.
+    ``records``: all records; their order and their names make no difference, see
+    :func:`~.in_canonical_order`. ``blocks``: of the declared model; they fix rows and noise floor. ``noise``:
+    of the measured signals, where it is known from other records of the same bench. ``filters``: by name of
+    the block, where they were chosen for other records of the same bench. ``clock``: time in s between
+    samples at which the blocks show what they do, where that is known from other records of the same bench.
+    ``sampling``: how inputs run between their samples, where that is known from other records of the same
+    bench.
     """
 
     def __init__(

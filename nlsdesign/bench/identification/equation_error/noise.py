@@ -59,21 +59,11 @@ _MOST_SAMPLES, _SHORTEST = 3000, 8
 
 
 class Stretch(NamedTuple):
-    """Samples in which a signal shows its noise alone.
+    """Samples in which a signal shows its noise alone."""
 
-    Parameters
-    ----------
-    samples
-        Shape (n,).
-    step
-        Time between them in s.
-    lag
-        Samples after which it was subtracted from itself, divided by √2; zero where it was not.
-    """
-
-    samples: Array
-    step: float
-    lag: int
+    samples: Array  # shape (n,)
+    step: float  # time between them in s
+    lag: int  # samples after which it was subtracted from itself, divided by √2; zero where it was not
 
 
 class NoisePart(NamedTuple):
@@ -271,29 +261,16 @@ Evidence: TypeAlias = Literal["rest", "repetition", "white only"]
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of each measured signal.
+    """Noise of each measured signal."""
 
-    Parameters
-    ----------
-    level
-        Standard deviation of its white part, in SI.
-    rounded
-        Whether that is mere rounding.
-    parts
-        Parts of it that remember, beside the white one; nothing for signals without.
-    evidence
-        Where that is known from.
-    seen
-        Lengths in s of the stretches in which the parts were seen.
-    taps
-        Weights of neighbouring samples with which a signal is read that is held or averaged.
-    """
-
-    level: Mapping[str, float]
-    rounded: Mapping[str, bool]
+    level: Mapping[str, float]  # standard deviation of its white part, in SI
+    rounded: Mapping[str, bool]  # whether that is mere rounding
+    # parts: parts of it that remember, beside the white one; nothing for signals without
     parts: Mapping[str, tuple[NoisePart, ...]] = field(default_factory=dict)
-    evidence: Mapping[str, Evidence] = field(default_factory=dict)
+    evidence: Mapping[str, Evidence] = field(default_factory=dict)  # where that is known from
+    # seen: lengths in s of the stretches in which the parts were seen
     seen: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    # taps: weights of neighbouring samples with which a signal is read that is held or averaged
     taps: Mapping[str, Array] = field(default_factory=dict)
 
     def deviation(self, signal: str) -> float:

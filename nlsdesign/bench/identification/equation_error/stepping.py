@@ -117,18 +117,12 @@ def rosenbrock_step(
 
 
 class ImplicitSteps(NamedTuple):
-    """What :func:`implicit_steps` returns.
+    """What :func:`implicit_steps` returns."""
 
-    Parameters
-    ----------
-    states
-        At the end of each short step; they contain ``guess`` symbols.
-    guess, guessed
-        Symbols of iterates, and what to put in for them, earlier ones first. Derivatives are taken with the
-        symbols in place: at the root the derivative of one more Newton step is that of the root itself.
-    """
-
-    states: list[Expression]
+    states: list[Expression]  # at the end of each short step; they contain guess symbols
+    # guess, guessed: symbols of iterates, and what to put in for them, earlier ones first. Derivatives are
+    # taken with the symbols in place: at the root the derivative of one more Newton step is that of the root
+    # itself.
     guess: list[Expression]
     guessed: list[Expression]
 

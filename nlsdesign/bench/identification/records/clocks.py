@@ -60,21 +60,11 @@ class Resolution(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A channel with the times at which it was sampled.
+    """A channel with the times at which it was sampled."""
 
-    Parameters
-    ----------
-    name
-        For messages.
-    time
-        In s, ascending, shape (n,).
-    values
-        Shape (n,).
-    """
-
-    name: str
-    time: Array
-    values: Array
+    name: str  # for messages
+    time: Array  # in s, ascending, shape (n,)
+    values: Array  # shape (n,)
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.values):
@@ -112,21 +102,11 @@ class Channel:
 
 
 class Resampled(NamedTuple):
-    """Channels on one clock.
+    """Channels on one clock."""
 
-    Parameters
-    ----------
-    time
-        In s, uniform, shape (n,).
-    values
-        By name, shape (n,).
-    changes
-        One clause for each channel that was changed.
-    """
-
-    time: Array
-    values: dict[str, Array]
-    changes: tuple[str, ...]
+    time: Array  # in s, uniform, shape (n,)
+    values: dict[str, Array]  # by name, shape (n,)
+    changes: tuple[str, ...]  # one clause for each channel that was changed
 
 
 def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
@@ -224,23 +204,12 @@ def resolutions(
 
 @dataclass(frozen=True)
 class Lag:
-    """Time by which one channel is delayed against another.
+    """Time by which one channel is delayed against another."""
 
-    Parameters
-    ----------
-    seconds
-        Positive where the first channel is delayed.
-    standard_error
-        In s; allows for coloured residuals.
-    correlation
-        At that lag.
-    delayed, reference
-        Names of the channels.
-    """
-
-    seconds: float
-    standard_error: float
-    correlation: float
+    seconds: float  # positive where the first channel is delayed
+    standard_error: float  # in s; allows for coloured residuals
+    correlation: float  # at that lag
+    # delayed, reference: names of the channels
     delayed: str
     reference: str
 

@@ -29,90 +29,54 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class DescribedColumn:
-    """One column, by its head, in the file that has the most of them.
+    """One column, by its head, in the file that has the most of them."""
 
-    Parameters
-    ----------
-    head, unit
-        As in the file; the unit is empty where the head has none.
-    signals
-        What it may hold; one name where that is certain, none where the deck reads nothing in this unit.
-    clock, clock_unit
-        Head and unit of its time; the head is empty for the clock of most columns.
-    rate
-        Usual samples a second; nan without a clock.
-    noise, quantum
-        Standard deviation of the white noise and smallest step between two values, in the unit of the file.
-    smallest, largest
-        Ends of its values, in the unit of the file.
-    drives
-        Whether it is an input of the model, or the reading of one.
-    """
-
+    # head, unit: as in the file; the unit is empty where the head has none
     head: str
     unit: str
+    # signals: what it may hold; one name where that is certain, none where the deck reads nothing in this
+    # unit
     signals: tuple[str, ...]
+    # clock, clock_unit: head and unit of its time; the head is empty for the clock of most columns
     clock: str
     clock_unit: str
-    rate: float
+    rate: float  # usual samples a second; nan without a clock
+    # noise, quantum: standard deviation of the white noise and smallest step between two values, in the unit
+    # of the file
     noise: float
     quantum: float
+    # smallest, largest: ends of its values, in the unit of the file
     smallest: float
     largest: float
-    drives: bool
+    drives: bool  # whether it is an input of the model, or the reading of one
 
 
 @dataclass(frozen=True)
 class DescribedFile:
-    """One file.
-
-    Parameters
-    ----------
-    name
-        Of the file.
-    rows
-        Of numbers on the clock of most columns.
-    seconds, rate
-        Length in s and usual samples a second; nan without a clock.
-    gaps
-        Number of steps of the clock longer than 1.5 usual ones.
-    problem
-        Why it cannot be read; empty where it can.
-    """
+    """One file."""
 
     name: str
-    rows: int
+    rows: int  # of numbers on the clock of most columns
+    # seconds, rate: length in s and usual samples a second; nan without a clock
     seconds: float
     rate: float
-    gaps: int
-    problem: str = ""
+    gaps: int  # number of steps of the clock longer than 1.5 usual ones
+    problem: str = ""  # why it cannot be read; empty where it can
 
 
 @dataclass(frozen=True, eq=False)
 class RecordsDescription:
-    """What a folder of records holds.
+    """What a folder of records holds."""
 
-    Parameters
-    ----------
-    time, time_unit
-        Head and unit of the clock; the head is empty where none was found.
-    time_is_guessed
-        Whether the unit of the clock is none that the head gives.
-    files, columns
-        What was found.
-    records
-        As :func:`~.measurement.load_records` reads them with this mapping; ``None`` where it cannot.
-    problem
-        Why it cannot; empty where it can.
-    """
-
+    # time, time_unit: head and unit of the clock; the head is empty where none was found
     time: str
     time_unit: str
-    time_is_guessed: bool
+    time_is_guessed: bool  # whether the unit of the clock is none that the head gives
+    # files, columns: what was found
     files: tuple[DescribedFile, ...]
     columns: tuple[DescribedColumn, ...]
-    records: RecordSet | None = None
-    problem: str = ""
+    records: RecordSet | None = None  # as load_records reads them with this mapping; None where it cannot
+    problem: str = ""  # why it cannot; empty where it can
 
     @property
     def clocks(self) -> tuple[str, ...]:

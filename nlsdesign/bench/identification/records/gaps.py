@@ -23,18 +23,10 @@ _MOST_LEFT_OUT = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """The parts of one file between its gaps.
+    """The parts of one file between its gaps."""
 
-    Parameters
-    ----------
-    tables
-        In order of time; the table as it stands where there is no gap.
-    remarks
-        What was filled in, split or left out.
-    """
-
-    tables: tuple[RecordTable, ...]
-    remarks: tuple[Finding, ...] = ()
+    tables: tuple[RecordTable, ...]  # in order of time; the table as it stands where there is no gap
+    remarks: tuple[Finding, ...] = ()  # what was filled in, split or left out
 
 
 def between_gaps(table: RecordTable, mapping: ColumnMap) -> Pieces:

@@ -27,27 +27,14 @@ _SINCE_1970, _NO_TIME = 1e8, 1e11
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Content of one file.
+    """Content of one file."""
 
-    Parameters
-    ----------
-    trace
-        Signals in SI by full name, on a uniform grid.
-    source
-        File, and the changes made to its samples.
-    resolution
-        Resolution of the channels that were interpolated or filtered, by signal; see
-        :class:`~nlsdesign.bench.identification.records.clocks.Resolution`.
-    masked
-        Samples that were faulty and stand interpolated, by signal, shape (n,).
-    findings, remarks
-        What makes the file suspect; what was changed or is unusual.
-    """
-
-    trace: Trace
-    source: str
+    trace: Trace  # signals in SI by full name, on a uniform grid
+    source: str  # file, and the changes made to its samples
+    # resolution: resolution of the channels that were interpolated or filtered, by signal; see Resolution
     resolution: Mapping[str, Resolution]
-    masked: Mapping[str, Mask]
+    masked: Mapping[str, Mask]  # samples that were faulty and stand interpolated, by signal, shape (n,)
+    # findings, remarks: what makes the file suspect; what was changed or is unusual
     findings: tuple[Finding, ...]
     remarks: tuple[Finding, ...]
 

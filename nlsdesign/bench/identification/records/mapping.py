@@ -73,72 +73,42 @@ def _shown(given: Any) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """What a column of a file measures.
+    """What a column of a file measures."""
 
-    Parameters
-    ----------
-    name
-        Head of the column in the file.
-    signal
-        Full name of the signal in the model.
-    unit
-        Unit in the file.
-    noise, quantum
-        Declared standard deviation of the noise and size of one count, in SI; 0 where nothing is declared.
-        The noise is also estimated from the records.
-    time
-        Head of the clock of this column, in the unit of ``[time]``; empty for the clock of ``[time]``.
-    sampling
-        How the signal runs between its samples; ``None`` where the records are to tell.
-    declared
-        Whether that is said: otherwise the channel may be shifted by up to half a sample.
-    """
-
-    name: str
-    signal: str
-    unit: str
+    name: str  # head of the column in the file
+    signal: str  # full name of the signal in the model
+    unit: str  # unit in the file
+    # noise, quantum: declared standard deviation of the noise and size of one count, in SI; 0 where nothing
+    # is declared. The noise is also estimated from the records.
     noise: float = 0.0
     quantum: float = 0.0
-    time: str = ""
+    time: str = ""  # head of the clock of this column, in the unit of [time]; empty for the clock of [time]
+    # sampling: how the signal runs between its samples; None where the records are to tell
     sampling: Sampling | None = SAMPLED
-    declared: bool = True
+    declared: bool = True  # whether that is said: otherwise the channel may be shifted by up to half a sample
 
 
 @dataclass(frozen=True)
 class Align:
-    """A lag to be estimated and removed.
+    """A lag to be estimated and removed."""
 
-    Parameters
-    ----------
-    column, to
-        Heads of two columns that show the same motion; the first may be delayed. They need not be mapped.
-    time
-        Head of the clock of ``column`` where that is not mapped. All columns of a clock of its own move
-        together; a column on the clock of ``[time]`` moves alone.
-    longest
-        Largest lag in s; a quarter of the record where ``None``.
-    """
-
+    # column, to: heads of two columns that show the same motion; the first may be delayed. They need not be
+    # mapped.
     column: str
     to: str
+    # time: head of the clock of column where that is not mapped. All columns of a clock of its own move
+    # together; a column on the clock of [time] moves alone.
     time: str = ""
-    longest: float | None = None
+    longest: float | None = None  # largest lag in s; a quarter of the record where None
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """Which signals command the machine: they may rest at a limit, and jump.
+    """Which signals command the machine: they may rest at a limit, and jump."""
 
-    Parameters
-    ----------
-    commanded
-        Full names of inputs, and of what a controller in the model commands its drive with.
-    shown
-        Full names of readings of one of them, for instance of a current.
-    """
-
+    # commanded: full names of inputs, and of what a controller in the model commands its drive with
     commanded: frozenset[str] = frozenset()
-    shown: frozenset[str] = frozenset()
+    shown: frozenset[str] = frozenset()  # full names of readings of one of them, for instance of a current
 
     @staticmethod
     def of(model: FlatModel) -> Inputs:

@@ -173,36 +173,22 @@ def rows_in_words(indices: Indices, first_row: int) -> str:
 
 
 class Group(NamedTuple):
-    """Faulty samples.
+    """Faulty samples."""
 
-    Parameters
-    ----------
-    first, behind
-        Indices of the first sample, and of the first one that is good again.
-    kind
-        ``"spike"``, ``"dropout"`` (several samples off), ``"stuck"`` (a value is repeated) or ``"jump"``,
-        behind which all samples are off.
-    size
-        Largest distance from the samples around, in the unit of the channel.
-    """
-
+    # first, behind: indices of the first sample, and of the first one that is good again
     first: int
     behind: int
+    # kind: "spike", "dropout" (several samples off), "stuck" (a value is repeated) or "jump", behind which
+    # all samples are off
     kind: str
-    size: float
+    size: float  # largest distance from the samples around, in the unit of the channel
 
 
 @dataclass(frozen=True, eq=False)
 class Witness:
-    """Another channel on the same clock: what it shows at the same time is no fault of a sensor.
+    """Another channel on the same clock: what it shows at the same time is no fault of a sensor."""
 
-    Parameters
-    ----------
-    values
-        Shape (n,).
-    """
-
-    values: Array
+    values: Array  # shape (n,)
 
     @cached_property
     def least(self) -> float:
@@ -238,21 +224,11 @@ class Witness:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What decides, beside the channel itself, whether samples are faulty.
+    """What decides, beside the channel itself, whether samples are faulty."""
 
-    Parameters
-    ----------
-    others
-        Other channels on the same clock.
-    commanded
-        Whether the channel is an input of the model: a command may rest, and jump.
-    motion
-        Whether the channel is a position or an angle: a body is never in two places.
-    """
-
-    others: Sequence[Witness] = ()
-    commanded: bool = False
-    motion: bool = False
+    others: Sequence[Witness] = ()  # other channels on the same clock
+    commanded: bool = False  # whether the channel is an input of the model: a command may rest, and jump
+    motion: bool = False  # whether the channel is a position or an angle: a body is never in two places
 
 
 def faulty_groups(values: Array, around: Surroundings) -> list[Group]:
@@ -495,44 +471,26 @@ def _sum_of_squares(values: Array, places: Indices, order: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """A column as it stands in the file.
-
-    Parameters
-    ----------
-    head, unit
-        Of the column.
-    values
-        Finite, shape (n,).
-    commanded
-        Whether it is an input of the model: a command may rest, jump, and be limited.
-    shows_input
-        Whether it is an input, or the reading of one: a limit may be that of the drive.
-    motion
-        Whether it is a position or an angle.
-    """
+    """A column as it stands in the file."""
 
     head: str
     unit: str
-    values: Array
-    commanded: bool = False
+    values: Array  # finite, shape (n,)
+    commanded: bool = False  # whether it is an input of the model: a command may rest, jump, and be limited
+    # shows_input: whether it is an input, or the reading of one: a limit may be that of the drive
     shows_input: bool = False
-    motion: bool = False
+    motion: bool = False  # whether it is a position or an angle
 
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """Columns after the checks.
+    """Columns after the checks."""
 
-    Parameters
-    ----------
-    values, masked
-        By head, shape (n,): repaired values, and which samples these are; only of columns that were changed.
-    findings, remarks
-        What makes the file suspect, and what was changed or is unusual.
-    """
-
+    # values, masked: by head, shape (n,): repaired values, and which samples these are; only of columns that
+    # were changed
     values: Mapping[str, Array]
     masked: Mapping[str, Mask]
+    # findings, remarks: what makes the file suspect, and what was changed or is unusual
     findings: tuple[Finding, ...]
     remarks: tuple[Finding, ...]
 

@@ -24,28 +24,16 @@ _REACH = 3
 
 @dataclass(frozen=True)
 class Sampling:
-    """How a signal runs between its samples.
+    """How a signal runs between its samples."""
 
-    Parameters
-    ----------
-    name
-        As ``records.toml`` writes it.
-    words
-        What it means, for remarks.
-    taps
-        Weights of neighbouring samples, by how many samples later they stand, whose sum is what a smooth
-        signal with the same effect has at a sample.
-    late
-        How many samples the signal acts behind its stamps.
-    held_from
-        Where it is held from one sample to the next: how many samples later the value in force stands;
-        ``None`` where it is not held.
-    """
-
-    name: str
-    words: str
+    name: str  # as records.toml writes it
+    words: str  # what it means, for remarks
+    # taps: weights of neighbouring samples, by how many samples later they stand, whose sum is what a smooth
+    # signal with the same effect has at a sample
     taps: tuple[tuple[int, float], ...] = ((0, 1.0),)
-    late: float = 0.0
+    late: float = 0.0  # how many samples the signal acts behind its stamps
+    # held_from: where it is held from one sample to the next: how many samples later the value in force
+    # stands; None where it is not held
     held_from: int | None = None
 
     @property

@@ -64,14 +64,7 @@ def check_mat(file: Path) -> None:
 class _Elements:
     """The elements of one variable, one after the other.
 
-    Parameters
-    ----------
-    name
-        Of the file, for messages.
-    content
-        From the head of the variable.
-    order
-        Of bytes, as in :mod:`struct`.
+    ``content``: from the head of the variable.
     """
 
     def __init__(self, name: str, content: bytes, order: str) -> None:
@@ -138,29 +131,15 @@ class _Elements:
 
 @dataclass(frozen=True, eq=False)
 class RecordTable:
-    """Columns of one file.
+    """Columns of one file."""
 
-    Parameters
-    ----------
-    file
-        Name of the file, for messages.
-    given
-        Columns by head, shape (n,); in binary files they may differ in length.
-    first_row
-        Number of the first row in messages: 2 in a CSV file whose heads are row 1.
-    units
-        Units of columns, by head, where the file gives them beside the heads.
-    remarks
-        What was assumed about the file.
-    behind
-        Usual time in s by which the clocks of a log, by head, lie behind its writing; empty for a table.
-    """
-
-    file: str
-    given: Mapping[str, Array]
-    first_row: int = 1
+    file: str  # name of the file, for messages
+    given: Mapping[str, Array]  # columns by head, shape (n,); in binary files they may differ in length
+    first_row: int = 1  # number of the first row in messages: 2 in a CSV file whose heads are row 1
+    # units: units of columns, by head, where the file gives them beside the heads
     units: Mapping[str, str] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what was assumed about the file
+    # behind: usual time in s by which the clocks of a log, by head, lie behind its writing; empty for a table
     behind: Mapping[str, float] = field(default_factory=dict)
 
     @property
