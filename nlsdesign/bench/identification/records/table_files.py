@@ -218,7 +218,7 @@ def _folders_of_records(parent: Path) -> list[str]:
 
 def _is_record(path: Path) -> bool:
     """Tell whether a path may hold a record: a table by its ending, or a log."""
-    return is_robot_log(path) if path.is_dir() else path.suffix.lower() in _ENDINGS
+    return path.suffix.lower() in _ENDINGS or is_robot_log(path)
 
 
 def unread_tables(folder: Path) -> list[Path]:
