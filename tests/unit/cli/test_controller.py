@@ -12,6 +12,7 @@ __all__ = ["run"]
 DECK = "austin2015_figure_consistent"
 
 
+@pytest.mark.long_cases("pid-PID on the")  # quick: test_export_fmu.py
 @pytest.mark.parametrize(
     ("law", "told"), [("scheduled", "speed by tangent stiffness"), ("pid", "PID on the")]
 )
@@ -31,7 +32,7 @@ def test_the_controller_is_written_as_c(run: Run, tmp_path: Path, law: str, told
 
 
 def test_an_fmu_stands_beside_it(run: Run, tmp_path: Path) -> None:
-    status, _, err = run("export", "controller", "--deck", DECK, "--out", "c", "--fmu")
+    status, _, err = run("export", "controller", "--deck", "austin2015_soft_spring", "--out", "c", "--fmu")
     assert status == 0, err
     assert (tmp_path / "c" / "controller.fmu").stat().st_size > 10_000
 

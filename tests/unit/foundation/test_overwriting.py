@@ -189,7 +189,7 @@ def test_what_a_command_lists_beforehand_is_what_it_writes(run: Run, tmp_path: P
     calls = (
         ("export", "controller", "--deck", DECK, "--out", "a"),
         ("export", "c", "--deck", DECK, "--what", "controller", "--examples", "--out", "b"),
-        ("analyse", "--deck", "austin2015_figure_consistent", "--count", "2", "--out", "c"),
+        ("analyse", "--deck", DECK, "--count", "2", "--out", "c"),
     )
     for words in calls:
         listed = json.loads(run(*words, "--dry-run", "--json")[1])["files"]
