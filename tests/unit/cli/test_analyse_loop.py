@@ -58,7 +58,7 @@ def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp
     assert any(line.startswith("2.8 N·m held: limit cycle of ±") for line in found["findings"])
     # The sine limit-cycles at nearly all frequencies, which is one finding with their range.
     (sine,) = [line for line in found["findings"] if line.startswith("sine of ")]
-    assert sine.startswith("sine of ±2.8 N·m at 0.5 to 5.1 Hz (4 of 5 frequencies): limit cycle of ±0.0")
+    assert sine.startswith("sine of ±2.8 N·m at 0.5 to 5.08 Hz (4 of 5 frequencies): limit cycle of ±0.1")
     (onset,) = found["onset"]
     # Of the loop that export writes, with its velocity loop of 45 Hz; the linear one has no friction.
     assert onset["value"] == pytest.approx(52.4, rel=0.05)

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Run, files_in, run
+from tests.command_line import Run, files_in, run, two_machines
 
-__all__ = ["run"]
+__all__ = ["run", "two_machines"]  # the fixtures
+pytestmark = pytest.mark.usefixtures("two_machines")
 DECK = "austin2015_figure_consistent"
 
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from fmpy.util import read_csv
 
-from tests.command_line import Run, files_in, run
+from tests.command_line import Run, files_in, run, two_machines
 
-__all__ = ["run"]  # the fixture
+__all__ = ["run", "two_machines"]  # the fixtures
+pytestmark = pytest.mark.usefixtures("two_machines")
 
 WORDS = ("export", "fmu", "--deck", "austin2015_figure_consistent", "--kind", "cascade")
 LINEAR = "austin2015_soft_spring"

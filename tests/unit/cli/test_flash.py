@@ -29,6 +29,8 @@ LINEAR = "austin2015_soft_spring"
 @pytest.fixture
 def export(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
     monkeypatch.chdir(tmp_path)
+    # Margins are not looked at here.
+    monkeypatch.setattr("nlsdesign.feedback.control.evaluation.spread_margins.DRAWS", 2)
 
     def call(*words: str) -> tuple[int, str, str]:
         usual = ("export", "c", "--deck", "austin2015_figure_consistent", "--kind", "cascade")

@@ -20,9 +20,10 @@ from nlsdesign.foundation.text_files import (
     write_table,
     write_text,
 )
-from tests.command_line import Run, run
+from tests.command_line import Run, run, two_machines
 
-__all__ = ["run"]
+__all__ = ["run", "two_machines"]  # the fixtures
+pytestmark = pytest.mark.usefixtures("two_machines")
 DECK = "austin2015_soft_spring"
 CALL = ("simulate", "--deck", DECK, "--stop", "20 ms", "--signals", "motor.angle", "--out", "o/run.csv")
 
