@@ -37,7 +37,6 @@ from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten
 from tests.cam_cases import CONCAVE, CONTOUR, CONVEX, KEEP, PRETENSION, RUBBER, TARGET, actuator
 
-
 SMALL = DesignSettings(starts=2, draws=100, look_for_size_ranges=False)
 
 
