@@ -107,15 +107,12 @@ def _spread_figure(name: str, results: ActuatorResults) -> FigureSection:
     middle, paper = (float(np.max(errors.quantile(each, 0.5))) for each in ("best", "published form"))
     ranked = errors.ranked_causes("best")[:3]
     causes = ", ".join(f"{cause} ({1e3 * size:.0f})" for cause, size in ranked)
-    dashed = (
-        " Dashed: bound of Cramér and Rao on the rms over all machines, for any estimator with encoder and "
-        "current."
-    )
     return FigureSection(
         f"Torque errors over the spread, {name}",
         nls.figures.errors_over_spread(errors),
         caption=f"Sines of {errors.torque:.2f} N·m, one run for all; {draws} machines drawn from the "
-        f"spreads of the deck.{dashed if len(errors.bound) else ''}",
+        "spreads of the deck. Dashed, where computed: bound of Cramér and Rao on the rms over all machines, "
+        "for any estimator with encoder and current.",
         means=f"Median over the spread at the worse frequency: {1e3 * middle:.0f} mN·m of the observer "
         f"that is generated, {1e3 * paper:.0f} of the published form. Most costs what rubber and drive "
         f"are not known: {causes} mN·m.",
