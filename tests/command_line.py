@@ -32,6 +32,12 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
     return call
 
 
+@pytest.fixture
+def two_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judge the margins of a written controller over the spread on two machines, where none is looked at."""
+    monkeypatch.setattr("nlsdesign.feedback.control.evaluation.spread_margins.DRAWS", 2)
+
+
 def files_in(folder: Path) -> list[str]:
     """Return the names of the files in a folder, without the list of what was written, sorted."""
     return sorted(each.name for each in folder.iterdir() if each.name != LIST_NAME)

@@ -12,7 +12,6 @@ from .._published import bench_records, with_bench_sensors
 
 RIVALS = (
     effects.coulomb_friction,
-    effects.drive_delay,
     effects.rate_independent_hysteresis,
     effects.second_relaxation,
 )

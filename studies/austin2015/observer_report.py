@@ -111,8 +111,8 @@ def _spread_figure(name: str, results: ActuatorResults) -> FigureSection:
         f"Torque errors over the spread, {name}",
         nls.figures.errors_over_spread(errors),
         caption=f"Sines of {errors.torque:.2f} N·m, one run for all; {draws} machines drawn from the "
-        "spreads of the deck. Dashed: bound of Cramér and Rao on the rms over all machines, for any "
-        "estimator with encoder and current.",
+        "spreads of the deck. Dashed, where computed: bound of Cramér and Rao on the rms over all machines, "
+        "for any estimator with encoder and current.",
         means=f"Median over the spread at the worse frequency: {1e3 * middle:.0f} mN·m of the observer "
         f"that is generated, {1e3 * paper:.0f} of the published form. Most costs what rubber and drive "
         f"are not known: {causes} mN·m.",

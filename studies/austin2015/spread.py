@@ -68,7 +68,7 @@ def over_spread(
         "best": chosen.model, "cascade": observers.minimal.model, "published form": observers.published.model,
     }  # fmt: skip
     errors = observer_errors(
-        compared, observer_bench(model), draws=draws, bounded=1 if draws < 8 else 2, translate=natively
+        compared, observer_bench(model), draws=draws, bounded=0 if draws < 8 else 2, translate=natively
     )
     angles = np.radians(np.linspace(-50.0, 50.0, 101))
     drops = rank_drops(model, angles=angles, angle="motor.angle", measured=("motor.angle",))

@@ -87,7 +87,7 @@ def test_a_periodic_disturbance_is_no_noise(disturbed: tuple[Assembly, RecordSet
     assert bench.noise.deviation(FORCE) < 1.3 * WHITE * np.sqrt(2.0)
 
 
-@pytest.mark.long_cases("rate_independent_hysteresis", "torque_ripple")
+@pytest.mark.long_cases("second_relaxation", "rate_independent_hysteresis", "torque_ripple")
 @pytest.mark.parametrize(
     "effect",
     ["none", "coulomb_friction", "second_relaxation", "rate_independent_hysteresis", "torque_ripple"],

@@ -125,7 +125,7 @@ def estimates(folder: Path, angle: np.ndarray, current: np.ndarray) -> tuple[np.
     return np.array([y for y, _ in both]), np.array([status for _, status in both])
 
 
-@pytest.mark.long_cases("frozen-2300-1000", "long jump-2200-40")
+@pytest.mark.long_cases("frozen-2300-1000", "long jump-2200-40", "frozen-3300-100")
 @pytest.mark.parametrize(
     ("fault", "first", "length"),
     [("jump", 2200, 3), ("long jump", 2200, 40), ("frozen", 2300, 1000), ("frozen", 3300, 100)],

@@ -140,6 +140,7 @@ def test_a_stiff_plant_costs_few_steps_and_settles_at_its_rest(tmp_path):
 # --- the published actuator -----------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("austin2015_as_printed")
 @pytest.mark.parametrize("deck", ["austin2015_as_printed", "austin2015_figure_consistent"])
 def test_the_published_actuator_agrees_with_the_packages_own_simulation_to_1e_6(deck, tmp_path):
     model = flatten(cam_rubber_actuator(load_deck(deck)), inputs=["motor.current"], outputs=["motor.angle"])

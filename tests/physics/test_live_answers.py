@@ -42,7 +42,7 @@ SAME = 2e-4
 solver of 1e-9 in a cost in which 1e-3 of the largest torque counts as one."""
 
 
-def whole(question: LiveQuestion, starts: int = 4) -> CamDesign:
+def whole(question: LiveQuestion, starts: int = 2) -> CamDesign:
     settings = DesignSettings(
         starts=starts, defaults=(), look_for_size_ranges=False, look_for_remedies=False, draws=0
     )

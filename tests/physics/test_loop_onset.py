@@ -49,6 +49,7 @@ def swings(loop: ClosedLoop, gains: np.ndarray, amplitude: float) -> np.ndarray:
     return np.max(np.abs(np.fft.irfft(spectrum)), axis=1)
 
 
+@pytest.mark.long_cases("1.0")
 @pytest.mark.parametrize("amplitude", [1.0, 2.8])
 def test_onset_against_a_dense_sweep(loop: ClosedLoop, amplitude: float) -> None:
     """In the sweep the band of the oscillation jumps up where it begins: ten times steeper than before."""

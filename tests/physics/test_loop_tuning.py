@@ -114,10 +114,10 @@ def test_a_loop_that_holds_no_angle_has_no_gain(loops: dict[str, ClosedLoop]) ->
 
 
 def test_an_observer_without_a_rest_is_refused(loops: dict[str, ClosedLoop]) -> None:
-    bench = flatten(declare(load_deck(SPRINGS["nonlinear"])), outputs=["motor.angle", "spring.torque"])
+    bench = flatten(declare(load_deck(SPRINGS["soft"])), outputs=["motor.angle", "spring.torque"])
     for observer in (design_observer(bench), design_adaptive_observer(bench).model):
         with pytest.raises(ConvergenceError, match=r"no rest is found.*gain=CascadeGain"):
-            loop_margins(replace(loops["nonlinear"], observer=observer), np.radians([20.0]))
+            loop_margins(replace(loops["soft"], observer=observer), np.radians([20.0]))
 
 
 def test_what_cannot_be_had(loops: dict[str, ClosedLoop]) -> None:

@@ -102,6 +102,7 @@ def force(extension: np.ndarray) -> np.ndarray:
     "two-sided, anchor 25 mm",
     "two-sided, parallel cable",
     "two-sided, sharp, anchor 22 mm",
+    "two-sided, groove and bore",
 )
 @pytest.mark.parametrize("name", CASES)
 def test_a_cable_on_the_machined_edge_gives_the_claimed_torque(name: str, tmp_path: Path) -> None:
@@ -146,7 +147,12 @@ def test_the_arcs_keep_the_stated_distance_from_the_offset_of_the_integrated_cur
     assert max(np.sqrt(np.maximum(np.square(away) - 0.25e-3**2, 0.0))) < 1.05 * stated
 
 
-@pytest.mark.long_cases("one-sided, anchor 30 mm")
+@pytest.mark.long_cases(
+    "one-sided, anchor 30 mm",
+    "two-sided, anchor 25 mm",
+    "two-sided, groove and bore",
+    "two-sided, parallel cable",
+)
 @pytest.mark.parametrize("name", CASES)
 def test_the_lever_arm_is_the_change_of_the_string_s_length(name: str, tmp_path: Path) -> None:
     contour, machined = CASES[name]

@@ -242,7 +242,7 @@ def test_dry_friction_does_not_make_the_estimated_speed_chatter() -> None:
     assert np.max(np.abs(found["motor.speed"])[slow]) < 0.05
 
 
-@pytest.mark.long_cases("-60.0-441")
+@pytest.mark.long_cases("-60.0-441", "-1500.0-441")
 @pytest.mark.parametrize("points", [111, 441])
 @pytest.mark.parametrize("first", [-60.0, -1500.0])
 def test_pole_placement_is_unstable_between_its_grid_points(points: int, first: float) -> None:

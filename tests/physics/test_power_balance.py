@@ -71,6 +71,7 @@ def integral(power: np.ndarray, times: np.ndarray) -> np.ndarray:
     return cumulative_simpson(power, x=times, initial=0.0)
 
 
+@pytest.mark.long_cases("austin2015_as_printed")
 @pytest.mark.parametrize("name", DECKS)
 def test_the_published_actuator_balances(name: str) -> None:
     """Sine current of 4 A at 3 Hz for a second; balance at every moment, to 1e-6 of the work done."""
@@ -90,6 +91,7 @@ def test_the_published_actuator_balances(name: str) -> None:
     assert np.max(stored) > 0.1 * np.max(np.abs(work))
 
 
+@pytest.mark.long_cases("austin2015_figure_consistent")
 @pytest.mark.parametrize("name", DECKS)
 def test_the_spring_alone_balances_when_it_is_driven(name: str) -> None:
     made = declare(load_deck(name)).with_part("motor", Driven()).without_part("motor_encoder")

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from tests import tutorial
-from tests.command_line import Run, run
+from tests.command_line import Run, run, two_machines
 
-__all__ = ["run"]
+__all__ = ["run", "two_machines"]
 SMALLER = {
     "nlsdesign design": ["--draws", "0", "--starts", "1"],
     "nlsdesign simulate": ["--dry-run"],
@@ -44,6 +44,7 @@ def quick_words(line: str) -> tuple[list[str], bool]:
     return words + more, not more
 
 
+@pytest.mark.usefixtures("two_machines")
 def test_the_commands_and_scripts_work_with_smaller_settings(
     run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

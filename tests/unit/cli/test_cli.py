@@ -66,7 +66,7 @@ def test_infeasible_limits_are_named(run: Run, tmp_path: Path) -> None:
     words = ["--maximum", "5 N*m", "--angle", "53 deg"]
     words += ["--limit", 'MinimumRadiusOfCurvature = {radius = "30 mm"}']
     words += ["--limit", 'MaximumCamRadius = {radius = "5 mm"}']
-    status, _, err = run("design", "--deck", DECK, *words)
+    status, _, err = run("design", "--deck", DECK, "--starts", "1", *words)
     assert status == 2
     assert "MinimumRadiusOfCurvature" in err
     assert "MaximumCamRadius" in err
@@ -84,8 +84,7 @@ def test_a_design_that_misses_is_no_success(run: Run, tmp_path: Path) -> None:
     words = [
         "--target",
         'PowerTorque = {coefficient = 3.4, exponent = 1.0, angle = "50 deg"}',
-        "--draws",
-        "0",
+        *("--draws", "0", "--starts", "1"),
     ]
     words += ["--free", "spring.cam.contour", "--free", "spring.pretension", "--out", "o"]
     status, out, err = run("design", "--deck", "austin2015_as_printed", *words)
@@ -247,7 +246,7 @@ def test_analyse_without_a_command_goes_over_the_angle(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")  # no cell is wrapped
-    words = ("--deck", DECK, "--from", "-10 deg", "--to", "45 deg", "--count", "5", "--out", "o")
+    words = ("--deck", DECK, "--from", "-10 deg", "--to", "45 deg", "--count", "2", "--out", "o")
     short, named = (run("analyse", *more, *words) for more in ((), ("angle",)))
     assert short == named
     status, out, _ = short

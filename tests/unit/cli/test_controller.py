@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Run, files_in, run
+from tests.command_line import Run, files_in, run, two_machines
 
-__all__ = ["run"]
+__all__ = ["run", "two_machines"]  # the fixtures
+pytestmark = pytest.mark.usefixtures("two_machines")
 DECK = "austin2015_figure_consistent"
 
 
+@pytest.mark.long_cases("pid-PID on the")  # quick: test_export_fmu.py
 @pytest.mark.parametrize(
     ("law", "told"), [("scheduled", "speed by tangent stiffness"), ("pid", "PID on the")]
 )
@@ -31,7 +33,7 @@ def test_the_controller_is_written_as_c(run: Run, tmp_path: Path, law: str, told
 
 
 def test_an_fmu_stands_beside_it(run: Run, tmp_path: Path) -> None:
-    status, _, err = run("export", "controller", "--deck", DECK, "--out", "c", "--fmu")
+    status, _, err = run("export", "controller", "--deck", "austin2015_soft_spring", "--out", "c", "--fmu")
     assert status == 0, err
     assert (tmp_path / "c" / "controller.fmu").stat().st_size > 10_000
 

@@ -27,6 +27,8 @@ from tests.unit.bench.identification.test_shooting import truth as slide_record
 
 __all__ = ["run"]
 PARTS = ("observer", "controller", "torque_loop")
+SHORT = "sine_15deg_5.0Hz"
+"""Three seconds are enough where it does not matter how well the numbers are known."""
 SEED, ONLY = 5, ("sine_25deg_2.0Hz", "sine_15deg_5.0Hz", "multisine")
 
 
@@ -35,7 +37,9 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with records of a rig that hides nothing, and the deck as its makers declare it."""
     folder = tmp_path_factory.mktemp("bench")
     write_declaration(folder, ACTUATORS["arm"])
-    write_records(folder / "records", make_records(ACTUATORS["arm"], {}, SEED, only=ONLY))
+    made = make_records(ACTUATORS["arm"], {}, SEED, only=ONLY)
+    write_records(folder / "records", made)
+    write_records(folder / "short", {SHORT: made[SHORT]})
     write_deck(declared_rig(folder / "rig.toml", folder / "cam.csv"), folder / "deck.toml")
     return folder
 
@@ -83,7 +87,7 @@ def test_the_deck_that_is_written_is_accepted_and_says_where_its_numbers_come_fr
     run: Run, bench: Path, tmp_path: Path
 ) -> None:
     status, out, _ = run(
-        "fit", "--deck", str(bench / "deck.toml"), "--records", str(bench / "records"), "--out", "fitted"
+        "fit", "--deck", str(bench / "deck.toml"), "--records", str(bench / "short"), "--out", "fitted"
     )
     assert status == 0
     assert "noise floor" in out
@@ -92,13 +96,13 @@ def test_the_deck_that_is_written_is_accepted_and_says_where_its_numbers_come_fr
     assert run("deck", "check", str(deck))[0] == 0
     fitted, declared = assembly_of(deck).quantities(), assembly_of(bench / "deck.toml").quantities()
     source, before = fitted["motor.inertia"].source, declared["motor.inertia"].source
-    records = f" in {bench / 'records'}, "
+    records = f" in {bench / 'short'}, "
     assert re.fullmatch(
         rf"fitted to bench records \w.*{re.escape(records)}\d{{4}}-\d\d-\d\d; declared: {re.escape(before)}",
         source,
     )
     assert fitted["motor.inertia"].spread == declared["motor.inertia"].spread
-    record = str(bench / "records" / "sine_15deg_5.0Hz.csv")
+    record = str(bench / "short" / f"{SHORT}.csv")
     errors = []
     for each in (deck, bench / "deck.toml"):
         status, out, _ = run("simulate", "--deck", str(each), "--record", record, "--out", "y.csv", "--json")
@@ -114,7 +118,7 @@ def test_a_number_at_the_end_of_its_range_is_not_passed_over(bench: Path) -> Non
     deck = assembly_of(bench / "deck.toml")
     inertia = deck.quantities()["motor.inertia"]
     wrong = deck.with_values({"motor.inertia": replace(inertia, value=2.0 * inertia.number)})
-    found = refit(wrong, load_records(bench / "records", flatten(wrong)))
+    found = refit(wrong, load_records(bench / "short", flatten(wrong)))
     (number,) = [n for n in found.numbers if n.name == "motor.inertia"]
     assert number.strain == pytest.approx(-3.0, abs=0.01)
     assert any("motor.inertia stands at the end of its range, -3.0 standard" in w for w in found.words())
@@ -125,7 +129,7 @@ def test_a_deck_that_leaves_nothing_free_is_refused(bench: Path) -> None:
     numbers = deck.quantities()
     known = deck.with_values({n: replace(q, spread=0.0) for n, q in numbers.items() if q.spread})
     with pytest.raises(MeasurementError, match=r"declares no spread.*spread = 0\.1"):
-        refit(known, load_records(bench / "records", flatten(known)))
+        refit(known, load_records(bench / "short", flatten(known)))
 
 
 def test_a_glob_that_holds_nothing_out_is_named_and_nothing_is_written(

@@ -37,10 +37,12 @@ from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten
 from tests.cam_cases import CONCAVE, CONTOUR, CONVEX, KEEP, PRETENSION, RUBBER, TARGET, actuator
 
+SMALL = DesignSettings(starts=2, draws=100, look_for_size_ranges=False)
+
 
 @pytest.fixture(scope="module")
 def found() -> CamDesign:
-    return design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP)
+    return design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=SMALL)
 
 
 def test_values_put_into_the_actuator_give_the_reported_torque(found: CamDesign) -> None:
@@ -63,7 +65,7 @@ def test_nothing_else_is_touched(found: CamDesign) -> None:
 
 
 def test_same_question_same_answer(found: CamDesign) -> None:
-    again = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP)
+    again = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=SMALL)
     assert again.fingerprint == found.fingerprint
     assert pickle.loads(pickle.dumps(found)).fingerprint == found.fingerprint
 
@@ -100,7 +102,7 @@ def test_tolerance_band_is_counted() -> None:
     wide = ExponentialTorque(
         maximum=5.0, angle=TARGET.last_angle, shape=1.0, tolerance=quantity(20.0, "mN*m")
     )
-    design = design_cam(actuator(CONCAVE), target=wide, free=PRETENSION, keep=KEEP)
+    design = design_cam(actuator(CONCAVE), target=wide, free=PRETENSION, keep=KEEP, settings=SMALL)
     inside = np.mean(np.abs(design.check.errors) <= 0.02)
     assert 0.1 < inside < 0.9
     assert design.within_tolerance == pytest.approx(inside)
@@ -114,7 +116,9 @@ def test_progress_is_told_after_each_start() -> None:
         target=TARGET,
         free=CONTOUR,
         keep=KEEP,
-        settings=DesignSettings(progress=lambda: steps.append(1)),
+        settings=DesignSettings(
+            draws=0, look_for_size_ranges=False, look_for_remedies=False, progress=lambda: steps.append(1)
+        ),
     )
     assert len(steps) == len(design.starts) == 6
 
@@ -241,4 +245,4 @@ def test_limits_of_the_geometry_alone_can_be_in_conflict() -> None:
 def test_a_solver_that_stops_early_gives_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(program._OPTIONS, "ipopt.max_iter", 2)
     with pytest.raises(ConvergenceError, match="IPOPT"):
-        design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP)
+        design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=SMALL)

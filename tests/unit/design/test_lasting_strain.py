@@ -19,7 +19,7 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.live.gallery import gallery_question
 from nlsdesign.model import flatten
 
-QUICK = DesignSettings(starts=2, draws=0, look_for_size_ranges=False)
+QUICK = DesignSettings(starts=1, draws=0, look_for_size_ranges=False)
 FREE = ["spring.cam.contour", "spring.pretension"]
 """With both free the template of the live page stretched 40 mm of rubber by 46 mm for good, 114 %."""
 

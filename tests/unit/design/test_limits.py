@@ -16,6 +16,7 @@ from nlsdesign.components.transmission.cam_drive import through
 from nlsdesign.design import (
     AnchorDistance,
     AreaRange,
+    DesignSettings,
     Limit,
     MaximumCableTension,
     MaximumCamRadius,
@@ -72,6 +73,7 @@ def test_slips_are_named(make: Callable[[], Limit], error: type[Exception], word
 
 
 # Limit; a value at the starting point that it bounds, found by hand from the design's own numbers.
+QUICK = DesignSettings(look_for_size_ranges=False, draws=0, starts=2)
 BOUNDED = [
     (MinimumRadiusOfCurvature(1e-3), "radius of curvature >= 1 mm"),
     (MaximumCamRadius(20e-3), "cam radius <= 20 mm"),
@@ -124,7 +126,7 @@ def test_each_limit_says_what_it_bounds(limit: Limit, text: str) -> None:
 )
 def test_an_active_limit_is_kept_and_named(limit: Limit, measure: Callable[[object], float]) -> None:
     keep = [*KEEP, limit]
-    found = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER[:2], keep=keep)
+    found = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER[:2], keep=keep, settings=QUICK)
     assert type(limit).__name__ in found.active_limits
     room = measure(found)
     # The declared cam holds the contour to parts in 1e5.

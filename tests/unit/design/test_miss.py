@@ -43,7 +43,7 @@ from nlsdesign.model import flatten
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, actuator
 
 LINE = PowerTorque(coefficient=3.4, exponent=1.0, angle=degrees(50.0))
-QUICK = DesignSettings(look_for_size_ranges=False, draws=0)
+QUICK = DesignSettings(look_for_size_ranges=False, draws=0, starts=2)
 
 
 def test_a_miss_says_how_far_where_why_and_what_to_free() -> None:
@@ -116,7 +116,7 @@ def test_declared_strength_and_cable_are_limits_unless_others_are_asked_for() ->
     looser = [MaximumCamRadius(20e-3), MaximumCableTension(1000.0)]
     other = design_cam(published, target=TARGET, free=free, keep=looser, settings=QUICK)
     assert [state.bound for state in other.limits if state.limit == "MaximumCableTension"] == [1000.0]
-    bare = DesignSettings(defaults=(), look_for_size_ranges=False, draws=0)
+    bare = replace(QUICK, defaults=())
     unlimited = design_cam(published, target=TARGET, free=PRETENSION, keep=[], settings=bare)
     assert unlimited.limits == ()
     assert any("MaximumCableTension" in remark for remark in unlimited.remarks)

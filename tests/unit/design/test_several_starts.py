@@ -29,11 +29,11 @@ def test_knots_rounded_much_at_first_lead_to_what_plain_starts_mostly_miss() -> 
     """Searches with knots of the last rounding end in the nearest of many local optima, but for a few."""
     search = ALL["README"].search()
     sizes = [v.name for v in search.problem.scalars if v.name != search.problem.law.cam.pretension]
-    plain = [search.program.solve(search.problem.at(start)) for start in starts(8, 1, sizes)]
+    plain = [search.program.solve(search.problem.at(start)) for start in starts(4, 1, sizes)]
     cost, found, count = best_of(ALL["README"])
     costs = [outcome.cost for outcome in plain if outcome.solved]
     assert cost <= 1.0005 * min(costs)
-    assert sum(each > 1.5 * cost for each in costs) >= 6
+    assert sum(each > 1.5 * cost for each in costs) >= 3
     assert found == count == 6, "every start that is led comes to the best"
 
 

@@ -26,7 +26,7 @@ from nlsdesign.foundation.errors import InfeasibleError
 from nlsdesign.foundation.quantity import quantity
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, actuator
 
-QUICK = DesignSettings(look_for_size_ranges=False, draws=0, starts=2)
+QUICK = DesignSettings(look_for_size_ranges=False, draws=0, starts=1)
 NO_HELP = ("more elements", "another rubber", "smaller torque")
 FREED = re.compile(r"(spring\.[a-z_.]+) \(to ([0-9.]+) (mm²|mm|cm²)\)")
 

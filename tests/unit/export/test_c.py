@@ -111,6 +111,7 @@ def test_float_agrees_with_double_as_far_as_its_rounding_allows(name, running):
     assert np.all(difference < 3e-5)
 
 
+@pytest.mark.long_cases("observer-double", "controller-float")
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("name", MODELS)
 def test_the_self_test_passes_and_can_fail(name, real, tmp_path):
@@ -126,6 +127,7 @@ def test_the_self_test_passes_and_can_fail(name, real, tmp_path):
     assert subprocess.run([wrong], check=False, capture_output=True).returncode != 0
 
 
+@pytest.mark.long_cases("double--O0", "double--O2", "float--O0", "float--O3")
 @pytest.mark.parametrize("optimised", ["-O0", "-O2", "-O3"])
 @pytest.mark.parametrize("real", REALS)
 def test_gcc_finds_nothing_to_complain_about(real, optimised, tmp_path):
@@ -334,6 +336,9 @@ def test_parameters_are_taken_at_run_time_or_refused(running):
     assert running("observer", "double", [3.0, 0.015, 0.2]).first_status == PARAMETER_REFUSED | index_bit(0)
 
 
+@pytest.mark.long_cases(
+    "0-double", "1-double", "1-float", "127-double", "165-double", "165-float", "255-float"
+)
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("filling", [0x00, 0x01, 0x7F, 0xA5, 0xFF])
 def test_a_step_before_init_gives_zeros_and_says_so(filling, real, running):
@@ -402,6 +407,9 @@ def looked_up(*tables: Table) -> FlatModel:
     )
 
 
+@pytest.mark.long_cases(
+    "2-double", "3-double", "3-float", "5-double", "5-float", "33-float", "100-double", "400-float"
+)  # fmt: skip
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("points", [2, 3, 5, 33, 100, 400])
 def test_breakpoints_are_found_by_any_number_of_them(points, real, tmp_path):
@@ -524,12 +532,13 @@ def test_files_are_written_whole_or_not_at_all(tmp_path, monkeypatch):
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["figure_consistent", *(pytest.param(n, marks=pytest.mark.slow) for n in ("as_printed", "stiff_spring"))],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["figure_consistent", "as_printed", "stiff_spring"])
 def test_the_default_observer_in_float_passes_its_own_self_test(name, tmp_path):
-    """Its covariance once began at the square of the range, which cost single precision its digits."""
+    """Its covariance once began at the square of the range, which cost single precision its digits.
+
+    Quick, of the soft spring and joined with its controller: the test below.
+    """
     plant = flatten(declare(load_deck(f"austin2015_{name}")))
     source = export_c(design_adaptive_observer(plant).model, tmp_path, real="float")
     program = compile_program([source.source, source.selftest], tmp_path / "selftest")

@@ -47,6 +47,8 @@ def test_a_library_for_this_machine_runs(source, tmp_path):
     assert library.one(ctypes.c_double(0.5)) == pytest.approx(1.5, rel=1e-15)
 
 
+# The first library for a platform takes as long as its C library takes to build.
+@pytest.mark.long_cases("aarch64-linux", "x86_64-darwin")
 @pytest.mark.parametrize("name", ALL_PLATFORMS)
 def test_a_library_is_built_for_each_platform(name, source, tmp_path):
     where = PLATFORMS[name]

@@ -105,6 +105,9 @@ def monolithic(count: int, *, late: bool) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.long_cases(
+    "all read first-0.00025", "all read first-0.01", "one after another-0.0007", "one after another-None"
+)
 @pytest.mark.parametrize("step", [None, SAMPLE_TIME / 4, 0.0007, 0.01])
 @pytest.mark.parametrize("order", [(), ORDER], ids=["all read first", "one after another"])
 def test_the_closed_loop_is_that_of_one_program_whatever_the_step(order, step, loop):

@@ -258,6 +258,11 @@ def hostile(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @FORKS
+@pytest.mark.long_cases(
+    "instantiate SIGABRT-its library crashed (SIGABRT) while it was instantiated",
+    "step SIGBUS-its library crashed (SIGBUS) during a step from 0.005 s",
+    "step SIGILL-its library crashed (SIG",
+)
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
@@ -420,7 +425,8 @@ def refusal(bad: Path) -> str | None:
     [
         ("archive", 40),
         ("description", 15),
-        ("library", 20),
+        ("library", 8),
+        pytest.param("library", 20, marks=pytest.mark.slow),
         pytest.param("archive", 350, marks=pytest.mark.slow),
         pytest.param("description", 150, marks=pytest.mark.slow),
         pytest.param("library", 150, marks=pytest.mark.slow),

@@ -90,6 +90,15 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {name: export_fmu(model, folder / f"{name}.fmu") for name, model in models.items()}
 
 
+LATE = [
+    (k, delay, step)
+    for k, delay in enumerate((0.002, 0.0026, 0.001, 0.003, 0.0025, 0.0))
+    for number, step in enumerate((None, 0.00025, 0.00033, 0.005))
+    if (k + number) % 2
+]
+"""Every other pair of wire and step is left to the whole run."""
+
+
 def chosen(fmus: dict[str, Path], *names: str) -> dict[str, Path]:
     return {name: fmus[name] for name in names}
 
@@ -132,6 +141,9 @@ def test_a_gain_in_other_units_of_a_foreign_fmu_is_converted(tmp_path: Path, fmu
 # --- delays --------------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases(
+    "0.003-0.001", "0.003-0.0007", "0.00235-0.00013", "0.00235-0.001", "0.0001-0.0007", "0.0001-0.00013"
+)  # fmt: skip
 @pytest.mark.parametrize("step", [1e-3, 7e-4, 1.3e-4])
 @pytest.mark.parametrize("delay", [3e-3, 2.35e-3, 1e-4])
 def test_a_continuous_value_is_late_by_seconds(delay: float, step: float, fmus: dict[str, Path]) -> None:
@@ -144,6 +156,7 @@ def test_a_continuous_value_is_late_by_seconds(delay: float, step: float, fmus: 
     assert run.delays["meter.input"] == delay
 
 
+@pytest.mark.long_cases(*(f"wire{k}-{d}-{s}" for k, d, s in LATE))
 @pytest.mark.parametrize("step", [None, 2.5e-4, 3.3e-4, 5e-3])
 @pytest.mark.parametrize(
     ("wire", "delay"),

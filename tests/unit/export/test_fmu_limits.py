@@ -87,6 +87,7 @@ def swinging() -> FlatModel:
     return FlatModel("swinging", "For ever", states, (), (), (Variable("y", "1", "Output"),), (), equations)
 
 
+@pytest.mark.long_cases("1000000000.0-3.0", "1e+300-2.0")
 @both
 @pytest.mark.parametrize("length", [1e9, 1e300])
 def test_a_step_that_needs_too_many_steps_of_the_integrator_is_refused(length, version, tmp_path):
@@ -181,6 +182,7 @@ def by_differences(start: float, count: int) -> list[tuple[float, float]]:
 CLOCKS = pytest.mark.parametrize("clock", [by_adding, by_multiplying, by_differences])
 
 
+@pytest.mark.long_cases("by_adding-3.0", "by_multiplying-2.0", "by_differences-3.0")
 @both
 @CLOCKS
 def test_samples_are_counted_at_a_large_time(clock, version, units):

@@ -80,7 +80,7 @@ def assert_same_equations(model: FlatModel, read: Any) -> None:
             assert got[name] == pytest.approx(value, rel=1e-12, abs=1e-30), name
 
 
-@pytest.mark.long_cases("austin2015_figure_consistent")
+@pytest.mark.long_cases("austin2015_figure_consistent", "austin2015_soft_spring")
 @pytest.mark.parametrize("name", DECKS)
 def test_an_independent_compiler_reads_the_same_equations(name: str) -> None:
     model = deck(name)

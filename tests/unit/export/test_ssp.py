@@ -206,6 +206,7 @@ REFUSED: dict[str, tuple[str, str, str]] = {
 }
 
 
+@pytest.mark.long_cases(*(f"3.0-{case}" for case in REFUSED if case != "nothing"))
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_not_read_is_named(case: str, written: Path, tmp_path: Path) -> None:
     old, new, words = REFUSED[case]

@@ -97,7 +97,6 @@ def test_decks_of_the_project_come_back_equal(name: str) -> None:
 units = st.sampled_from(["N/m", "kN/m", "N/mm", "mN/m", "N/cm", "kg/s^2", "MN/m"])
 
 
-@settings(max_examples=300)
 @given(
     st.floats(min_value=1e-5, max_value=1e11),
     units,

@@ -43,6 +43,10 @@ PROGRAMS = {
 }
 
 
+@pytest.mark.long_cases(
+    "a program that it has started-15", "the interrupt is swallowed-15", "it becomes another error-15",
+    "a folder that nobody removes-2",
+)  # fmt: skip
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_an_interrupt_ends_the_program_and_leaves_nothing(

@@ -20,9 +20,10 @@ from nlsdesign.foundation.text_files import (
     write_table,
     write_text,
 )
-from tests.command_line import Run, run
+from tests.command_line import Run, run, two_machines
 
-__all__ = ["run"]
+__all__ = ["run", "two_machines"]  # the fixtures
+pytestmark = pytest.mark.usefixtures("two_machines")
 DECK = "austin2015_soft_spring"
 CALL = ("simulate", "--deck", DECK, "--stop", "20 ms", "--signals", "motor.angle", "--out", "o/run.csv")
 
@@ -189,7 +190,7 @@ def test_what_a_command_lists_beforehand_is_what_it_writes(run: Run, tmp_path: P
     calls = (
         ("export", "controller", "--deck", DECK, "--out", "a"),
         ("export", "c", "--deck", DECK, "--what", "controller", "--examples", "--out", "b"),
-        ("analyse", "--deck", "austin2015_figure_consistent", "--count", "2", "--out", "c"),
+        ("analyse", "--deck", DECK, "--count", "2", "--out", "c"),
     )
     for words in calls:
         listed = json.loads(run(*words, "--dry-run", "--json")[1])["files"]

@@ -15,7 +15,13 @@ from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.changed_copies import with_moved_load
 from nlsdesign.components.assembly.deck_writer import deck_digest, deck_problems, deck_text, declare
 from nlsdesign.feedback.control import joined, torque_controller
-from nlsdesign.feedback.observer import FixedGrid, PaperForm, design_adaptive_observer, design_observer
+from nlsdesign.feedback.observer import (
+    CascadeGain,
+    FixedGrid,
+    PaperForm,
+    design_adaptive_observer,
+    design_observer,
+)
 from nlsdesign.foundation.deck import deck_names, load_deck, read_deck
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import FlatModel, Origin, flatten
@@ -124,7 +130,7 @@ VIEWS: dict[str, Callable[[FlatModel], FlatModel]] = {
     "cut": lambda m: cut(m, ["spring.rubber.extension"]),
     "without idle states": lambda m: without_idle_states(m, ["spring.torque", "motor.angle"]),
     "paper form": paper_form,
-    "cascade": lambda m: design_observer(m, grid=FixedGrid(-1.5, 1.5, 33)),
+    "default observer": lambda m: design_observer(m, grid=FixedGrid(-1.5, 1.5, 33)),
     "observer in the published form": lambda m: design_observer(
         m, form=PaperForm(), grid=FixedGrid(-1.5, 1.5, 33)
     ),
@@ -154,7 +160,7 @@ def test_other_numbers_have_the_digest_of_the_deck_that_they_would_make() -> Non
     assert set(origin(changed).changed) == {"motor.inertia", "spring.rubber.area", "spring.cam.lever_arm"}
     assert origin(changed).digest == deck_digest(made.with_values(values)) != deck_digest(made)
     assert origin(changed).numbers["motor.inertia"].number == 7e-4
-    observer = design_observer(changed, grid=FixedGrid(-1.5, 1.5, 33))
+    observer = design_observer(changed, gain=CascadeGain(), grid=FixedGrid(-1.5, 1.5, 33))
     assert origin(observer).digest == origin(changed).digest
     back = changed.with_values({n: made.quantities()[n] for n in ("motor.inertia", "spring.rubber.area")})
     assert origin(back).changed == ("spring.cam.lever_arm",)
@@ -180,7 +186,7 @@ def test_a_moved_load_is_another_arrangement() -> None:
 def test_observer_and_controller_of_two_decks_are_of_neither() -> None:
     plant, grid = flatten(bundled()), FixedGrid(-1.5, 1.5, 33)
     other = plant.with_values({"motor.inertia": 7e-4})
-    observer = design_observer(plant, grid=grid)
+    observer = design_observer(plant, gain=CascadeGain(), grid=grid)
     one = joined(observer, torque_controller(plant))
     assert origin(one).digest == deck_digest(bundled())
     mixed = origin(joined(observer, torque_controller(other)))

@@ -72,7 +72,7 @@ def test_a_figure_has_words_labels_and_units(name: str) -> None:
     assert bottom.get_xlabel() == "" if name == "gap_bars" else re.search(r" in \S", bottom.get_xlabel())
 
 
-@pytest.mark.parametrize("name", samples.FIGURES)
+@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::3]))
 def test_an_inline_figure_fits_into_any_page(name: str) -> None:
     figure = drawn(name)
     root = ET.fromstring(figures.inline_svg(figure, "k7"))

@@ -86,6 +86,7 @@ def test_a_drive_that_does_not_saturate_gains_nothing_by_saturation() -> None:
     assert with_it > 0.99 * without
 
 
+@pytest.mark.long_cases("1.0")
 @pytest.mark.parametrize("logged", [0.0, 1.0])
 def test_dry_friction_is_no_drive_whose_torque_fades_or_grows(logged: float) -> None:
     """A drive that grew without end would make any error small, and one that fades is gone."""

@@ -19,6 +19,7 @@ LATE = {"belt_axis": 0.25, "elastic_joint": 0.1}
 """Samples by which a current that is held for a tick acts late where a row has two ticks, or five."""
 
 
+@pytest.mark.long_cases("rack_carriage-1100-plain", "belt_axis-1103-slow")
 @pytest.mark.parametrize(
     ("kind", "seed", "condition"),
     [("rack_carriage", 1100, "plain"), ("belt_axis", 1103, "slow"), ("elastic_joint", 1103, "slow")],
@@ -33,6 +34,7 @@ def test_a_clean_machine_whose_current_is_held_gets_no_name(
     assert any("nothing says how it runs between its samples" in remark for remark in verdict.remarks)
 
 
+@pytest.mark.long_cases("belt_axis")
 @pytest.mark.parametrize("kind", LATE)
 def test_numbers_that_blocks_share_tell_when_a_current_acts(kind: str, tmp_path: Path) -> None:
     write_kind_case(tmp_path, kind, (), 0.0, 1103, condition="slow")

@@ -49,6 +49,7 @@ def simulated(declared: Assembly, signals: tuple[str, ...] = SIGNALS) -> Record:
     return Record("run", simulate(model, TIME, inputs={"motor.current": current}))
 
 
+@pytest.mark.long_cases("gain", "bias")
 @pytest.mark.parametrize("change", ["none", "gain", "bias", "delay"])
 def test_both_blocks_vanish_on_records_of_the_model_itself(rig: Assembly, change: str) -> None:
     edited = {

@@ -30,6 +30,7 @@ def falling(rate: float, angle: float, load: float) -> float:
     return 0.1 + 0.1 * math.exp(-((rate / 0.1) ** 2))
 
 
+@pytest.mark.long_cases("motor")
 @pytest.mark.parametrize("body", ["motor", "joint"])
 def test_sharp_friction_in_slow_motion_is_coulombs(body: str, tmp_path: Path) -> None:
     """A sign that is rounded more than the records resolve is sharpened by a Stribeck speed below it."""
