@@ -31,6 +31,7 @@ def rows(results: dict[str, StepProof], real: str) -> list[str]:
     """Return a row of the table for each proof."""
     return [
         f"| {name} | {real} | {len(each.alarms) or 'none'} | {len(each.open_members) or 'none'} | "
+        f"{len(each.beyond) or 'none'} | "
         f"{each.reached} of {each.statements} |"
         for name, each in results.items()
     ]
@@ -42,8 +43,8 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="write nothing")
     given = parser.parse_args()
     lines = [
-        "| | number type | may be undefined | not proved finite | statements reached |",
-        "| --- | --- | ---: | ---: | ---: |",
+        "| | number type | may be undefined | not proved finite | beyond limits | statements reached |",
+        "| --- | --- | ---: | ---: | ---: | ---: |",
     ]
     holds = True
     for real in ("float", "double"):

@@ -11,6 +11,7 @@ are written anew for it, in a copy, and mean the same:
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import subprocess
@@ -37,6 +38,8 @@ _NAME = r"[A-Za-z_]\w*(?:(?:->|\.)\w+|\[[^\]]*\])*"
 _BRANCH = re.compile(r"^(\s*(?:else )?if \()(.+?) (<|>|<=|>=) (.+?)\)(\s.*|)$")
 _SHOWN = re.compile(r"Frama_C_show_each_(\w+):\s*\{(\d+)\},\s*([^\n]+)")
 _ALARM = re.compile(r"^\[eva:alarm\] [^:\n]*:(\d+): Warning:\s*([^\[]*)", re.MULTILINE)
+_NUMBER = re.compile(r"-?(?:\d+\.?\d*(?:e[+-]?\d+)?|inf)")
+_LOADING = ("_load", "_check", "_checksum")
 _REACHED = re.compile(r"(\d+) statements reached \(out of (\d+)\)")
 _BODIES = """\
 static {real} fabs_({real} x) {{ return x < ({real})0 ? -x : x; }}
@@ -54,6 +57,8 @@ class StepProof:
     # nothing is
     alarms: tuple[str, ...]
     open_members: tuple[str, ...]  # members that were not proved finite after a step; empty where all were
+    beyond: tuple[str, ...]  # outputs that were not proved to stay within the limits that the header states
+    loops: tuple[str, ...]  # functions of the step that hold a loop or a jump, which nothing bounds
     # reached, statements: how many statements the analysis reached, and of how many
     reached: int
     statements: int
@@ -61,15 +66,23 @@ class StepProof:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing is undefined and all that is given and remembered stays finite."""
-        return not self.alarms and not self.open_members
+        """Whether nothing is undefined, all stays finite and within its limits, and the work is bounded."""
+        return not (self.alarms or self.open_members or self.beyond or self.loops)
 
     def words(self) -> tuple[str, ...]:
         """Return what was proved, or what is open, in sentences."""
         if self.holds:
-            return ("proved for all inputs and any number of steps: nothing is undefined, all stays finite",)
-        open_members = [f"not proved finite: {', '.join(self.open_members)}"] if self.open_members else []
-        return (*(f"may be undefined: {alarm}" for alarm in self.alarms), *open_members)
+            return (
+                "proved of the step for all inputs and any number of steps: nothing is undefined, all stays "
+                "finite, outputs within their limits, no loop",
+            )
+        kinds = {
+            "may be undefined": self.alarms,
+            "not proved finite": self.open_members,
+            "not proved to stay within its limits": self.beyond,
+            "holds a loop or a jump": self.loops,
+        }
+        return tuple(f"{kind}: {each}" for kind, found in kinds.items() for each in found)
 
 
 def missing_prover() -> str:
@@ -84,8 +97,10 @@ def prove_step(source: CSource) -> StepProof:
 
     Of a state of any content, any inputs and any parameters: no access beyond an array or structure, no
     conversion of a number that does not fit, no overflow of a signed number, no shift too far, nothing read
-    that was not set. Of a state after :c:func:`init`, by induction over the steps: all outputs, states, taken
-    inputs and remembered readings are finite.
+    that was not set. Of a state after :c:func:`init`, by induction over the steps, where parameters may be
+    set anew before each: all outputs, states, taken inputs and remembered readings are finite, and outputs
+    are within the limits that the header states. That the step has no loop is read off its text. Code that
+    loads parameter blocks is not looked at.
 
     Parameters
     ----------
@@ -110,7 +125,8 @@ def prove_step(source: CSource) -> StepProof:
         folder = Path(scratch)
         shutil.copy(source.header, folder / source.header.name)
         copy, harness = folder / source.source.name, folder / "proof.c"
-        copy.write_text(_readable(source.source.read_text(encoding="utf-8"), source.real), encoding="utf-8")
+        code = source.source.read_text(encoding="utf-8")
+        copy.write_text(_readable(code, source.real), encoding="utf-8")
         copy.write_text(with_numbers_admitted(_printed(copy, folder)), encoding="utf-8")
         members = _members(source)
         harness.write_text(_harness(source, members), encoding="utf-8")
@@ -124,8 +140,39 @@ def prove_step(source: CSource) -> StepProof:
         for line, text in _ALARM.findall(output)
     )
     reached, statements = (int(number) for number in (_REACHED.findall(induction) or [(0, 0)])[-1])
-    seconds = time.perf_counter() - begin
-    return StepProof(source.name, alarms, _open(induction, members), reached, statements, seconds)
+    beyond = tuple(
+        path
+        for number, (path, v) in enumerate(
+            zip(source.writer.paths.outputs, source.model.outputs, strict=True)
+        )
+        if not _within(induction, f"outputs_{number}", v.minimum, v.maximum)
+    )
+    return StepProof(
+        name=source.name, alarms=alarms, open_members=_open(induction, members), beyond=beyond,
+        loops=_loops(code), reached=reached, statements=statements, seconds=time.perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _loops(code: str) -> tuple[str, ...]:
+    """Return the functions that hold a loop or a jump, without those that load parameter blocks."""
+    found, function = [], ""
+    for line in re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL).splitlines():
+        head = re.match(r"\w[\w ]* \*?(\w+)\(", line)
+        function = head[1] if head else function
+        if re.search(r"\b(?:for|while|do|goto)\b", line) and not function.endswith(_LOADING):
+            found.append(function)
+    return tuple(dict.fromkeys(found))
+
+
+def _within(output: str, label: str, lowest: float, highest: float) -> bool:
+    """Tell whether all values of an output that Eva shows are within limits, as far as it prints digits."""
+    names = (label, f"kept_{label}", f"at_first_kept_{label}")
+    shown = [values for name, _, values in _SHOWN.findall(output) if name in names]
+    numbers = [float(number) for values in shown for number in _NUMBER.findall(values)]
+    if not numbers or any("NaN" in values for values in shown):
+        return False
+    slack = 1e-6 * max((abs(limit) for limit in (lowest, highest) if math.isfinite(limit)), default=0.0)
+    return lowest - slack <= min(numbers) and max(numbers) <= highest + slack
 
 
 def _readable(code: str, real: Real) -> str:
@@ -199,6 +246,7 @@ def _members(source: CSource) -> dict[str, str]:
 
 def _harness(source: CSource, members: dict[str, str]) -> str:
     """Return the program whose values Eva computes."""
+    real = source.real
     inside = {label: path for label, path in members.items() if path.startswith("state.")}
     at_first = {label: path for label, path in inside.items() if not label.startswith(("states", "inputs"))}
     unknown = ["Frama_C_make_unknown((char *)&state.readings, sizeof state.readings);"]
@@ -210,6 +258,12 @@ def _harness(source: CSource, members: dict[str, str]) -> str:
         "supposed": [
             *(unknown if source.writer.readings else []),
             *(f"{path} = any_finite();" for path in inside.values()),
+            *(
+                f"state.outputs.{path} = Frama_C_{real}_interval("
+                f"{real.literal(v.minimum)}, {real.literal(v.maximum)});"
+                for path, v in zip(source.writer.paths.outputs, source.model.outputs, strict=True)
+                if math.isfinite(v.minimum) and math.isfinite(v.maximum)
+            ),
         ],
         "shown": _shown("", members),
     }

@@ -20,6 +20,7 @@ void any_content(void)
     Frama_C_make_unknown((char *)&state, sizeof state);
     Frama_C_make_unknown((char *)&given, sizeof given);
     Frama_C_make_unknown((char *)&parameters, sizeof parameters);
+    Frama_C_make_unknown((char *)&outputs, sizeof outputs);
     (void)@name@_set_parameters(&state, &parameters);
     (void)@name@_step(&state, &given, &outputs);
 }
@@ -33,6 +34,9 @@ void every_step(void)
     @shown_at_first@
     @supposed@
     state.begun = Frama_C_unsigned_int_interval(0u, 1u);
+    Frama_C_make_unknown((char *)&outputs, sizeof outputs);
+    Frama_C_make_unknown((char *)&parameters, sizeof parameters);
+    (void)@name@_set_parameters(&state, &parameters);
     (void)@name@_step(&state, &given, &outputs);
     @shown@
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -106,8 +106,9 @@ class KnownDrive:
         )
 
     def current_limit(self, writer: LawWriter) -> Expression:
-        """Return the largest current in A."""
-        return writer.number(self.plant.variable(self.motor.current_limit))
+        """Return the largest current in A; while it runs it can only be lowered."""
+        declared = self.plant.variable(self.motor.current_limit)
+        return writer.number(replace(declared, maximum=declared.start))
 
     @cached_property
     def named(self) -> tuple[dict[str, Expression], Symbols]:
