@@ -212,7 +212,10 @@ def diagnose(
 ) -> None:
     """Name and add the effects that a deck lacks. They are judged on held-out records."""
     contents: dict[str, dict[str, Any]] = {}
-    for joint, deck, folder in _questions(deck_name, joints, out):
+    questions = _questions(deck_name, joints, out)
+    for _, deck, _ in questions:
+        machine_of(deck)  # before hours of work on the first, whether the last can be read
+    for joint, deck, folder in questions:
         content, sentences = _diagnosed(deck, records, folder, joint, options)
         contents[joint or ""] = content
         warn(content["warnings"])

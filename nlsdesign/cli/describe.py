@@ -41,15 +41,20 @@ def describe(folder: Path, deck_name: str, joint: str | None, out: Path, as_json
     from ..model import flatten
 
     description = describe_records(folder, flatten(machine_of(deck_name)), joint=joint)
-    write_text(out, description.mapping())
+    # Of files that cannot be read nothing is known that could be mapped.
+    written = str(out) if description.columns else ""
+    if written:
+        write_text(out, description.mapping())
     if as_json:
-        show_json({**_content(description), "written": str(out)})
+        show_json({**_content(description), "written": written})
     else:
         _show(description)
-        click.echo(f"written: {out}; put it beside the records as records.toml, or name it by --mapping")
-        words = ["fit", "--deck", deck_name, "--records", folder, "--mapping", out]
-        words += ["--joint", joint] if joint else []
-        click.echo(f"next: {next_command(*words)}")
+        if written:
+            click.echo(f"written: {out}; put it beside the records as records.toml, or name it by --mapping")
+        if not description.problem:
+            words = ["fit", "--deck", deck_name, "--records", folder, "--mapping", out]
+            words += ["--joint", joint] if joint else []
+            click.echo(f"next: {next_command(*words)}")
     if description.problem or description.undecided:
         raise click.exceptions.Exit(1)
 

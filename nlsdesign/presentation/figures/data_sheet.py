@@ -19,7 +19,7 @@ _WIDTH, _HEIGHT, _BORDER = 210.0, 297.0, 8.0
 _LEFT, _MIDDLE = 12.0, 108.0
 _ANGLES = 11
 _MOST_LIMITS, _MOST_SIZES = 9, 12
-_LETTERS = 150
+_LETTERS, _LABEL = 150, 46
 _ASSUMED = (
     "Torque of the spring at rest and at the declared temperature, without friction of bearings and guides. "
     "While rubber relaxes its force is higher; it creeps under load that stays. Strengths are those of the "
@@ -34,7 +34,9 @@ def data_sheet(design: CamDesign, *, deck: str) -> Figure:
     page.box(_BORDER, _BORDER, width=_WIDTH - 2 * _BORDER, height=_HEIGHT - 2 * _BORDER)
     page.text(_LEFT, 280.0, text=f"Spring of {design.actuator.name}", fontsize=15.0, weight="bold")
     verdict = (
-        "meets its target" if design.met else f"misses its target: {design.miss.words if design.miss else ''}"
+        "with exact numbers it meets its target"
+        if design.miss is None
+        else f"misses its target: {design.miss.words}"
     )
     page.text(_LEFT, 274.0, text=f"deck {deck}; design {design.fingerprint}; {verdict}", color=MUTED.light)
     last = float(design.contour.angles[-1])
@@ -51,7 +53,7 @@ def data_sheet(design: CamDesign, *, deck: str) -> Figure:
     _torque(_axes(page, _LEFT + 12.0, 87.0, 78.0, 54.0), design)
     _stiffness(_axes(page, _MIDDLE + 14.0, 87.0, 76.0, 54.0), design)
     page.table((_LEFT, 74.0), (13.0, 19.0, 27.0, 14.0, 17.0), rows=_over_angle(design))
-    page.table((_MIDDLE, 74.0), (52.0, 38.0), rows=_limits(design))
+    page.table((_MIDDLE, 74.0), (58.0, 32.0), rows=_limits(design))
     for number, line in enumerate(textwrap.wrap(_ASSUMED, _LETTERS)):
         page.text(_LEFT, 17.0 - 3.6 * number, text=line, color=MUTED.light)
     return described(
@@ -76,7 +78,7 @@ def _numbers(design: CamDesign) -> list[tuple[str, ...]]:
         ("at an angle of", f"{np.degrees(float(check.angles[-1])):.4g}°"),
         ("stiffness at 0°", f"{three_digits(float(stiffness[0]))} N·m/rad"),
         ("stiffness at the last angle", f"{three_digits(float(stiffness[-1]))} N·m/rad"),
-        ("stored work", prefixed(float(curves.energy), "J")),
+        ("work stored from 0° to there", prefixed(float(curves.energy), "J")),
         ("with exact numbers, rms", f"{prefixed(design.rms, 'N*m')} ({share:.2g} %)"),
         ("largest force of a cable", f"{three_digits(float(np.max(curves.forces)))} N"),
         ("volume of all rubber", f"{three_digits(1e6 * design.rubber_volume)} cm³"),
@@ -107,7 +109,12 @@ def _sizes(design: CamDesign) -> list[tuple[str, ...]]:
         path = name.split(".")
         label = " ".join(path[-2:]).replace("_", " ")
         rows.append(
-            (label, with_unit(f"{quantity.number / parse_unit(quantity.unit).factor:.4g}", quantity.unit))
+            (
+                label,
+                with_unit(
+                    f"{quantity.number / parse_unit(quantity.unit).factor:.4g}", typeset_unit(quantity.unit)
+                ),
+            )
         )
     return rows
 
@@ -162,7 +169,8 @@ def _limits(design: CamDesign) -> list[tuple[str, ...]]:
         factor = parse_unit(state.unit).factor
         sign = "≤" if state.upper else "≥"
         text = f"{state.value / factor:.4g} {sign} {state.bound / factor:.4g} {typeset_unit(state.unit)}"
-        rows.append((f"{state.of}{', reached' if state.active else ''}", text.strip()))
+        label = f"{state.of}{', reached' if state.active else ''}"
+        rows.append((textwrap.shorten(label, _LABEL, placeholder=" …"), text.strip()))
     if len(states) > _MOST_LIMITS:
         rows.append((f"and {len(states) - _MOST_LIMITS} more", "in design.json"))
     return rows

@@ -45,16 +45,18 @@ def default_mapping(
 ) -> ColumnMap:
     """Return the mapping that follows from the heads of the columns.
 
-    ``given``: where it maps columns, it is returned as it stands; else all but the columns are kept.
+    ``given``: where it maps columns, they are kept, and the time that it names; else all but the columns.
     ``joint``: the heads are those of one joint in a log, of which a deck need not read everything.
     """
-    if given is not None and given.columns:
+    if given is not None and given.columns and given.time.name:
         return given
     split_heads = [(head, *name_and_unit(head)) for head in heads]
     timed = given is not None and given.time.name in heads
     times = [(given.time.name, given.time.unit)] if given is not None and timed else times_among(heads)
     if not times:
         raise MeasurementError(file, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+    if given is not None and given.columns:
+        return replace(given, time=Column(times[0][0], "time", times[0][1]))
     if joint:
         clocks = [head for head, _ in times]
         split_heads = [

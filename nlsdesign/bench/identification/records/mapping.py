@@ -177,9 +177,8 @@ def read_mapping(path: Path, joint: str | None = None) -> ColumnMap:
     given = table_at(path.name, "columns", tables.get("columns", {}), 'write [columns.<head>] signal = "..."')
     columns = tuple(_mapped(path, head, table) for head, table in given.items())
     _check_signals_differ(path.name, columns)
-    timed = columns or "time" in tables
     mapping = ColumnMap(
-        _time(path.name, tables.get("time", {})) if timed else Column("", "time", "s"),
+        _time(path.name, tables["time"]) if "time" in tables else Column("", "time", "s"),
         columns,
         globs_at(path.name, "held_out", tables.get("held_out", [])),
         globs_at(path.name, "selection", tables.get("selection", [])),

@@ -358,8 +358,8 @@ def load_records(
         Globs on record names. Without any, here or in the mapping, a third of the records is held out, those
         that the others surround, see :func:`~.held_out.surrounded`; a single record is cut after two thirds.
     joint
-        Name of a joint in logs of a robot: only its columns are read. Without a mapping these are the ones of
-        which the model has one signal in their unit; in a mapping ``{joint}`` stands for the name.
+        Name of a joint in logs of a robot. Without a mapping only its columns are read, and of these the ones
+        of which the model has one signal in their unit; in a mapping ``{joint}`` stands for the name.
 
     Raises
     ------
@@ -454,7 +454,9 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
 
 def _table(file: Path, mapping: ColumnMap | None, joint: str | None = None) -> RecordTable:
     """Return the table of a file; units below its heads become part of them where no mapping names these."""
-    table = read_table(file) if joint is None else read_table(file).of_joint(joint)
+    mapped = mapping is not None and bool(mapping.columns)
+    # A mapping names what it reads: also columns of no joint, such as a command.
+    table = read_table(file) if joint is None or mapped else read_table(file).of_joint(joint)
     if (mapping is not None and mapping.columns) or not table.units:
         return table
     units = {h: u for h, u in table.units.items() if mapping is None or h != mapping.time.name}

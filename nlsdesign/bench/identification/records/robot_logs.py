@@ -27,15 +27,16 @@ _LONGEST_LIST = 64
 _CLOCKS_APART = 0.05
 """Times in s by which the stamps of two topics run behind the log before they count as two clocks."""
 _UNITS: Final[Mapping[tuple[str, str], str]] = {
-    ("JointState", "position"): "rad", ("JointState", "velocity"): "rad/s", ("JointState", "effort"): "N*m",
+    ("JointState", "position"): "rad", ("JointState", "velocity"): "rad/s",
     ("JointTrajectoryPoint", "positions"): "rad", ("JointTrajectoryPoint", "velocities"): "rad/s",
-    ("JointTrajectoryPoint", "accelerations"): "rad/s^2", ("JointTrajectoryPoint", "effort"): "N*m",
+    ("JointTrajectoryPoint", "accelerations"): "rad/s^2",
     ("Wrench", "force"): "N", ("Wrench", "torque"): "N*m", ("BatteryState", "voltage"): "V",
     ("BatteryState", "current"): "A", ("Imu", "angular_velocity"): "rad/s",
     ("Imu", "linear_acceleration"): "m/s^2",
 }  # fmt: skip
 """Units by type of message and field, after the comments in the definitions of ROS's common interfaces; of
-joints those of a turning one, for the messages do not say which it is."""
+joints those of a turning one, for the messages do not say which it is. An effort may be a torque, a force or
+a current, so it has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,9 +210,14 @@ def _columns(series: Mapping[tuple[str, tuple[str, ...]], _Series], passed: Mapp
             columns[f"{prefix}/{head}"] = values
         units |= {f"{prefix}/{head}": unit for head, unit in one.units.items()}
         if "rad" in one.units.values():
-            text = "joints are taken to turn (rad, N·m); records.toml can say m and N"
+            text = "joints are taken to turn (rad), efforts have no unit; records.toml says what they are"
             remarks.append(f"topic '{topic}': {text}")
     return LogColumns(columns, units, behind, tuple(remarks))
+
+
+def of_joint(head: str, joint: str) -> bool:
+    """Tell whether a column is one of a joint: its name stands between slashes of the head, or at its end."""
+    return f"/{joint}/" in f"{head}/"
 
 
 def check_one_clock(where: str, behind: Mapping[str, float], clocks: Sequence[str]) -> None:

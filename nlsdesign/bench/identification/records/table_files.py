@@ -26,7 +26,7 @@ from ....foundation.arrays import Array
 from ....foundation.csv_tables import named_if_unreadable, read_csv
 from ....foundation.errors import MeasurementError, missing_library, nearest
 from ....foundation.text_files import is_there
-from .robot_logs import LOG_ENDINGS, is_robot_log, read_robot_log
+from .robot_logs import LOG_ENDINGS, is_robot_log, of_joint, read_robot_log
 
 _NUMBERS = frozenset((1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18))
 """Codes of the types of numbers and letters."""
@@ -149,11 +149,11 @@ class RecordTable:
 
     def of_joint(self, joint: str) -> RecordTable:
         """Return the columns of a joint, whose name stands between slashes in a head, with their clocks."""
-        of = [head for head in self.given if joint in head.split("/") and head not in self.behind]
+        of = [head for head in self.given if of_joint(head, joint) and head not in self.behind]
         if not of:
             parts = {part for head in self.given for part in head.split("/")[1:] if head not in self.behind}
             raise MeasurementError(
-                f"{self.file}: joint '{joint}'", "no column has this name between its slashes",
+                f"{self.file}: joint '{joint}'", "is not the end or a part of any head",
                 did_you_mean=nearest(joint, sorted(parts)),
                 next_step="name a joint as the messages do, or leave --joint out",
             )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +104,9 @@ def test_what_a_log_holds_says_topics_units_and_what_is_left_out(tmp_path: Path)
         "joint_states/time", "joint_states/position/knee", "joint_states/position/elbow",
         "joint_states/effort/knee", "joint_states/effort/elbow",
     )  # fmt: skip
-    assert log.units["joint_states/effort/knee"] == "N*m"
+    assert log.units["joint_states/position/knee"] == "rad"
+    # An effort may be a torque, a force or a current: nobody guesses.
+    assert "joint_states/effort/knee" not in log.units
     assert "topic '/said' is left out: it holds no numbers" in log.remarks
     # Stamps of the robot are taken, not the times of writing.
     np.testing.assert_allclose(log.given["joint_states/time"], samples()[0] * 1e-9, atol=1e-9)
@@ -114,12 +117,10 @@ def test_a_joint_needs_no_mapping_where_its_units_decide(tmp_path: Path, model: 
     ros2(tmp_path / "run")
     records = load_records(tmp_path, model, joint="elbow")
     assert {c.signal: c.name for c in records.columns} == {
-        "encoder.reading": "joint_states/position/elbow [rad]",
-        "cell.reading": "joint_states/effort/elbow [N*m]",
+        "encoder.reading": "joint_states/position/elbow [rad]"
     }
     described = describe_records(tmp_path, model, joint="knee")
-    assert not described.undecided
-    assert not described.problem
+    assert [column.head for column in described.undecided] == ["joint_states/effort/knee"]
     assert '[columns."joint_states/position/knee"]' in described.mapping()
 
 
@@ -147,6 +148,27 @@ def test_a_bag_of_the_older_system_is_read(tmp_path: Path) -> None:
     log = read_table(tmp_path / "run.bag")
     np.testing.assert_allclose(log.given["wrist/torque/z"], 0.5 * np.arange(60))
     assert (log.units["wrist/force/x"], log.units["wrist/torque/z"]) == ("N", "N*m")
+
+
+def test_a_mapping_reads_what_it_names_beside_the_joint(tmp_path: Path, model: Any) -> None:
+    ros2(tmp_path / "run", second=300_000)
+    mapping = MAPPING.replace("joint_states/effort/{joint}", "load_cell/effort/knee")
+    text = "resample_Hz = 200\n" + mapping + 'time = "load_cell/time"\n'
+    (tmp_path / "records.toml").write_text(text, encoding="utf8")
+    records = load_records(tmp_path, model, joint="elbow")
+    assert {column.name for column in records.columns} == {
+        "joint_states/position/elbow",
+        "load_cell/effort/knee",
+    }
+
+
+def test_a_joint_with_a_slash_in_its_name_is_found(tmp_path: Path) -> None:
+    table = read_table(ros2(tmp_path / "run"))
+    given = {head.replace("elbow", "left/elbow"): values for head, values in table.given.items()}
+    renamed = replace(table, given=given)
+    assert renamed.of_joint("left/elbow").heads == (
+        "joint_states/time", "joint_states/position/left/elbow", "joint_states/effort/left/elbow",
+    )  # fmt: skip
 
 
 def test_two_clocks_are_refused_with_both_lags(tmp_path: Path, model: Any) -> None:
