@@ -51,7 +51,11 @@ def data_sheet(design: CamDesign, *, deck: str) -> Figure:
     page.table((_LEFT, 202.0), (56.0, 34.0), rows=[("The spring", ""), *_numbers(design)])
     page.table((_MIDDLE, 202.0), (56.0, 34.0), rows=[("Sizes", ""), *_sizes(design)])
     _torque(_axes(page, _LEFT + 12.0, 87.0, 78.0, 54.0), design)
-    _stiffness(_axes(page, _MIDDLE + 14.0, 87.0, 76.0, 54.0), design)
+    stiffness = _axes(page, _MIDDLE + 14.0, 87.0, 76.0, 54.0)
+    slope = np.gradient(design.check.torques, design.check.angles)
+    stiffness.plot(np.degrees(design.check.angles), slope, color=AFTER.light)
+    stiffness.set(xlabel="angle in degrees", ylabel="stiffness in N·m/rad", title="Stiffness")
+    stiffness.set_ylim(bottom=min(0.0, float(slope.min())))
     page.table((_LEFT, 74.0), (13.0, 19.0, 27.0, 14.0, 17.0), rows=_over_angle(design))
     page.table((_MIDDLE, 74.0), (58.0, 32.0), rows=_limits(design))
     for number, line in enumerate(textwrap.wrap(_ASSUMED, _LETTERS)):
@@ -134,14 +138,6 @@ def _torque(axes: Axes, design: CamDesign) -> None:
     )  # fmt: skip
     axes.set(xlabel="angle in degrees", ylabel="torque in N·m", title="Torque")
     axes.legend(loc="upper left", fontsize=7.5, frameon=False)
-
-
-def _stiffness(axes: Axes, design: CamDesign) -> None:
-    """Draw the slope of the torque over the angle."""
-    slope = np.gradient(design.check.torques, design.check.angles)
-    axes.plot(np.degrees(design.check.angles), slope, color=AFTER.light)
-    axes.set(xlabel="angle in degrees", ylabel="stiffness in N·m/rad", title="Stiffness")
-    axes.set_ylim(bottom=min(0.0, float(slope.min())))
 
 
 def _over_angle(design: CamDesign) -> list[tuple[str, ...]]:
