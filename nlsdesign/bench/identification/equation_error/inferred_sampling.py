@@ -41,6 +41,8 @@ _PLAINLY = 3.0
 """Natural logarithm of the likelihood ratio from which another way to run is taken: odds of 20."""
 _NO_FORM = 10.0
 """The same for a shift that none of the usual ways explains: it is rare, and what a model lacks looks so."""
+_LEAST = 0.05
+"""Share of the noise that the numbers of a machine leave at least, where they do not make it vanish."""
 _MOST = 1.0
 """Samples by which two channels can be shifted against each other: half a sample of each."""
 
@@ -93,7 +95,8 @@ def _as(record: Record, sampling: Mapping[str, Sampling]) -> Record:
 class _Rows(NamedTuple):
     """Residuals of a block for each form, shape (forms, rows), and what may explain them.
 
-    ``numbers``: by name, shape (rows,); blocks may share them. ``own``: of this block, shape (rows, terms).
+    ``numbers``: what each contributes, by name, shape (rows,); blocks may share them. ``own``: of this block,
+    shape (rows, terms).
     """
 
     residuals: Array
@@ -199,13 +202,16 @@ def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
     as much less.
     """
     names = [*dict.fromkeys(name for each in blocks for name in each.numbers)]
-    bands = []
-    for k, each in enumerate(blocks):
-        zero = np.zeros(each.residuals.shape[1])
-        shared = [each.numbers.get(name, zero) for name in names]
-        others = [np.zeros((len(zero), other.own.shape[1])) for other in blocks]
-        bands.append(np.column_stack([*shared, *others[:k], each.own, *others[k + 1 :]]))
-    rows, rank = _freed(np.hstack([each.residuals for each in blocks]), np.vstack(bands))
+    residuals = np.hstack([each.residuals for each in blocks])
+    rows, rank = _freed(residuals, _terms(blocks, names))
+    # A balance vanishes with all of its numbers, its noise too. Where that is found, the largest is held.
+    while names and np.min(np.mean(rows**2, axis=1)) < _LEAST * (1.0 - rank / rows.shape[1]):
+        sizes = [
+            sum(float(b.numbers[name] @ b.numbers[name]) for b in blocks if name in b.numbers)
+            for name in names
+        ]
+        names.pop(int(np.argmax(sizes)))
+        rows, rank = _freed(residuals, _terms(blocks, names))
     sampled, held, averaged = rows
     slope = held - averaged
     information = float(slope @ slope)
@@ -221,6 +227,17 @@ def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
         shift,
         math.sqrt(scale / information),
     )
+
+
+def _terms(blocks: Sequence[_Rows], names: Sequence[str]) -> Array:
+    """Return what may explain the residuals of all blocks: numbers that they share, then terms of each."""
+    bands = []
+    for k, each in enumerate(blocks):
+        zero = np.zeros(each.residuals.shape[1])
+        shared = [each.numbers.get(name, zero) for name in names]
+        others = [np.zeros((len(zero), other.own.shape[1])) for other in blocks]
+        bands.append(np.column_stack([*shared, *others[:k], each.own, *others[k + 1 :]]))
+    return np.vstack(bands)
 
 
 def _freed(residuals: Array, terms: Array) -> tuple[Array, int]:
@@ -251,7 +268,8 @@ def _rows(seen: SeenBlock, records: Sequence[Record], signal: str, missing: Miss
         slopes.append((floor.filter @ response.slope) / floor.sigma[:, None])
         own = [(floor.filter @ term) / floor.sigma for term in missing(block, record, filters.span)]
         terms.append(np.reshape(own, (len(own), len(floor.sigma))).T)
-    return _Rows(np.hstack(residuals), dict(zip(free, np.vstack(slopes).T, strict=True)), np.vstack(terms))
+    parts = np.vstack(slopes) * [values[name] or 1.0 for name in free]
+    return _Rows(np.hstack(residuals), dict(zip(free, parts.T, strict=True)), np.vstack(terms))
 
 
 def no_terms(_block: Block, _record: Record, _span: float) -> Iterator[Array]:

@@ -12,11 +12,12 @@ import pytest
 from nlsdesign.bench.discrepancy.block_prediction import band_errors, predict
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
-from nlsdesign.bench.identification.equation_error import block_noise, evidence
+from nlsdesign.bench.identification.equation_error import block_noise, evidence, inferred_sampling
 from nlsdesign.bench.identification.equation_error.between_samples import on_clock, refined
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.mapping import Column
+from nlsdesign.bench.identification.records.sampling import SAMPLED
 from nlsdesign.components import ROTATION, Dashpot, Encoder, Inertia, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
@@ -119,3 +120,18 @@ def test_a_quick_swing_is_read_across_its_reversals(monkeypatch: pytest.MonkeyPa
         assert len(floor.sigma) < 100
         (remark,) = bench.records.remarks
         assert "is judged on rows with 1 % of the power of its motion" in str(remark)
+
+
+def test_a_balance_whose_numbers_are_all_free_does_not_vanish_with_them() -> None:
+    """J·a = k·i with both J and k free: no number is no answer, and the current is sampled as it was."""
+    draw, time = np.random.default_rng(3), 2e-3 * np.arange(400)
+    current = {late: np.sin(30.0 * (time - late * 2e-3)) for late in (0.0, 0.5, -0.5)}
+    accelerating = current[0.0] + 1e-2 * draw.standard_normal(len(time))
+    residuals = np.array([accelerating - current[late] for late in (0.0, 0.5, -0.5)]) / 1e-2
+    # The slopes are those of the last way to run: with them the balance is made of its own numbers.
+    numbers = {"motor.inertia": accelerating / 1e-2, "motor.torque_constant": -current[-0.5] / 1e-2}
+    rows = inferred_sampling._Rows(residuals, numbers, np.zeros((len(time), 0)))
+    found = inferred_sampling._likelihood([rows])
+    assert found is not None
+    assert abs(found.shift) < 0.1
+    assert found.taken() == (SAMPLED, "")
