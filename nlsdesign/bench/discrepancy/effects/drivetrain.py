@@ -199,7 +199,7 @@ def _shaft(
 
 def _absorber(assembly: Assembly, body: str) -> Iterator[Edit]:
     """Let a part of the inertia hang on a shaft; what acts on the body goes on acting on it."""
-    edited, _, unknowns = _shaft(assembly, body, (0.25, 0.4, 0.65, 1.0, 1.7, 3.0, 8.0))
+    edited, _, unknowns = _shaft(assembly, body, (3.0, 8.0))
     yield Edit(edited, unknowns)
 
 
