@@ -41,6 +41,8 @@ class Excess:
         Whether that is more than noise.
     pieces
         The sum of squares by record, for each piece of the record in time.
+    closed_on
+        Records on which, each taken alone, it is no more than noise.
     """
 
     block: str
@@ -53,6 +55,7 @@ class Excess:
     effective: float
     open: bool
     pieces: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    closed_on: frozenset[str] = frozenset()
 
     @property
     def excess(self) -> float:

@@ -389,7 +389,7 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
 
 
 def _level_beside(record: Record, signal: str, motions: Sequence[str]) -> float:
-    """Return the white noise of a signal beside what a controller makes of readings; infinite if not known."""
+    """Return the white noise of a signal beside what a controller makes of readings; infinite if unknown."""
     values, count = record.trace[signal], (_PAST + _AHEAD + 1) * len(motions)
     rows = len(values) - _PAST - _AHEAD
     if signal in record.resolution or not motions or rows - _SMOOTH < _FEW * count:
