@@ -395,9 +395,9 @@ def _level_beside(record: Record, signal: str, motions: Sequence[str]) -> float:
     if signal in record.resolution or not motions or rows - _SMOOTH < _FEW * count:
         return math.inf
     columns = [record.trace[name][k : k + rows] for name in motions for k in range(_PAST + _AHEAD + 1)]
-    readings, own = np.column_stack(columns), values[_PAST : _PAST + rows]
-    quick = (np.diff(each, _SMOOTH, axis=0) for each in (readings, own))
-    rest = own - readings @ np.linalg.lstsq(*quick, rcond=None)[0]
+    readings, itself = np.column_stack(columns), values[_PAST : _PAST + rows]
+    quick, answer = (np.diff(each, _SMOOTH, axis=0) for each in (readings, itself))
+    rest = itself - readings @ np.linalg.lstsq(quick, answer, rcond=None)[0]
     share = math.sqrt(rows / (rows - count))  # of what is left, the numbers have taken some
     return share * noise_of(rest[~record.masked_in([signal, *motions])[_PAST : _PAST + rows]])
 
