@@ -125,9 +125,9 @@ def diagnose(
     if again is not None:
         progress("reading inputs between their samples as they run beside what was found")
         fresh = again.comparison.base(actuator)
-        found = _decided(again, fresh, effects, progress)
-        if outcome.steps or found[0].steps:
-            case, base, (outcome, decision) = again, fresh, found
+        anew = _decided(again, fresh, effects, progress)
+        if outcome.steps or anew[0].steps:
+            case, base, (outcome, decision) = again, fresh, anew
     progress("reading the held-out records")
     return _verdict(case, base, outcome, decision, records)
 
@@ -176,8 +176,7 @@ class _Case:
         returned where the inputs are read so already.
         """
         if outcome.steps:
-            told = self.bench.inferred(self._blocks(outcome.last.fitted))
-            return self._read_as(told, _SAME_SAMPLING)
+            return self._read_as(self.bench.inferred(self._blocks(outcome.last.fitted)), _SAME_SAMPLING)
         if decision.verdict not in ("unknown", "undecidable"):
             return None
         fitted = (each.hypothesis for each in outcome.tried)

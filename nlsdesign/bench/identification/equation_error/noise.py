@@ -28,7 +28,6 @@ from scipy.optimize import nnls
 from ....foundation.arrays import Array
 from ..filters import filter_weights
 from ..records.measurement import Record, RecordSet
-from ..residuals import noise_of
 
 _DEGREE = 4
 """Degree of the polynomial that is taken from a stretch: what is slower is no noise that can be known."""
@@ -61,13 +60,6 @@ _MOST_STRETCHES = 200
 """Stretches of rest in a record, at most, so that the search for them ends."""
 _MOST_SAMPLES, _SHORTEST = 3000, 8
 """Samples on which a period is looked for, and its least length in them."""
-_PAST, _AHEAD = 16, 1
-"""Samples of a reading that a controller may make a signal of: a filter of its rate remembers some, and a
-stamp may be one late."""
-_SMOOTH = 4
-"""Order of the difference behind which nothing but the quick part of a signal is left."""
-_FEW = 20
-"""Samples for each number of such a controller, at least."""
 
 
 class Stretch(NamedTuple):
@@ -369,7 +361,7 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     evidence: dict[str, Evidence] = dict.fromkeys(level, "white only")
     counted = [name for name, coarse in rounded.items() if coarse]
     for signal in level.keys() - {*targets, *counted}:
-        levels = [min(r.resolution_of(signal).noise, _level_beside(r, signal, counted)) for r in seen]
+        levels = [min(r.resolution_of(signal).noise, r.noise_beside(signal, counted)) for r in seen]
         level[signal] = max(float(np.median(levels)), quanta[signal] / math.sqrt(12.0))
     quiet = [(r, *_quiet(r, motions)) for r in seen] if motions else []
     for signal in targets:
@@ -386,20 +378,6 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
             level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
             lengths[signal] = tuple(s.step * len(s.samples) for s in at_rest + repeated)
     return Noise(level, rounded, parts, evidence, lengths).read_as(records)
-
-
-def _level_beside(record: Record, signal: str, motions: Sequence[str]) -> float:
-    """Return the white noise of a signal beside what a controller makes of readings; infinite if unknown."""
-    values, count = record.trace[signal], (_PAST + _AHEAD + 1) * len(motions)
-    rows = len(values) - _PAST - _AHEAD
-    if signal in record.resolution or not motions or rows - _SMOOTH < _FEW * count:
-        return math.inf
-    columns = [record.trace[name][k : k + rows] for name in motions for k in range(_PAST + _AHEAD + 1)]
-    readings, itself = np.column_stack(columns), values[_PAST : _PAST + rows]
-    quick, answer = (np.diff(each, _SMOOTH, axis=0) for each in (readings, itself))
-    rest = itself - readings @ np.linalg.lstsq(quick, answer, rcond=None)[0]
-    share = math.sqrt(rows / (rows - count))  # of what is left, the numbers have taken some
-    return share * noise_of(rest[~record.masked_in([signal, *motions])[_PAST : _PAST + rows]])
 
 
 def _length(stretches: Sequence[Stretch]) -> float:
