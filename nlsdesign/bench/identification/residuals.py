@@ -59,21 +59,9 @@ def _difference_level(signal: Array, order: int) -> float:
 
 
 def noise_beside(signal: Array, readings: Array, masked: Mask) -> float:
-    """Estimate the standard deviation of the white noise in a signal beside a linear filter of readings.
+    """Estimate the white noise in a signal, shape (n,), beside a linear filter of readings, shape (n, m).
 
-    Parameters
-    ----------
-    signal
-        Shape (n,).
-    readings
-        Shape (n, m).
-    masked
-        Samples that tell nothing, shape (n,).
-
-    Returns
-    -------
-    float
-        Infinite where there are too few samples for the weights of the filter.
+    ``masked``: samples that tell nothing, shape (n,). Infinite where there are too few samples for the weights.
     """
     rows, count = len(signal) - _PAST - _AHEAD, (_PAST + _AHEAD + 1) * readings.shape[1]
     if rows - _ORDERS[0] < _SAMPLES_PER_WEIGHT * count:
