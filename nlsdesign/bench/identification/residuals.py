@@ -61,7 +61,7 @@ def _difference_level(signal: Array, order: int) -> float:
 def noise_beside(signal: Array, readings: Array, masked: Mask) -> float:
     """Estimate the white noise in a signal, shape (n,), beside a linear filter of readings, shape (n, m).
 
-    ``masked``: samples that tell nothing, shape (n,). Infinite where there are too few samples for the weights.
+    ``masked``: samples that tell nothing, shape (n,). Infinite where samples are too few for the weights.
     """
     rows, count = len(signal) - _PAST - _AHEAD, (_PAST + _AHEAD + 1) * readings.shape[1]
     if rows - _ORDERS[0] < _SAMPLES_PER_WEIGHT * count:
