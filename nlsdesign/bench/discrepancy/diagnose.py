@@ -121,12 +121,13 @@ def diagnose(
     case, base = case.read_as_declared(case.comparison.base(actuator))
     effects = known_effects() if catalogue is None else catalogue
     outcome, decision = _decided(case, base, effects, progress)
-    again = case.read_as_inferred_beside(outcome)
+    again = case.read_as_inferred_beside(outcome, decision)
     if again is not None:
-        progress("reading inputs between their samples as they run beside what is named")
-        case = again
-        base = case.comparison.base(actuator)
-        outcome, decision = _decided(case, base, effects, progress)
+        progress("reading inputs between their samples as they run beside what was found")
+        fresh = again.comparison.base(actuator)
+        anew = _decided(again, fresh, effects, progress)
+        if outcome.steps or anew[0].steps:
+            case, base, (outcome, decision) = again, fresh, anew
     progress("reading the held-out records")
     return _verdict(case, base, outcome, decision, records)
 
@@ -166,15 +167,23 @@ class _Case:
         explains = _leaves_nothing(after) and least >= self.criteria.closed_share
         return (other, again) if explains else (self, base)
 
-    def read_as_inferred_beside(self, outcome: Outcome) -> _Case | None:
-        """Return the case with inputs read between their samples as records tell it beside what is named.
+    def read_as_inferred_beside(self, outcome: Outcome, decision: _Decision) -> _Case | None:
+        """Return the case with inputs read between their samples as records tell it beside what was found.
 
-        Backlash that nobody declared, for instance, hides at first that a current is held. Nothing is
+        Backlash that nobody declared, for instance, hides at first that a current is held. Where nothing may
+        be named, it is asked beside the best that closes every block, as if nothing were missing then: inputs
+        that are read half a sample early spoil the quickest record, and a right name with it. Nothing is
         returned where the inputs are read so already.
         """
-        if not outcome.steps:
+        if outcome.steps:
+            return self._read_as(self.bench.inferred(self._blocks(outcome.last.fitted)), _SAME_SAMPLING)
+        if decision.verdict not in ("unknown", "undecidable"):
             return None
-        return self._read_as(self.bench.inferred(self._blocks(outcome.last.fitted)), _SAME_SAMPLING)
+        fitted = (each.hypothesis for each in outcome.tried)
+        closing = next((each for each in fitted if is_complete(self.excesses(each))), None)
+        if closing is None:
+            return None
+        return self._read_as(self.bench.inferred(self._blocks(closing.fitted), no_terms), _SAME_SAMPLING)
 
     def _read_as(self, records: RecordSet, least: float) -> _Case | None:
         """Return the case with inputs read otherwise; nothing where none moves by more samples than that."""

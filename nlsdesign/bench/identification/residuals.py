@@ -12,10 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...foundation.arrays import Array
+from ...foundation.arrays import Array, Mask
 
 _ORDERS, _PLAINLY = (4, 8, 12), 0.6
 _MEDIAN_OF_NORMAL = 0.6744897501960817
+_PAST, _AHEAD = 16, 1
+"""Samples of a reading that a controller may make a signal of: a filter of its rate remembers some, and a
+stamp may be one late."""
+_SAMPLES_PER_WEIGHT = 20
+"""Samples for each weight of such a controller, at least."""
 _BACK = 0.03
 """A path has come back where it is this near its beginning, as a share of its range."""
 _SIGNIFICANT = 5.0
@@ -51,6 +56,23 @@ def _difference_level(signal: Array, order: int) -> float:
         return 0.0
     differences = np.convolve(signal, weights, mode="valid") / np.linalg.norm(weights)
     return float(np.median(np.abs(differences)) / _MEDIAN_OF_NORMAL)
+
+
+def noise_beside(signal: Array, readings: Array, masked: Mask) -> float:
+    """Estimate the white noise in a signal, shape (n,), beside a linear filter of readings, shape (n, m).
+
+    ``masked``: samples that tell nothing, shape (n,). Infinite where samples are too few for the weights.
+    """
+    rows, count = len(signal) - _PAST - _AHEAD, (_PAST + _AHEAD + 1) * readings.shape[1]
+    if rows - _ORDERS[0] < _SAMPLES_PER_WEIGHT * count:
+        return math.inf
+    shifted = np.hstack([readings[k : k + rows] for k in range(_PAST + _AHEAD + 1)])
+    itself = signal[_PAST : _PAST + rows]
+    # Behind the difference nothing but the quick part of a signal is left.
+    quick, answer = (np.diff(each, _ORDERS[0], axis=0) for each in (shifted, itself))
+    rest = itself - shifted @ np.linalg.lstsq(quick, answer, rcond=None)[0]
+    share = math.sqrt(rows / (rows - count))  # of what is left, the weights have taken some
+    return share * noise_of(rest[~masked[_PAST : _PAST + rows]])
 
 
 def quantum_of(signal: Array) -> float:

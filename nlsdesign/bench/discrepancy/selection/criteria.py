@@ -11,7 +11,8 @@ An effect may be named if
  2. that gain in prediction does not rest on a single piece of a record;
  3. its numbers exclude "no effect", are known, and stand off the bounds of their search, and it does not
     drive declared numbers out of their ranges;
- 4. no record is predicted worse than without it, and records left out as a whole are predicted better.
+ 4. no record is predicted worse than without it, unless still to within its noise, and records left out as a
+    whole are predicted better.
 Of several such effects the one that predicts best is taken, unless a simpler one predicts about as well.
 
 The probability that a name is right is calibrated on cases with known answers:
@@ -191,7 +192,10 @@ class Change:
         return self.gain.value >= self.criteria.noise_margin
 
     def records_made_worse(self) -> dict[str, float]:
-        """Return the records that are predicted worse, with the factor by which their squares grow."""
+        """Return the records that are predicted worse, with the factor by which their squares grow.
+
+        One that is still predicted to within its noise in every block is not among them.
+        """
         then, now, margin = (dict[str, float]() for _ in range(3))
         for name, one in self.before.items():
             for record, pieces in one.pieces.items():
@@ -203,6 +207,7 @@ class Change:
             record: now[record] / max(then[record], 1e-300)
             for record in then
             if now[record] > (1.0 + self.criteria.worse) * then[record] + margin[record]
+            and not all(record in one.closed_on for one in self.after.values() if record in one.pieces)
         }
 
     def unexplained(self) -> list[str]:

@@ -107,7 +107,11 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Cr
     rows = sum(t.rows for t in tallies.values())
     effective = sum(t.effective_size for t in tallies.values())
     fitted, predicted = sum(t.squares for t in tallies.values()), sum(t.predicted for t in tallies.values())
-    floor = bench.typical_floor(block)
+    floor, known_from = bench.typical_floor(block), bench.known_from(block)
+
+    def is_open(squares: float, count: int, independent: float) -> bool:
+        return criteria.is_beyond_noise(squares / max(count, 1), independent, known_from)
+
     return Excess(
         block,
         bench.units[block],
@@ -117,6 +121,7 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Cr
         predicted,
         rows,
         effective,
-        criteria.is_beyond_noise(predicted / max(rows, 1), effective, bench.known_from(block)),
+        is_open(predicted, rows, effective),
         {record: t.segments or (t.squares,) for record, t in tallies.items()},
+        frozenset(r for r, t in tallies.items() if not is_open(t.predicted, t.rows, t.effective_size)),
     )

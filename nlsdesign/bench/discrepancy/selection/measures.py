@@ -37,6 +37,7 @@ class Excess:
     open: bool  # whether that is more than noise
     # pieces: the sum of squares by record, for each piece of the record in time
     pieces: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    closed_on: frozenset[str] = frozenset()  # records on which, each taken alone, it is no more than noise
 
     @property
     def excess(self) -> float:

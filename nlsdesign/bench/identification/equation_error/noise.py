@@ -9,6 +9,10 @@ Stretches are shorter than records, and below the lowest frequency that they sho
 passes what is there. So noise that still rises towards that frequency is taken to rise on, by the same power
 of the frequency, down to one period in a record, unless the corner of a single process is plainly seen: to
 let it end where the view ends would make the noise of a record too small, by a factor of two for 1/f noise.
+
+A controller that takes a rate from coarse counts gives a current that jumps with each of them. That current
+acts; it is no noise of the ammeter. So the noise of what drives a block is that of its part which no linear
+filter of the readings of motion gives.
 """
 
 from __future__ import annotations
@@ -332,6 +336,10 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     parts: dict[str, tuple[NoisePart, ...]] = {}
     lengths: dict[str, tuple[float, ...]] = {}
     evidence: dict[str, Evidence] = dict.fromkeys(level, "white only")
+    counted = [name for name, coarse in rounded.items() if coarse]
+    for signal in level.keys() - {*targets, *counted}:
+        levels = [min(r.resolution_of(signal).noise, r.noise_beside(signal, counted)) for r in seen]
+        level[signal] = max(float(np.median(levels)), quanta[signal] / math.sqrt(12.0))
     quiet = [(r, *_quiet(r, motions)) for r in seen] if motions else []
     for signal in targets:
         if signal not in level or rounded[signal]:

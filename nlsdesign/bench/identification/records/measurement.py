@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fnmatch
 import hashlib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from ....foundation.errors import MeasurementError, nearest, unknown_name, visib
 from ....foundation.quantity import parse_unit
 from ....model import FlatModel
 from ....simulation import Trace
-from ..residuals import noise_of, quantum_of
+from ..residuals import noise_beside, noise_of, quantum_of
 from .clocks import Resolution
 from .column_heads import default_mapping, times_among, times_without_unit
 from .gaps import between_gaps
@@ -221,6 +222,26 @@ class Record:
         # What was interpolated has another noise, and no counts.
         values = self.trace[signal][~self.masked_in([signal])]
         return Resolution(noise_of(values), quantum_of(values))
+
+    def noise_beside(self, signal: str, readings: Sequence[str]) -> float:
+        """Return the white noise of a signal beside what a controller makes of readings, in SI.
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        readings
+            Full names of what the controller reads.
+
+        Returns
+        -------
+        float
+            Infinite where the signal was resampled, or where there is too little to tell.
+        """
+        if signal in self.resolution or not readings:
+            return math.inf
+        columns = np.column_stack([self.trace[name] for name in readings])
+        return noise_beside(self.trace[signal], columns, self.masked_in([signal, *readings]))
 
     def masked_in(self, signals: Iterable[str]) -> Mask:
         """Return the samples that are masked in at least one of these signals, shape (n,).

@@ -232,6 +232,16 @@ def test_a_record_may_grow_by_what_noise_does_and_is_judged_over_all_blocks() ->
     assert not Change(RULE, before, grown).records_made_worse()
 
 
+def test_a_record_that_is_still_predicted_to_within_its_noise_in_every_block_is_not_made_worse() -> None:
+    before = {"spring": excess(1e5, -400.0), "motor": excess(0.0, -400.0)}
+    # Three times the squares on the quick record, and no more than 0.6 of its floor.
+    left = {"spring": excess(1e2, -200.0), "motor": excess(0.0, -200.0)}
+    closed = {name: replace(each, closed_on=frozenset({"quick"})) for name, each in left.items()}
+    assert Change(RULE, before, left).records_made_worse() == {"quick": pytest.approx(3.0)}
+    assert not Change(RULE, before, closed).records_made_worse()
+    assert Change(RULE, before, {**closed, "motor": left["motor"]}).records_made_worse()
+
+
 # --- when the search is done ----------------------------------------------------------------------
 
 

@@ -138,6 +138,13 @@ def test_a_block_is_open_beyond_what_its_independent_residuals_allow() -> None:
     assert not excesses(with_mean_squares(a=1.6, b=1.6), BENCH, RULE)["spring"].open
 
 
+def test_a_block_is_closed_on_a_record_by_the_independent_residuals_of_that_record_alone() -> None:
+    """With 50 independent residuals noise stays below 1 + 5·√(2/50) = 2."""
+    found = excesses(with_mean_squares(a=1.9, b=2.1), BENCH, RULE)["spring"]
+    assert found.open
+    assert found.closed_on == {"a"}
+
+
 def test_the_declared_numbers_are_open_beyond_the_edge_of_their_ranges() -> None:
     for factor, is_open in ((1.15, False), (1.25, True)):
         fit = fitted(spring_stiffness=factor, wheel_inertia=factor)

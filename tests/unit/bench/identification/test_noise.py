@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
@@ -51,6 +52,26 @@ def test_the_deviation_of_flicker_noise_is_told_from_rests_that_are_shorter_than
         # Of each rest the last two thirds.
         assert len(noise.seen[FORCE]) == 7
         assert noise.seen[FORCE] == pytest.approx((1.144,) * 7, abs=0.02)
+
+
+def driven_by_counts(gain: float) -> RecordSet:
+    """A motion in coarse counts, and a current with white noise that follows their filtered rate."""
+    draw, time = np.random.default_rng(5), STEP * np.arange(COUNT)
+    angle = 1e-3 * np.round(0.4e3 * np.sin(3.0 * time))
+    rate = lfilter([0.5], [1.0, -0.5], np.diff(angle, prepend=angle[0]) / STEP)
+    current = np.cos(3.0 * time) - gain * rate + 0.02 * draw.standard_normal(COUNT)
+    units = {"angle": "rad", "current": "A"}
+    trace = Trace(time, {"angle": angle, "current": current}, units, "loop")
+    columns = (Column("angle", "angle", "rad", quantum=1e-3), Column("current", "current", "A"))
+    return RecordSet((Record("loop", trace, "fit"),), columns)
+
+
+def test_a_current_that_jumps_with_the_counts_of_an_encoder_is_not_the_noise_of_the_ammeter() -> None:
+    quiet, loud = driven_by_counts(0.0), driven_by_counts(1.0)
+    # The differences of the current cannot tell its jumps from noise.
+    assert loud.records[0].resolution_of("current").noise > 0.1
+    assert estimate_noise(loud).level["current"] == pytest.approx(0.02, rel=0.05)
+    assert estimate_noise(quiet).level["current"] == pytest.approx(0.02, rel=0.05)
 
 
 def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, BlockNoise]:
