@@ -32,9 +32,7 @@ NAMED = {
 )
 @pytest.mark.long_cases("emps-whole", "vhb4910-fast")
 @pytest.mark.parametrize(("name", "way"), [("emps", "fast"), ("emps", "whole"), ("vhb4910", "fast")])
-def test_the_study_keeps_its_claims(
-    name: str, way: str, tmp_path: Path
-) -> None:
+def test_the_study_keeps_its_claims(name: str, way: str, tmp_path: Path) -> None:
     """The fast way tries few effects on the drive and fits it over fewer windows."""
     results = run_study(name, tmp_path, fast=way == "fast")
     expected = claims(name)
