@@ -23,12 +23,7 @@ MAPPING = Path(__file__).with_name("emps_records.toml")
 SHORT, LONG = 1.0, 3.1  # s; windows of prediction
 BANDWIDTH, EDGE = 20.0, 100  # Hz; samples that the filter spoils at each end
 PHASES, FEW_PHASES = 4, 2  # of the windows of the fit
-RIVALS = (
-    effects.coulomb_friction,
-    effects.constant_force,
-    effects.viscous_friction,
-    effects.quadratic_drag,
-)
+RIVALS = (effects.coulomb_friction, effects.constant_force, effects.viscous_friction, effects.quadratic_drag)
 """What the drive lacks, and what that is most easily mistaken for: enough for the fast way."""
 MISSING = ("dry_friction", "offset")
 FITTED = {

@@ -33,8 +33,8 @@ def main(out: Path, fast: bool = False) -> Results:
         actuator = declared_actuator()
         nls.write_deck(actuator, out / "actuator.toml")
     with steps.step("joint design of cam, pretension and rubber"):
-        few = DesignSettings(starts=2, draws=200)
-        cam = design_spring(actuator, out, few if fast else DesignSettings(draws=1000))
+        settings = DesignSettings(starts=2, draws=200) if fast else DesignSettings(draws=1000)
+        cam = design_spring(actuator, out, settings)
     with steps.step("model against the figures of the paper"):
         figures = compare_with_figures(actuator)
     published = work_up(actuator, out / "actuator.toml", out / "published", steps=steps, fast=fast)

@@ -14,7 +14,7 @@ from .._published import figure_points
 from .benches import DECKS, FILES, HIGH, LOW, Bench
 
 AMPLITUDES = {"low": LOW, "high": HIGH}
-FEW = {"low": (1.0, 1.5, 2.0, 3.0, 5.0, 11.0), "high": (1.0, 1.5, 5.0)}
+IN_FAST = {"low": (1.0, 1.5, 2.0, 3.0, 5.0, 11.0), "high": (1.0, 1.5, 5.0)}
 """Frequencies in Hz of the fast way."""
 
 
@@ -95,7 +95,7 @@ def followed_torque(*, fast: bool = False) -> FollowedTorque:
             for spring in DECKS:
                 bench = Bench(spring, setting.gains, late=setting.late)
                 points = published_response(amplitude, spring)
-                points = _thinned(points, FEW[amplitude]) if fast else points
+                points = _thinned(points, IN_FAST[amplitude]) if fast else points
                 response = bench.response(AMPLITUDES[amplitude], points[:, 0])
                 result[setting.name, amplitude, spring] = Followed(response, 1e-3 * setting.late, points)
     return result
