@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 import nlsdesign as nls
-from nlsdesign.bench.discrepancy import Verdict
+from nlsdesign.bench.discrepancy import Verdict, effects
 from nlsdesign.bench.identification import Shots, Weights, coloured_sigma
 from nlsdesign.presentation.report import PublishedNumber, TableSection, comparison_table, verdict_sections
 
@@ -22,7 +22,9 @@ from ._measured import data_folder, named_effects, write_diagnosis, write_skippe
 MAPPING = Path(__file__).with_name("emps_records.toml")
 SHORT, LONG = 1.0, 3.1  # s; windows of prediction
 BANDWIDTH, EDGE = 20.0, 100  # Hz; samples that the filter spoils at each end
-PHASES = 4  # of the windows of the fit
+PHASES, FEW_PHASES = 4, 2  # of the windows of the fit
+RIVALS = (effects.coulomb_friction, effects.constant_force, effects.viscous_friction, effects.quadratic_drag)
+"""What the drive lacks, and what that is most easily mistaken for: enough for the fast way."""
 MISSING = ("dry_friction", "offset")
 FITTED = {
     "mass_kg": ("carriage.mass", "kg"),
@@ -100,9 +102,9 @@ def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | N
     bare = viscous_only(published)
     records = nls.load_records(folder, nls.flatten(bare), mapping=MAPPING)
     with steps.step("diagnosis"):
-        verdict = nls.diagnose(bare, records, progress=steps.note)
+        verdict = nls.diagnose(bare, records, catalogue=RIVALS if fast else None, progress=steps.note)
     with steps.step("fit by simulation, the balance of forces as prior"):
-        better = refitted(verdict, records)
+        better = refitted(verdict, records, FEW_PHASES if fast else PHASES)
     write_diagnosis(verdict, out)
     nls.write_deck(better, out / "refitted.toml")
     results = Results(
@@ -128,11 +130,11 @@ def viscous_only(published: nls.Assembly) -> nls.Assembly:
     )
 
 
-def refitted(verdict: Verdict, records: nls.RecordSet) -> nls.Assembly:
+def refitted(verdict: Verdict, records: nls.RecordSet, phases: int) -> nls.Assembly:
     """Return the better model, fitted by simulation over one second on top of the balance of forces."""
     model = nls.flatten(verdict.actuator)
     free = [nls.free_parameter(model.variable(p.name)) for fit in verdict.fits for p in fit.parameters]
-    shots, train = Shots(SHORT, joined=False, phases=PHASES), records.of("fit")
+    shots, train = Shots(SHORT, joined=False, phases=phases), records.of("fit")
     alone = nls.fit_by_simulation(model, train, free, shots=shots)
     weights = Weights(coloured_sigma(alone), known=verdict.fits)
     both = nls.fit_by_simulation(model, train, free, shots=shots, weights=weights)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,7 @@ def unchanged(name: str) -> str:
     return name
 
 
+@cache
 def deck(name: str = CAM) -> Assembly:
     """A deck of the project."""
     return declare(load_deck(name))

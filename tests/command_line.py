@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli import main
+from nlsdesign.feedback.control.evaluation import spread_margins
 from nlsdesign.foundation.text_files import LIST_NAME
 
 Run = Callable[..., tuple[int, str, str]]
@@ -35,7 +36,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 @pytest.fixture
 def two_machines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Judge the margins of a written controller over the spread on two machines, where none is looked at."""
-    monkeypatch.setattr("nlsdesign.feedback.control.evaluation.spread_margins.DRAWS", 2)
+    monkeypatch.setattr(spread_margins, "DRAWS", 2)
 
 
 def files_in(folder: Path) -> list[str]:

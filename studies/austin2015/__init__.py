@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import nlsdesign as nls
+from nlsdesign.design import DesignSettings
 
 from .._published import declared_actuator
 from .design import design_spring
@@ -32,7 +33,8 @@ def main(out: Path, fast: bool = False) -> Results:
         actuator = declared_actuator()
         nls.write_deck(actuator, out / "actuator.toml")
     with steps.step("joint design of cam, pretension and rubber"):
-        cam = design_spring(actuator, out, 200 if fast else 1000)
+        settings = DesignSettings(starts=2, draws=200) if fast else DesignSettings(draws=1000)
+        cam = design_spring(actuator, out, settings)
     with steps.step("model against the figures of the paper"):
         figures = compare_with_figures(actuator)
     published = work_up(actuator, out / "actuator.toml", out / "published", steps=steps, fast=fast)
@@ -59,14 +61,14 @@ def work_up(
     name = out.name
     model = nls.flatten(actuator, outputs=["motor.angle", "motor_encoder.reading", "spring.torque"])
     with steps.step(f"observability over the cam angle, {name}"):
-        chart = sweep_angle(model, 19 if fast else 61)
+        chart = sweep_angle(model, 11 if fast else 61)
     with steps.step(f"observers, on the bench and with the load free, {name}"):
         observers = compare_observers(actuator, model, 2.0 if fast else 5.0)
     with steps.step(f"observers over the spread, and what is proved, {name}"):
-        spread = over_spread(model, observers, deck, out, 4 if fast else 16)
+        spread = over_spread(model, observers, deck, out, 2 if fast else 16)
     with steps.step(f"torque loop, {name}"):
         following = follow_sines(model, observers.minimal)
-        evaluation = evaluate_loop(actuator, model, observers.minimal, 6 if fast else 12)
+        evaluation = evaluate_loop(actuator, model, observers.minimal, 4 if fast else 12)
     with steps.step(f"C code, FMUs and their co-simulation, {name}"):
         loop = export_and_cosimulate(model, spread.chosen.model, out, 1.0 if fast else 3.0)
     return ActuatorResults(actuator, model, chart, observers, following, loop, spread, evaluation)

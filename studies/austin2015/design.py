@@ -23,7 +23,7 @@ MACHINED = nls.MachinedTwoSidedCam(
 )
 
 
-def design_spring(actuator: nls.Assembly, out: Path, draws: int) -> MadeCam:
+def design_spring(actuator: nls.Assembly, out: Path, settings: DesignSettings) -> MadeCam:
     """Design for 5 N·m at 53°, and write deck and drawings.
 
     Curvature, cable tension, stress and strain are held by the limits that follow from the declared cable and
@@ -34,7 +34,7 @@ def design_spring(actuator: nls.Assembly, out: Path, draws: int) -> MadeCam:
         target=nls.ExponentialTorque(maximum=5.0, angle=nls.degrees(53.0), shape=1.0),
         free=FREE,
         keep=[nls.MaximumCamRadius(LARGEST_RADIUS), RestLengthRange(*LENGTHS)],
-        settings=DesignSettings(draws=draws),
+        settings=settings,
     )
     nls.write_deck(design.actuator, out / "designed.toml")
     return make_cam(design, MACHINED, out / "drawing", title="Cam of the designed actuator")

@@ -10,11 +10,7 @@ from nlsdesign.foundation.progress import Progress
 
 from .._published import bench_records, with_bench_sensors
 
-RIVALS = (
-    effects.coulomb_friction,
-    effects.rate_independent_hysteresis,
-    effects.second_relaxation,
-)
+RIVALS = (effects.rate_independent_hysteresis, effects.second_relaxation)
 """What the loss of the rubber is most easily mistaken for, and it itself: enough for the fast way."""
 
 

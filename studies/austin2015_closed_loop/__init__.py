@@ -27,7 +27,7 @@ from .report import write_page
 from .scheduled_law import ScheduledLaw, scheduled_law
 from .statement import Statement
 
-DRAWS, FEW_DRAWS = 100, 20
+DRAWS, FEW_DRAWS = 100, 8
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,8 @@ from .._published import figure_points
 from .benches import DECKS, FILES, HIGH, LOW, Bench
 
 AMPLITUDES = {"low": LOW, "high": HIGH}
+IN_FAST = {"low": (1.0, 1.5, 2.0, 3.0, 5.0, 11.0), "high": (1.0, 1.5, 5.0)}
+"""Frequencies in Hz of the fast way."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def followed_torque(*, fast: bool = False) -> FollowedTorque:
             for spring in DECKS:
                 bench = Bench(spring, setting.gains, late=setting.late)
                 points = published_response(amplitude, spring)
-                points = _thinned(points) if fast else points
+                points = _thinned(points, IN_FAST[amplitude]) if fast else points
                 response = bench.response(AMPLITUDES[amplitude], points[:, 0])
                 result[setting.name, amplitude, spring] = Followed(response, 1e-3 * setting.late, points)
     return result
@@ -108,7 +110,6 @@ def published_response(amplitude: str, spring: str) -> Array:
     return np.column_stack([magnitude, phase[:, 1]])
 
 
-def _thinned(points: Array) -> Array:
+def _thinned(points: Array, wanted: Sequence[float]) -> Array:
     """Return the points nearest to a few frequencies."""
-    wanted = (1.0, 1.5, 2.0, 3.0, 5.0, 11.0)
     return points[sorted({int(np.argmin(np.abs(np.log(points[:, 0] / f)))) for f in wanted})]

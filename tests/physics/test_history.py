@@ -148,7 +148,7 @@ def test_what_is_lost_in_softening_is_work_minus_what_comes_back() -> None:
     assert after_two - after_one == pytest.approx(0.0, abs=0.005 * after_one)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=settings.default.max_examples // 10, deadline=None)
 @given(st.lists(st.floats(0.05, 1.2), min_size=2, max_size=4))
 def test_no_path_wins_energy_from_softening(peaks: list[float]) -> None:
     trace = cycled(soft(), peaks, per_second=1500, tolerance=1e-8)
@@ -220,7 +220,7 @@ def test_laws_inside_a_set_see_the_rate_of_what_is_left() -> None:
     assert stress[back] == pytest.approx(2e4 * rate[back], rel=1e-9)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=settings.default.max_examples // 10, deadline=None)
 @given(st.lists(st.floats(0.05, 1.0), min_size=2, max_size=4), st.floats(0.0, 0.5))
 def test_no_path_wins_energy_from_a_set_around_fading_memory(peaks: list[float], share: float) -> None:
     inside = parallel(still=LinearElastic(modulus=1e6), branch=maxwell(modulus=0.8e6, viscosity=5e4))

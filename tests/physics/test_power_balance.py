@@ -201,7 +201,7 @@ def smooth_drive(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return times, angle, speed
 
 
-@settings(max_examples=12)
+@settings(max_examples=settings.default.max_examples // 10)
 @given(st.integers(0, 10**6), st.sampled_from(DECKS))
 def test_no_closed_path_wins_energy_from_the_spring(seed: int, name: str) -> None:
     """From rest, ∫T dθ ≥ 0 at every moment and over the closed path: the spring is passive."""
@@ -214,7 +214,7 @@ def test_no_closed_path_wins_energy_from_the_spring(seed: int, name: str) -> Non
     assert work[-1] > 0.0
 
 
-@settings(max_examples=10)
+@settings(max_examples=settings.default.max_examples // 10)
 @given(st.integers(0, 10**6))
 def test_no_path_wins_energy_from_a_cable_that_only_pulls(seed: int) -> None:
     """Relaxing rubber behind a one-sided cable, slack and taut in turn."""

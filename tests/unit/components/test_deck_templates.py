@@ -38,6 +38,7 @@ def test_there_is_a_template_for_each_kind_of_machine() -> None:
     ] == TEMPLATES
 
 
+@pytest.mark.long_cases("one-sided-finger")
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_a_template_is_ready_for_each_command_that_it_names_and_holds_no_slip(
     run: Run, tmp_path: Path, name: str

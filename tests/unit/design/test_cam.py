@@ -64,7 +64,9 @@ def test_nothing_else_is_touched(found: CamDesign) -> None:
         found.predicted_rms = 0.0  # type: ignore[misc]
 
 
+@pytest.mark.slow
 def test_same_question_same_answer(found: CamDesign) -> None:
+    """Quickly: ``test_miss.py::test_starts_are_reproducible_by_seed``."""
     again = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=SMALL)
     assert again.fingerprint == found.fingerprint
     assert pickle.loads(pickle.dumps(found)).fingerprint == found.fingerprint

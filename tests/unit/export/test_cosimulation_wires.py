@@ -106,6 +106,7 @@ def chosen(fmus: dict[str, Path], *names: str) -> dict[str, Path]:
 # --- gains ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("-1.0")
 @pytest.mark.parametrize("gain", [1.0, -1.0, 0.25])
 def test_a_gain_multiplies(gain: float, fmus: dict[str, Path]) -> None:
     wires = {"meter.input": Wire("clock.now", gain=gain)}

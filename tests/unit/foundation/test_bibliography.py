@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import tomllib
 from collections.abc import Iterator
@@ -21,11 +22,16 @@ YEAR = re.compile(r"(?<![\w.])(?:1[6-9]\d\d|20[0-2]\d)(?!\w|\.\d)")
 SENTENCE = re.compile(r"\bSources?:\s+(.*?)(?:\n\s*\n|\Z)", flags=re.DOTALL)
 
 
+@functools.cache
+def beginning() -> re.Pattern[str]:
+    """What a source may begin with."""
+    return re.compile(rf"(?:{'|'.join(map(re.escape, [*references(), *origins()]))})(?!\w)")
+
+
 def unresolved(sentence: str) -> Iterator[str]:
     """Yield the sources in a sentence, parted by semicolons, that are no publication and no origin."""
     for piece in re.split(r";\s+", " ".join(sentence.split()).rstrip(".")):
-        beginnings = [*references(), *origins()]
-        if not any(re.match(rf"{re.escape(known)}(?!\w)", piece) for known in beginnings):
+        if not beginning().match(piece):
             yield piece
             continue
         for reference in cited(piece):
@@ -78,11 +84,12 @@ def documented(root: Path) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def of_effects(root: Path) -> dict[str, str]:
     """Sources of the effects on every deck, and all texts in their files that have a year."""
+    machines = [declare(load_deck(name)) for name in deck_names()]
     named = {
         candidate.effect: candidate.source
-        for name in deck_names()
+        for machine in machines
         for effect in ALL
-        for candidate in effect(declare(load_deck(name)))
+        for candidate in effect(machine)
     }
     assert len(named) >= 15
     for file in (root / "nlsdesign" / "bench" / "discrepancy" / "effects").rglob("*.py"):

@@ -150,14 +150,16 @@ import sys
 from nlsdesign.foundation.work_sharing import parallel_map
 
 signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))
-for _ in range(300):
+for _ in range(int(sys.argv[1])):
     assert list(parallel_map(abs, 2)) == [0, 1]
 print("done")
 """
 
 
-def test_short_maps_end_where_the_process_handles_requests_to_end() -> None:
+@pytest.mark.long_cases("300")
+@pytest.mark.parametrize("times", ["100", "300"])
+def test_short_maps_end_where_the_process_handles_requests_to_end(times: str) -> None:
     ended = subprocess.run(
-        [sys.executable, "-c", ASKED_TO_END_WHILE_FORKING], capture_output=True, text=True, timeout=120
+        [sys.executable, "-c", ASKED_TO_END_WHILE_FORKING, times], capture_output=True, text=True, timeout=120
     )
     assert ended.stdout == "done\n", ended.stderr

@@ -57,6 +57,22 @@ def test_a_tool_that_dies_fails_or_is_missing_is_named_with_what_it_said():
         run_tool(["no-such-tool"])
 
 
+def test_a_benchmark_that_ends_with_a_sentence_has_it_on_the_page(monkeypatch, tmp_path, capsys):
+    (tmp_path / "benchmarks").mkdir()
+    (tmp_path / "benchmarks" / "__init__.py").touch()
+    (tmp_path / "benchmarks" / "stand_in.py").write_text("raise SystemExit('valgrind died of SIGILL')\n")
+    monkeypatch.setattr(benchmarks, "fingerprint", lambda benchmark: benchmark.command)
+    monkeypatch.setattr(benchmarks, "ROOT", tmp_path)
+    monkeypatch.setattr(benchmarks._suite, "SUITE", (stand_in(),))
+    monkeypatch.setattr(_page, "SUITE", (stand_in(),))
+    page = tmp_path / "page.md"
+    assert benchmarks.main(["--results", str(tmp_path / "out"), "--page", str(page)]) == 1
+    assert "valgrind died of SIGILL" in capsys.readouterr().out
+    assert "Not measured: valgrind died of SIGILL" in page.read_text(encoding="utf-8")
+
+
+# What a tool says and what becomes of it are tried quickly above, one after the other.
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the tool")
 def test_a_tool_that_dies_under_a_benchmark_is_a_sentence_and_no_traceback(tmp_path, monkeypatch, capsys):
     valgrind = tmp_path / "valgrind"

@@ -29,7 +29,7 @@ from nlsdesign.regeneration import (
 )
 from nlsdesign.simulation import Trace
 
-TIME = np.arange(1500) * 0.002
+TIME = np.arange(800) * 0.002
 ANGLE = 0.3 * np.sin(4.0 * TIME)
 TRUE, DECLARED = 2.4, 2.0
 

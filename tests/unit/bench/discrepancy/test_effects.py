@@ -72,6 +72,8 @@ def swing() -> Assembly:
     )
 
 
+# Of all effects on one machine: ``test_effects_everywhere.py``, where each candidate is a deck.
+@pytest.mark.long_cases(*(e.__name__ for k, e in enumerate(ALL) if k % 4))
 @pytest.mark.parametrize("effect", ALL, ids=lambda e: e.__name__)
 def test_an_effect_is_a_whole_assembly_with_its_own_numbers(effect: Effect) -> None:
     machine = machine_for(effect)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import shutil
+import sys
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from nlsdesign.cli import main
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_c
 from nlsdesign.export.c.guarded_step import OUT_OF_TABLE
@@ -36,9 +40,22 @@ DECK = "austin2015_stiff_spring"
 WORDS = ("observer", "--deck", DECK, "--certificate", "--real", "float")
 
 
-def test_forged_c_with_a_hash_written_anew_fails(run: Run, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Certificate and code as the command writes them at a given time."""
+    folder = tmp_path_factory.mktemp("certified")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+        patch.setattr(sys, "argv", ["nlsdesign", *WORDS, "--out", str(folder)])
+        with suppress(SystemExit):
+            main()
+    assert (folder / "certificate.json").exists()
+    return folder
+
+
+def test_forged_c_with_a_hash_written_anew_fails(run: Run, tmp_path: Path, written: Path) -> None:
     """The forger changes a digit of the table, its hash and the checksum; only writing anew tells."""
-    assert run(*WORDS, "--out", str(tmp_path))[0] == 0
+    shutil.copytree(written, tmp_path, dirs_exist_ok=True)
     path, source = tmp_path / "certificate.json", tmp_path / "observer.c"
     status, out, _ = run("observer", "verify", str(path), "--c", str(tmp_path))
     assert status == 0
@@ -59,10 +76,9 @@ def test_forged_c_with_a_hash_written_anew_fails(run: Run, tmp_path: Path) -> No
 
 
 def test_code_is_verified_a_year_later_in_another_time_zone(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: Path
 ) -> None:
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    assert run(*WORDS, "--out", str(tmp_path))[0] == 0
+    shutil.copytree(written, tmp_path, dirs_exist_ok=True)
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1731600000")
     monkeypatch.setenv("TZ", "Pacific/Auckland")
     certificate, source = tmp_path / "certificate.json", tmp_path / "observer.c"
