@@ -82,7 +82,7 @@ class StepProof:
             "not proved to stay within its limits": self.beyond,
             "holds a loop or a jump": self.loops,
         }
-        return tuple(f"{kind}: {each}" for kind, found in kinds.items() for each in found)
+        return tuple(f"{kind}: {each}" for kind, texts in kinds.items() for each in texts)
 
 
 def missing_prover() -> str:
@@ -157,13 +157,13 @@ def prove_step(source: CSource) -> StepProof:
 
 def _loops(code: str) -> tuple[str, ...]:
     """Return the functions that hold a loop or a jump, without those that load parameter blocks."""
-    found, function = [], ""
+    texts, function = [], ""
     for line in re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL).splitlines():
         head = re.match(r"\w[\w ]* \*?(\w+)\(", line)
         function = head[1] if head else function
         if re.search(r"\b(?:for|while|do|goto)\b", line) and not function.endswith(_LOADING):
-            found.append(function)
-    return tuple(dict.fromkeys(found))
+            texts.append(function)
+    return tuple(dict.fromkeys(texts))
 
 
 def _within(output: str, label: str, lowest: float, highest: float) -> bool:

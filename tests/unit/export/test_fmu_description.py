@@ -141,7 +141,9 @@ def test_the_range_of_an_output_holds_for_every_tuning(actuator):
     (shown,) = (each.variable for each in layout(model).given_out)
     limit = model.variable("motor.current_limit")
     assert (shown.minimum, shown.maximum) == (-limit.maximum, limit.maximum)
-    for tuned in (1e-3, 20.0, 60.0):
+    with pytest.raises(ValueRangeError, match="current_limit = 60 A"):  # it can only be lowered
+        model.with_values({"motor.current_limit": 60.0})
+    for tuned in (1e-3, 5.0, 20.0):
         step = GuardedModel(model.with_values({"motor.current_limit": tuned}))
         currents = [step.step([1e6 * (-1) ** (k // 5), 0.0, 0.0])[0][0] for k in range(20)]
         assert max(map(abs, currents)) == pytest.approx(tuned)
