@@ -110,8 +110,7 @@ def _sizes(design: CamDesign) -> list[tuple[str, ...]]:
         name: quantity for name, quantity in design.values.items() if isinstance(quantity.value, int | float)
     }
     for name, quantity in list(single.items())[: _MOST_SIZES - len(rows)]:
-        path = name.split(".")
-        label = " ".join(path[-2:]).replace("_", " ")
+        label = " ".join(name.split(".")[-2:]).replace("_", " ")
         rows.append(
             (
                 label,
@@ -165,8 +164,9 @@ def _limits(design: CamDesign) -> list[tuple[str, ...]]:
         factor = parse_unit(state.unit).factor
         sign = "≤" if state.upper else "≥"
         text = f"{state.value / factor:.4g} {sign} {state.bound / factor:.4g} {typeset_unit(state.unit)}"
-        label = f"{state.of}{', reached' if state.active else ''}"
-        rows.append((textwrap.shorten(label, _LABEL, placeholder=" …"), text.strip()))
+        reached = ", reached" if state.active else ""
+        label = textwrap.shorten(state.of, _LABEL - len(reached), placeholder=" …")
+        rows.append((f"{label}{reached}", text.strip()))
     if len(states) > _MOST_LIMITS:
         rows.append((f"and {len(states) - _MOST_LIMITS} more", "in design.json"))
     return rows

@@ -9,6 +9,7 @@ from matplotlib.container import BarContainer
 from matplotlib.patches import Polygon
 
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
+from nlsdesign.presentation.figures import data_sheet as sheet_module
 from nlsdesign.presentation.figures.data_sheet import data_sheet
 from nlsdesign.presentation.figures.design_figures import design_picture, limit_margins
 from nlsdesign.presentation.figures.style import alternative_text
@@ -79,3 +80,11 @@ def test_the_data_sheet_is_one_page_a4_on_which_no_text_lies_on_another(design: 
     # Both views of the mechanism are drawn at one scale.
     assert first.get_xlim() == last.get_xlim()
     assert "Data sheet" in alternative_text(page)
+
+
+def test_a_limit_with_a_name_that_is_cut_short_is_still_said_to_be_reached(
+    design: CamDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sheet_module, "_LABEL", 20)
+    words = [text.get_text() for text in data_sheet(design, deck="rubber").axes[0].texts]
+    assert sum(word.endswith(", reached") for word in words) == sum(s.active for s in design.limits) > 0
