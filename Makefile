@@ -23,7 +23,7 @@ export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets proofs wheels docs gallery environment lock clean distclean
+.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets proofs firmware wheels docs gallery environment lock clean distclean
 
 help:
 	@echo 'make study      a small study, then that of the published actuator; the report goes to $(OUT)/report.html'
@@ -38,6 +38,7 @@ help:
 	@echo 'make gallery    run all studies and keep some of their figures for the site (minutes)'
 	@echo 'make masters    our FMUs in foreign masters: docs/fmi_masters.md'
 	@echo 'make targets    generated C on processors of controllers in an emulator: docs/targets.md'
+	@echo 'make firmware   the example firmware on an emulated board against the FMU of its machine: docs/firmware.md'
 	@echo 'make proofs     what is proved of generated C for all inputs: docs/proofs.md (needs frama-c)'
 	@echo 'make tutorial   run the tutorial and write its numbers, figures and notebook anew'
 	@echo 'make wheels     build wheel and sdist, install and try each on every Python that is here'
@@ -99,6 +100,9 @@ targets: environment
 
 proofs: environment
 	$(BIN)/python -m benchmarks.proofs
+
+firmware: environment
+	$(BIN)/python -m benchmarks.firmware_in_the_loop
 
 wheels: environment
 	$(BIN)/python -m tests.wheels

@@ -158,7 +158,8 @@ def _largest(model: FlatModel, points: Sequence[_Point]) -> Sizes:
     x, u = (np.array(rows).T for rows in zip(*points, strict=True))
     w = np.array([model.look_up(at.tolist(), given.tolist()) for at, given in points]).T
     every = model.equations.map("every", "serial", len(points), [0, 3], [])
-    f, y, s, _ = every(0.0, x, u, model.start(model.parameters), w)
+    results = every(0.0, x, u, model.start(model.parameters), w)
+    f, y, s, _ = (np.array(each, dtype=float) for each in results)
     rows = np.vstack([f, y, s, x] if model.sample_time is not None else [f, y, s])
     names = [f"der({v.name})" for v in model.states] + [v.name for v in (*model.outputs, *model.signals)]
     names += [v.name for v in model.states] if model.sample_time is not None else []

@@ -18,10 +18,13 @@
 
 static @name@_state state;
 static @name@_outputs outputs;
-static volatile uint32_t last_status;
+static uint32_t last_status;
 
 void SysTick_Handler(void);
 
+#ifdef BOARD /* a header with the two functions below for your board: -DBOARD='"my_board.h"'; then nothing here is edited */
+#include BOARD
+#else
 /* Put the readings of your sensors here. */
 static void read_inputs(@name@_inputs *given)
 {
@@ -30,13 +33,21 @@ static void read_inputs(@name@_inputs *given)
     *given = inputs;
 }
 
+/* Put the outputs where they act, and decide what a flag of the status word means for your machine. */
+static void write_outputs(const @name@_outputs *given, uint32_t status)
+{
+    (void)given;
+    (void)status;
+}
+#endif
+
 void SysTick_Handler(void)
 {
     @name@_inputs inputs;
 
     read_inputs(&inputs);
     last_status = @name@_step(&state, &inputs, &outputs);
-    /* Put the outputs where they act; a flag in last_status says that they are less sure than usual. */
+    write_outputs(&outputs, last_status);
 }
 
 int main(void)
@@ -48,5 +59,8 @@ int main(void)
     SYST_CVR = 0u;
     SYST_CSR = 7u; /* processor clock, interrupt, on */
     for (;;) {
+#if defined(__GNUC__)
+        __asm__ volatile("wfi"); /* sleeps until the next interrupt */
+#endif
     }
 }

@@ -31,6 +31,9 @@ void loop()
 {
     if ((int32_t)(micros() - next_time) >= 0) {
         next_time += @period@ul;
+        if ((int32_t)(micros() - next_time) >= 0) { /* late by a whole period or more: what was missed is not made up for */
+            next_time = micros() + @period@ul;
+        }
         read_inputs();
         write_outputs(@name@_step(&state, &inputs, &outputs));
     }
