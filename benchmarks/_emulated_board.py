@@ -98,7 +98,7 @@ class EmulatedBoard:
         self._run("c")
 
     def _go(self, *, behind: int = 0) -> None:
-        """Leave the instruction at which the interrupt is held; so many orders before are not answered yet."""
+        """Leave the instruction at which the interrupt is held; of as many orders before the answer is due."""
         self._send(self._past)
         self._run("c", behind=behind + 1)
 
