@@ -98,7 +98,7 @@ class EmulatedBoard:
         self._run("c")
 
     def _go(self, *, behind: int = 0) -> None:
-        """Leave the instruction at which the interrupt is held; of as many orders before the answer is due."""
+        """Leave the instruction at which the interrupt is held; as many orders before wait for an answer."""
         self._send(self._past)
         self._run("c", behind=behind + 1)
 
