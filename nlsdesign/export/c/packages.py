@@ -1,4 +1,4 @@
-"""A generated step as a library that PlatformIO, Arduino, Zephyr and CMake take as it stands."""
+"""A generated step as a library for PlatformIO, Arduino, Zephyr, CMake and ros2_control."""
 
 from __future__ import annotations
 
@@ -22,13 +22,22 @@ _FILES = {
     "zephyr/Kconfig": "package_Kconfig",
     "CMakeLists.txt": "package_CMakeLists.txt",
 }
+_ROS2_FILES = {
+    "ros2_control/{name}_transmission.hpp": "ros2_transmission.hpp",
+    "ros2_control/{name}_transmission_loader.cpp": "ros2_loader.cpp",
+    "ros2_control/ros2_control_plugins.xml": "ros2_plugins.xml",
+    "ros2_control/package.xml": "ros2_package.xml",
+    "ros2_control/CMakeLists.txt": "ros2_CMakeLists.txt",
+}
+_DESIRED = ".desired"
 
 
 def write_package(source: CSource, folder: Path) -> list[Path]:
     """Write a step as a library with the files that build systems of controllers ask for.
 
     One folder serves all: ``library.json`` for PlatformIO, ``library.properties`` and a sketch for Arduino,
-    ``zephyr/module.yml`` for Zephyr, ``CMakeLists.txt`` for CMake, with what ``find_package`` finds.
+    ``zephyr/module.yml`` for Zephyr, ``CMakeLists.txt`` for CMake, with what ``find_package`` finds. Observer
+    and controller as one step are also a transmission of ros2_control, in ``ros2_control/``.
 
     Parameters
     ----------
@@ -63,8 +72,41 @@ def write_package(source: CSource, folder: Path) -> list[Path]:
             for v, path in zip(model.inputs, source.writer.paths.inputs, strict=True)
         ],
     }
-    texts = {folder / file.format(name=name): filled(template, values) for file, template in _FILES.items()}
+    roles = _transmission_roles(source)
+    files = _FILES | _ROS2_FILES if roles else _FILES
+    texts = {
+        folder / file.format(name=name): filled(template, values | roles) for file, template in files.items()
+    }
     for file, place in ((source.header, "src"), (source.source, "src"), (source.selftest, "test")):
         texts[folder / place / file.name] = file.read_text(encoding="utf-8")
     write_all(texts)
     return list(texts)
+
+
+def _transmission_roles(source: CSource) -> dict[str, str]:
+    """Return the members of a step that a transmission reads and gives; empty unless it is a whole loop.
+
+    A loop is one measured angle, one desired torque, its estimate, the speed of what is measured, and a
+    command, the last output.
+    """
+    model, paths = source.model, source.writer.paths
+    inputs = {v.name: path for v, path in zip(model.inputs, paths.inputs, strict=True)}
+    outputs = {v.name: path for v, path in zip(model.outputs, paths.outputs, strict=True)}
+    angles = [v.name for v in model.inputs if v.plausibility is not None]
+    desired = [name for name in inputs if name.endswith(_DESIRED)]
+    if len(angles) != 1 or len(desired) != 1 or len(inputs) != 2:
+        return {}
+    estimate, speed = desired[0].removesuffix(_DESIRED), f"{angles[0].rpartition('.')[0]}.speed"
+    if not {estimate, speed} < set(outputs):
+        return {}
+    command = model.outputs[-1]
+    return {
+        "angle": inputs[angles[0]],
+        "desired": inputs[desired[0]],
+        "estimate": outputs[estimate],
+        "speed": f"outputs_.{outputs[speed]}",
+        "command": outputs[command.name],
+        "command_unit": f"{command.name} in {command.unit}",
+        "real": str(source.real),
+        "rate": f"{1.0 / float(model.sample_time or 1.0):g}",
+    }

@@ -1,16 +1,20 @@
-"""A step as a library: CMake builds and finds it, the schema of PlatformIO and a C++ compiler take it."""
+"""A step as a library: CMake builds and finds it, PlatformIO's schema, Arduino and ros2_control take it."""
 
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import subprocess
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 import nlsdesign as nls
 from nlsdesign.export import export_c, write_package
+from nlsdesign.export.compilation.compiled_step import CompiledStep
+from nlsdesign.feedback.control import joined
 
 ARDUINO = """
 #pragma once
@@ -117,3 +121,98 @@ def test_zephyr_finds_its_files_and_its_switch(package: Path) -> None:
     assert "if(CONFIG_STEP)" in text
     assert "config STEP\n" in (package / "zephyr" / "Kconfig").read_text(encoding="utf-8")
     assert "../src/step.c" in text
+
+
+HEADERS = Path(__file__).parents[2] / "ros2_headers"
+PLUGINLIB = """
+#pragma once
+#include <type_traits>
+#define PLUGINLIB_EXPORT_CLASS(A, B) \\
+    static_assert(std::is_base_of<B, A>::value && !std::is_abstract<A>::value, "");
+"""
+CONTROLLER_MANAGER = r"""
+#include <cstdio>
+#include "loop_transmission_loader.cpp"
+int main(int count, char **)
+{
+    hardware_interface::TransmissionInfo info;
+    hardware_interface::JointInfo joint;
+    joint.mechanical_reduction = 4.0;
+    joint.offset = 0.25;
+    info.joints.push_back(joint);
+    info.parameters["effort_per_command"] = "0.5";
+    loop_ros2::Loader loader;
+    std::shared_ptr<transmission_interface::Transmission> base = loader.load(info);
+    double position = 0, velocity = 0, effort = 0, encoder = 0, command = 0, wished = 0;
+    std::vector<transmission_interface::JointHandle> joints = {
+        {"knee", "position", &position}, {"knee", "velocity", &velocity}, {"knee", "effort", &effort}};
+    std::vector<transmission_interface::ActuatorHandle> actuators = {
+        {"motor", "position", &encoder}, {"motor", "effort", &command}};
+    if (count > 1) { joints.pop_back(); }
+    try {
+        base->configure(joints, actuators);
+    } catch (const std::exception &error) {
+        std::puts(error.what());
+        return 3;
+    }
+    while (std::scanf("%lf %lf", &encoder, &wished) == 2) {
+        base->actuator_to_joint();
+        std::printf("%a %a %a ", position, velocity, effort);
+        effort = wished;
+        base->joint_to_actuator();
+        std::printf("%a %u\n", command, static_cast<loop_ros2::ElasticTransmission &>(*base).status());
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
+def test_ros2_control_loads_the_loop_as_a_transmission_and_gets_the_numbers_of_the_step(
+    tmp_path: Path,
+) -> None:
+    plant = nls.flatten(nls.declare(nls.load_deck("austin2015_figure_consistent")))
+    observer = nls.design_observer(plant, gain=nls.observer.CascadeGain())
+    source = export_c(joined(observer, nls.torque_controller(plant)), tmp_path / "c", name="loop")
+    library = tmp_path / "library"
+    write_package(source, library)
+    ros = library / "ros2_control"
+    (tmp_path / "pluginlib").mkdir()
+    (tmp_path / "pluginlib" / "class_list_macros.hpp").write_text(PLUGINLIB)
+    (tmp_path / "main.cpp").write_text(CONTROLLER_MANAGER)
+    ran("gcc", "-std=c99", "-O2", "-ffp-contract=off", "-c", source.source, "-o", tmp_path / "loop.o")
+    includes = [f"-I{folder}" for folder in (tmp_path, ros, library / "src", HEADERS)]
+    ran("g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", *includes, tmp_path / "main.cpp",
+        tmp_path / "loop.o", "-lm", "-o", tmp_path / "main")  # fmt: skip
+    given = [(4.0 * (0.4 * math.sin(0.02 * k) - 0.25), math.sin(0.03 * k)) for k in range(200)]
+    given[120] = (math.nan, 0.5)
+    words = "\n".join(f"{encoder!r} {wished!r}" for encoder, wished in given)
+    done = subprocess.run([tmp_path / "main"], input=words, capture_output=True, text=True, check=True)
+    rows = [line.split() for line in done.stdout.splitlines()]
+    assert len(rows) == len(given)
+    step, names = CompiledStep(source), [v.name for v in source.model.outputs]
+    last = dict.fromkeys(names, 0.0)
+    for (encoder, wished), row in zip(given, rows, strict=True):
+        position, velocity, effort, command = (float.fromhex(number) for number in row[:4])
+        angle = encoder / 4.0 + 0.25
+        assert position == angle or math.isnan(angle)
+        assert (velocity, effort) == (last["motor.speed"], last["spring.torque"])
+        outputs, status = step([angle, wished])
+        last = dict(zip(names, outputs, strict=True))
+        assert (command, int(row[4])) == (0.5 * last["motor.current"], status)
+    assert abs(last["spring.torque"]) > 0.1
+    refused = subprocess.run([tmp_path / "main", "less"], capture_output=True, text=True, check=False)
+    assert refused.returncode == 3
+    assert "loop: needs effort of the joint, position and effort of the actuator" in refused.stdout
+    plugins = ElementTree.parse(ros / "ros2_control_plugins.xml").getroot()
+    (named,) = plugins.iter("class")
+    assert named.get("base_class_type") == "transmission_interface::TransmissionLoader"
+    assert (
+        ElementTree.parse(ros / "package.xml").getroot().findtext("name")
+        == plugins.get("path")
+        == "loop_ros2"
+    )
+
+
+def test_a_controller_alone_is_no_transmission(package: Path) -> None:
+    assert not (package / "ros2_control").exists()

@@ -141,6 +141,18 @@ def _members(message: Any) -> Iterator[tuple[str, Any]]:
                 yield each.name, getattr(message, each.name)
 
 
+_NOT_FINITE = ("NaN", "Infinity", "-Infinity")
+"""Numbers that JSON cannot hold, as the JSON form of Protocol Buffers writes them: as text."""
+
+
+def _number(value: Any) -> float | None:
+    """Return a number of a message, none for anything else."""
+    is_number = isinstance(value, bool | int | float | np.number) or (
+        isinstance(value, str) and value in _NOT_FINITE
+    )
+    return float(value) if is_number else None
+
+
 def _numbers(message: Any, kind: str, joints: Sequence[str] = ()) -> Iterator[tuple[str, tuple[float, str]]]:
     """Return what a message holds: path of fields, number and unit; its head stays out."""
     members = dict(_members(message))
@@ -150,12 +162,12 @@ def _numbers(message: Any, kind: str, joints: Sequence[str] = ()) -> Iterator[tu
         if name == "header":
             continue
         unit = _UNITS.get((kind, name), "")
-        if isinstance(value, bool | int | float | np.number):
-            yield name, (float(value), unit)
+        if (number := _number(value)) is not None:
+            yield name, (number, unit)
         elif isinstance(value, Mapping) or is_dataclass(value):
             inner = kind if unit else _kind_of(value) or kind
-            for path, (number, own) in _numbers(value, inner, named):
-                yield f"{name}/{path}", (number, own or unit)
+            for path, (size, own) in _numbers(value, inner, named):
+                yield f"{name}/{path}", (size, own or unit)
         elif isinstance(value, list | tuple | np.ndarray) and 0 < len(value) <= _LONGEST_LIST:
             labels = (
                 [f"/{n}" for n in named]
@@ -163,8 +175,8 @@ def _numbers(message: Any, kind: str, joints: Sequence[str] = ()) -> Iterator[tu
                 else [f"[{k}]" for k in range(len(value))]
             )
             for label, item in zip(labels, value, strict=True):
-                if isinstance(item, bool | int | float | np.number):
-                    yield f"{name}{label}", (float(item), unit)
+                if (number := _number(item)) is not None:
+                    yield f"{name}{label}", (number, unit)
                 elif isinstance(item, Mapping) or is_dataclass(item):
                     for path, numbered in _numbers(item, _kind_of(item) or kind):
                         yield f"{name}{label}/{path}", numbered

@@ -210,3 +210,20 @@ def test_messages_of_one_topic_that_hold_different_joints_have_clocks_of_their_o
     )  # fmt: skip
     assert log.given["states~2/time"][0] == pytest.approx(0.002)
     assert log.of_joint("elbow").heads == ("states~2/time", "states~2/position/elbow")
+
+
+def test_numbers_that_are_not_finite_come_as_text_and_leave_one_topic(tmp_path: Path) -> None:
+    """As Protocol Buffers write them in JSON; a topic is not split by them, and other texts are no numbers."""
+    file = tmp_path / "run.mcap"
+    with file.open("wb") as stream:
+        writer = pytest.importorskip("mcap.writer").Writer(stream)
+        writer.start()
+        channel = writer.register_channel("states", "json", writer.register_schema("", "jsonschema", b"{}"))
+        for number, torque in enumerate([0.5, "NaN", "-Infinity", 0.25]):
+            message = {"q": number, "tau": [torque], "mode": "run"}
+            at = BEGAN + 10_000_000 * number
+            writer.add_message(channel, log_time=at, data=json.dumps(message).encode(), publish_time=at)
+        writer.finish()
+    log = read_table(file)
+    assert log.heads == ("states/time", "states/q", "states/tau[0]")
+    np.testing.assert_array_equal(log.given["states/tau[0]"], [0.5, np.nan, -np.inf, 0.25])
