@@ -213,7 +213,7 @@ def test_messages_of_one_topic_that_hold_different_joints_have_clocks_of_their_o
 
 
 def test_numbers_that_are_not_finite_come_as_text_and_leave_one_topic(tmp_path: Path) -> None:
-    """As Protocol Buffers write them in JSON; a topic is not split by them, and other texts are no numbers."""
+    """As Protocol Buffers write them in JSON; a topic is not split by them; other texts are none."""
     file = tmp_path / "run.mcap"
     with file.open("wb") as stream:
         writer = pytest.importorskip("mcap.writer").Writer(stream)
