@@ -35,6 +35,8 @@ RECOVERED = 1 << 9
 WAITING = 1 << 10
 NOT_STARTED = 1 << 11
 COMMAND_SLOWED = 1 << 12
+SAMPLE_LATE = 1 << 13
+SAMPLE_REPEATED = 1 << 14
 FIRST_INDEX_BIT, LAST_INDEX_BIT = 16, 30
 
 STATUS_BITS = {
@@ -69,6 +71,8 @@ STATUS_BITS = {
         COMMAND_SLOWED,
         "a command changed faster than the drive can follow; what it can reach was used",
     ),
+    "SAMPLE_LATE": (SAMPLE_LATE, "of step_at: samples are missing before this one"),
+    "SAMPLE_REPEATED": (SAMPLE_REPEATED, "of step_at: the sample came twice; the last outputs were given"),
 }
 
 

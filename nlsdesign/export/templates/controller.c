@@ -100,3 +100,29 @@ static uint32_t @name@_advance(@name@_state *state, @name@_outputs *outputs)
     @noted@
     return status;
 }
+
+#define PERIOD @period@u /* us */
+
+@step_at@
+{
+    const uint32_t elapsed = microseconds - clock->last;
+    uint32_t status = 0u;
+    uint32_t known = 0u;
+
+    if (clock->running != 0u && state->started == @NAME@_INTERFACE_VERSION) {
+        known = 1u;
+    }
+    if (known != 0u && elapsed < PERIOD / 2u) {
+        *outputs = state->outputs;
+        status = @NAME@_SAMPLE_REPEATED;
+    } else {
+        if (known != 0u && elapsed >= PERIOD + PERIOD / 2u) {
+            status = @NAME@_SAMPLE_LATE;
+            @missed@
+        }
+        clock->last = microseconds;
+        clock->running = 1u;
+        status |= @name@_step(state, inputs, outputs);
+    }
+    return status;
+}

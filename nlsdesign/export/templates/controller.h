@@ -56,6 +56,17 @@ void @name@_defaults(@name@_parameters *parameters);
    of any content, all outputs are 0 and the word is @NAME@_NOT_STARTED. */
 @step@;
 
+/* When the last sample was taken; all zero before the first. The caller owns it. */
+typedef struct {
+    uint32_t last; /* us */
+    uint32_t running; /* 0 before the first sample */
+} @name@_clock;
+
+/* The same with the time in us at which the inputs were read, from a counter that may run over. A sample less than half
+   a sample time after the last one is @NAME@_SAMPLE_REPEATED: nothing is computed, the outputs are the last ones.
+   One later than one and a half is @NAME@_SAMPLE_LATE, and counts as one after missing readings. */
+@step_at@;
+
 #ifdef __cplusplus
 }
 #endif

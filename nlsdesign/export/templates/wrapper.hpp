@@ -22,12 +22,20 @@ public:
     {
         const parameters_type kept = state_.parameters;
         status_ = @name@_init(&state_, &kept);
+        clock_ = @name@_clock{};
     }
 
     // One sample; the outputs are finite whatever comes in.
     const outputs_type &step(const inputs_type &inputs) noexcept
     {
         status_ = @name@_step(&state_, &inputs, &outputs_);
+        return outputs_;
+    }
+
+    // The same with the time in us at which the inputs were read: late and repeated samples are flagged.
+    const outputs_type &step(const inputs_type &inputs, std::uint32_t microseconds) noexcept
+    {
+        status_ = @name@_step_at(&clock_, &state_, &inputs, &outputs_, microseconds);
         return outputs_;
     }
 
@@ -42,6 +50,7 @@ public:
 private:
     @name@_state state_{};
     outputs_type outputs_{};
+    @name@_clock clock_{};
     std::uint32_t status_ = 0;
 };
 

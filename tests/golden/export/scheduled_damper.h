@@ -16,7 +16,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_DECK "damper"
 #define SCHEDULED_DAMPER_DECK_DIGEST "1111111111111111111111111111111111111111111111111111111111111111"
 #define SCHEDULED_DAMPER_PARENT_DIGEST "0000000000000000000000000000000000000000000000000000000000000000"
-#define SCHEDULED_DAMPER_INTERFACE_VERSION 0x680285c2u /* another one where structures, functions or units differ */
+#define SCHEDULED_DAMPER_INTERFACE_VERSION 0xa012fa8bu /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
    set_parameters) as numbered below; bit 30 stands for all from 14 on. */
@@ -33,6 +33,8 @@ extern "C" {
 #define SCHEDULED_DAMPER_WAITING 0x400u /* no usable reading has come yet; the outputs are those of the start */
 #define SCHEDULED_DAMPER_NOT_STARTED 0x800u /* init has not been called; all outputs are 0, nothing was taken */
 #define SCHEDULED_DAMPER_COMMAND_SLOWED 0x1000u /* a command changed faster than the drive can follow; what it can reach was used */
+#define SCHEDULED_DAMPER_SAMPLE_LATE 0x2000u /* of step_at: samples are missing before this one */
+#define SCHEDULED_DAMPER_SAMPLE_REPEATED 0x4000u /* of step_at: the sample came twice; the last outputs were given */
 
 /* What step reads. */
 typedef struct {
@@ -109,6 +111,22 @@ uint32_t scheduled_damper_step(
     scheduled_damper_state *state,
     const scheduled_damper_inputs *inputs,
     scheduled_damper_outputs *outputs);
+
+/* When the last sample was taken; all zero before the first. The caller owns it. */
+typedef struct {
+    uint32_t last; /* us */
+    uint32_t running; /* 0 before the first sample */
+} scheduled_damper_clock;
+
+/* The same with the time in us at which the inputs were read, from a counter that may run over. A sample less than half
+   a sample time after the last one is SCHEDULED_DAMPER_SAMPLE_REPEATED: nothing is computed, the outputs are the last ones.
+   One later than one and a half is SCHEDULED_DAMPER_SAMPLE_LATE, and counts as one after missing readings. */
+uint32_t scheduled_damper_step_at(
+    scheduled_damper_clock *clock,
+    scheduled_damper_state *state,
+    const scheduled_damper_inputs *inputs,
+    scheduled_damper_outputs *outputs,
+    uint32_t microseconds);
 
 #ifdef __cplusplus
 }

@@ -331,3 +331,35 @@ uint32_t scheduled_damper_step(
     }
     return status;
 }
+
+#define PERIOD 10000u /* us */
+
+uint32_t scheduled_damper_step_at(
+    scheduled_damper_clock *clock,
+    scheduled_damper_state *state,
+    const scheduled_damper_inputs *inputs,
+    scheduled_damper_outputs *outputs,
+    uint32_t microseconds)
+{
+    const uint32_t elapsed = microseconds - clock->last;
+    uint32_t status = 0u;
+    uint32_t known = 0u;
+
+    if (clock->running != 0u && state->started == SCHEDULED_DAMPER_INTERFACE_VERSION) {
+        known = 1u;
+    }
+    if (known != 0u && elapsed < PERIOD / 2u) {
+        *outputs = state->outputs;
+        status = SCHEDULED_DAMPER_SAMPLE_REPEATED;
+    } else {
+        if (known != 0u && elapsed >= PERIOD + PERIOD / 2u) {
+            status = SCHEDULED_DAMPER_SAMPLE_LATE;
+            const uint32_t lacking = (elapsed + PERIOD / 2u) / PERIOD - 1u;
+            state->readings[0].missed = lacking < 1000000u - state->readings[0].missed ? state->readings[0].missed + lacking : 1000000u;
+        }
+        clock->last = microseconds;
+        clock->running = 1u;
+        status |= scheduled_damper_step(state, inputs, outputs);
+    }
+    return status;
+}
