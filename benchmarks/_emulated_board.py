@@ -20,7 +20,7 @@ from nlsdesign.export import Processor
 from nlsdesign.export.compilation.target_run import EMULATOR
 
 CELLS: Final = 0x20300000
-_LAYOUT: Final = struct.Struct("<iIIIIIddII")
+_LAYOUT: Final = struct.Struct("<iIIIIIddfII")
 _HANDLER: Final = 15 * 4
 """Where the table of vectors names the interrupt of the timer."""
 _SECONDS: Final = 20.0
@@ -38,6 +38,7 @@ class Cells:
     starts: int
     current: float
     torque: float
+    share: float
     clock: int
     samples: int
 

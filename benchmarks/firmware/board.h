@@ -15,6 +15,7 @@ struct board {
     volatile uint32_t starts;    /* of the program */
     volatile double current;     /* A, what the amplifier is given */
     volatile double torque;      /* N m, for the log */
+    volatile float share;        /* of the current that the supervisor lets act; the amplifier here takes all */
     volatile uint32_t clock;     /* SysTick when the step ended */
     volatile uint32_t samples;   /* written last: the sample is over */
 };
@@ -30,11 +31,12 @@ static void read_inputs(torque_loop_inputs *given)
     last_frame = frame;
 }
 
-static void write_outputs(const torque_loop_outputs *given, uint32_t status)
+static void write_outputs(const torque_loop_outputs *given, uint32_t status, float share)
 {
     BOARD_CELLS->current = (double)given->motor.current;
     BOARD_CELLS->torque = (double)given->spring.torque;
     BOARD_CELLS->status = status;
+    BOARD_CELLS->share = share;
     BOARD_CELLS->clock = SYST_CVR;
     BOARD_CELLS->samples = BOARD_CELLS->samples + 1u;
 }

@@ -101,7 +101,8 @@ def write_examples(source: CSource) -> list[Path]:
     """Write a C++ class, two main programs and build files beside the files of a step.
 
     The main programs are a loop on a POSIX timer and a timer interrupt of a Cortex-M; both say where readings
-    come from and where outputs go to, and what to do with the status word.
+    come from and where outputs go to. A supervisor turns the status word into the share of a command that
+    may act.
 
     Parameters
     ----------
@@ -133,6 +134,7 @@ def write_examples(source: CSource) -> list[Path]:
     }
     files = {
         f"{name}.hpp": "wrapper.hpp",
+        f"{name}_supervisor.h": "supervisor.h",
         f"{name}_example_posix.c": "example_posix.c",
         f"{name}_example_cortex_m.c": "example_cortex_m.c",
         "CMakeLists.txt": "CMakeLists.txt",

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "@name@.h"
+#include "@name@_supervisor.h"
 
 #ifndef CORE_CLOCK
 #define CORE_CLOCK 168000000u /* Hz */
@@ -19,6 +20,7 @@
 static @name@_state state;
 static @name@_outputs outputs;
 static uint32_t last_status;
+static @name@_supervisor supervisor;
 
 void SysTick_Handler(void);
 
@@ -33,11 +35,12 @@ static void read_inputs(@name@_inputs *given)
     *given = inputs;
 }
 
-/* Put the outputs where they act, and decide what a flag of the status word means for your machine. */
-static void write_outputs(const @name@_outputs *given, uint32_t status)
+/* Put the outputs where they act; of a command only the share that the supervisor leaves. */
+static void write_outputs(const @name@_outputs *given, uint32_t status, float share)
 {
     (void)given;
     (void)status;
+    (void)share;
 }
 #endif
 
@@ -47,7 +50,7 @@ void SysTick_Handler(void)
 
     read_inputs(&inputs);
     last_status = @name@_step(&state, &inputs, &outputs);
-    write_outputs(&outputs, last_status);
+    write_outputs(&outputs, last_status, @name@_supervise(&supervisor, last_status));
 }
 
 int main(void)
@@ -59,7 +62,7 @@ int main(void)
     SYST_CVR = 0u;
     SYST_CSR = 7u; /* processor clock, interrupt, on */
     for (;;) {
-#if defined(__GNUC__)
+#if defined(__GNUC__) && defined(__arm__)
         __asm__ volatile("wfi"); /* sleeps until the next interrupt */
 #endif
     }

@@ -8,6 +8,7 @@
 #include <time.h>
 
 #include "@name@.h"
+#include "@name@_supervisor.h"
 
 #define PERIOD @nanoseconds@L /* ns */
 
@@ -19,13 +20,11 @@ static void read_inputs(@name@_inputs *given)
     *given = inputs;
 }
 
-/* Put the outputs where they act, and decide what a flag of the status word means for your machine. */
-static void write_outputs(const @name@_outputs *outputs, uint32_t status)
+/* Put the outputs where they act; of a command only the share that the supervisor leaves. */
+static void write_outputs(const @name@_outputs *outputs, uint32_t status, float share)
 {
-    const uint32_t unsure = @NAME@_INPUT_HELD | @NAME@_INPUT_OUT_OF_RANGE | @NAME@_INPUT_JUMPED | @NAME@_INPUT_STALE |
-                            @NAME@_STATE_RESTARTED | @NAME@_OUTPUT_HELD;
-    if ((status & unsure) != 0u) {
-        (void)fprintf(stderr, "status 0x%lx\n", (unsigned long)status);
+    if (share < 1.0f) {
+        (void)fprintf(stderr, "status 0x%lx, share %g\n", (unsigned long)status, (double)share);
     }
     (void)outputs;
 }
@@ -33,6 +32,7 @@ static void write_outputs(const @name@_outputs *outputs, uint32_t status)
 int main(int count, char *words[])
 {
     static @name@_state state;
+    static @name@_supervisor supervisor;
     struct timespec next;
     const long samples = count > 1 ? strtol(words[1], NULL, 10) : -1L;
 
@@ -44,7 +44,8 @@ int main(int count, char *words[])
         @name@_outputs outputs;
 
         read_inputs(&inputs);
-        write_outputs(&outputs, @name@_step(&state, &inputs, &outputs));
+        const uint32_t status = @name@_step(&state, &inputs, &outputs);
+        write_outputs(&outputs, status, @name@_supervise(&supervisor, status));
         next.tv_nsec += PERIOD;
         while (next.tv_nsec >= 1000000000L) {
             next.tv_nsec -= 1000000000L;

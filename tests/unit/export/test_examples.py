@@ -1,0 +1,115 @@
+"""The programs beside a generated step compile and run; the supervisor does what its header says."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+
+import pytest
+
+from nlsdesign.export import CSource, export_c, write_examples
+from nlsdesign.export.c.guarded_step import (
+    COMMAND_SLOWED,
+    INPUT_HELD,
+    INPUT_JUMPED,
+    INPUT_STALE,
+    NOT_STARTED,
+    STATE_RESTARTED,
+    WAITING,
+    index_bit,
+)
+from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library, run_compiler
+from tests.hand_built import observer
+
+ADAPTER = """
+#include "loop_supervisor.h"
+#pragma GCC visibility push(default)
+static loop_supervisor supervisor;
+void reset(void) { supervisor = (loop_supervisor){0}; }
+double share(uint32_t status) { return (double)loop_supervise(&supervisor, status); }
+"""
+CLASS = """
+#include "loop.hpp"
+int main()
+{
+    loop one;
+    loop::inputs_type inputs{};
+    (void)one.step(inputs, 1000u);
+    (void)one.step(inputs, 1000u);
+    return one.status() == LOOP_SAMPLE_REPEATED ? 0 : 1;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> CSource:
+    made = export_c(observer(), tmp_path_factory.mktemp("c"), name="loop")
+    assert all(file.is_file() for file in write_examples(made))
+    return made
+
+
+@pytest.fixture
+def supervisor(source: CSource, tmp_path):
+    adapter = tmp_path / "adapter.c"
+    adapter.write_text(ADAPTER)
+    library = compile_library(
+        [adapter], tmp_path / "supervisor.so", include=[source.header.parent], flags=["-std=c99"]
+    )
+    loaded = ctypes.CDLL(str(library))
+    loaded.share.restype = ctypes.c_double
+    return loaded
+
+
+def test_the_program_on_a_posix_timer_runs(source: CSource, tmp_path) -> None:
+    program, folder = tmp_path / "program", source.header.parent
+    run_compiler(
+        [*STRICT, "-I", folder, source.source, folder / "loop_example_posix.c", "-lm", "-o", program],
+        about="the example",
+    )
+    done = subprocess.run([program, "3"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    run_compiler(
+        [*STRICT, "-I", folder, "-c", folder / "loop_example_cortex_m.c", "-o", tmp_path / "timer.o"],
+        about="the example",
+    )
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
+def test_the_class_knows_late_and_repeated_samples(source: CSource, tmp_path) -> None:
+    (tmp_path / "main.cpp").write_text(CLASS)
+    run_compiler(["-std=c99", "-c", source.source, "-o", tmp_path / "step.o"], about="the step")
+    build = ["g++", "-std=c++11", "-Wall", "-Wextra", "-Werror", f"-I{source.header.parent}"]
+    files = [tmp_path / "main.cpp", tmp_path / "step.o", "-lm", "-o", tmp_path / "main"]
+    subprocess.run([*build, *files], check=True, timeout=120)
+    assert subprocess.run([tmp_path / "main"], timeout=60).returncode == 0
+
+
+def test_ten_faulty_samples_more_than_good_ones_cut_and_six_derate(supervisor) -> None:
+    lost = INPUT_HELD | index_bit(0)
+    assert [supervisor.share(lost) for _ in range(5)] == [1.0] * 5
+    assert [supervisor.share(0) for _ in range(5)] == [1.0] * 5
+    shares = [supervisor.share(INPUT_JUMPED | index_bit(0)) for _ in range(10)]
+    assert shares == pytest.approx([1.0] * 5 + [0.8, 0.6, 0.4, 0.2, 0.0])
+    # A cut stays until it is reset.
+    assert [supervisor.share(0) for _ in range(100)] == [0.0] * 100
+    supervisor.reset()
+    assert supervisor.share(0) == 1.0
+
+
+def test_good_samples_take_back_what_was_derated(supervisor) -> None:
+    assert [supervisor.share(INPUT_HELD) for _ in range(8)][-1] == pytest.approx(0.4)
+    assert [supervisor.share(0) for _ in range(3)] == pytest.approx([0.6, 0.8, 1.0])
+
+
+@pytest.mark.parametrize("grave", [STATE_RESTARTED, INPUT_STALE | index_bit(0)])
+def test_a_dead_encoder_and_a_damaged_state_cut_at_once(supervisor, grave: int) -> None:
+    assert supervisor.share(grave) == 0.0
+    assert supervisor.share(0) == 0.0
+
+
+def test_nothing_acts_before_the_first_reading_and_commands_that_ask_too_much_are_no_fault(
+    supervisor,
+) -> None:
+    assert [supervisor.share(word) for word in (NOT_STARTED, WAITING, 0)] == [0.0, 0.0, 1.0]
+    assert [supervisor.share(COMMAND_SLOWED) for _ in range(50)] == [1.0] * 50
