@@ -17,7 +17,7 @@ from ...model.flat import FlatModel
 from ..files import write_all
 from .c_text import Real, comment, identifier, signature
 from .elementary import elementary_functions
-from .guarded_step import MOST, STATUS_BITS, first_outputs, index_bit
+from .guarded_step import STATUS_BITS, first_outputs, index_bit
 from .programs import selftest_source
 from .provenance import interface_version, number_lines, origin_lines, origin_macros, stamped
 from .writer import (
@@ -167,20 +167,14 @@ def source_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) ->
         "settled": settled,
         "take": take_statements(c),
         "period": str(max(2, round(1e6 * float(model.sample_time or 0.0)))),
-        "missed": _missed_readings(c),
+        "missed": [
+            f"lacking(&state->readings[{reading.number}], (elapsed + PERIOD / 2u) / PERIOD - 1u);"
+            for reading in c.readings.values()
+        ],
         "body": body,
         **blocks,
     }
     return c.filled("controller.c", _heads(c.name) | values)
-
-
-def _missed_readings(c: CWriter) -> list[str]:
-    """Return the statements by which readings count the samples that are missing before a late one."""
-    lines = ["const uint32_t lacking = (elapsed + PERIOD / 2u) / PERIOD - 1u;"] if c.readings else []
-    for reading in c.readings.values():
-        missed = f"state->readings[{reading.number}].missed"
-        lines.append(f"{missed} = lacking < {MOST}u - {missed} ? {missed} + lacking : {MOST}u;")
-    return lines
 
 
 def _title(model: FlatModel) -> list[str]:

@@ -73,3 +73,9 @@ static uint32_t plausible(@real@ given, @real@ mover, const reading_limits *can,
     }
     return resuming;
 }
+
+/* Counts samples that did not come as missing readings. */
+static void lacking(@name@_reading *seen, uint32_t samples)
+{
+    seen->missed = samples < @MOST@u - seen->missed ? seen->missed + samples : @MOST@u;
+}

@@ -193,6 +193,12 @@ static uint32_t plausible(float given, float mover, const reading_limits *can, s
     return resuming;
 }
 
+/* Counts samples that did not come as missing readings. */
+static void lacking(scheduled_damper_reading *seen, uint32_t samples)
+{
+    seen->missed = samples < 1000000u - seen->missed ? seen->missed + samples : 1000000u;
+}
+
 /* Takes over one parameter, unless it is not finite or outside its range. */
 static void take_over(float given, float lowest, float highest, float *taken, uint32_t which, uint32_t *status)
 {
@@ -354,8 +360,7 @@ uint32_t scheduled_damper_step_at(
     } else {
         if (known != 0u && elapsed >= PERIOD + PERIOD / 2u) {
             status = SCHEDULED_DAMPER_SAMPLE_LATE;
-            const uint32_t lacking = (elapsed + PERIOD / 2u) / PERIOD - 1u;
-            state->readings[0].missed = lacking < 1000000u - state->readings[0].missed ? state->readings[0].missed + lacking : 1000000u;
+            lacking(&state->readings[0], (elapsed + PERIOD / 2u) / PERIOD - 1u);
         }
         clock->last = microseconds;
         clock->running = 1u;
