@@ -105,7 +105,7 @@ def test_what_is_no_noise_is_not_taken_for_it(
 
 
 def test_counts_that_hide_what_a_torque_does_show_no_colour() -> None:
-    assert turned(SLOW, count=3e-2)[0].noise.evidence["ball.torque"] == "white only"
+    assert turned(SLOW, count=3e-3)[0].noise.evidence["ball.torque"] == "white only"
 
 
 @pytest.mark.long_cases("belt_axis")
