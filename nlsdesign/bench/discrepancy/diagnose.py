@@ -394,8 +394,8 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     for step in steps:
         judged = comparison.judged(step.chosen) if step.equals else ()
         differ = {
-            h.newest.effect: where_they_differ(judged, comparison.judged(h))
-            for h in step.equals[:_MOST_ALIASES]
+            name: where_they_differ(judged, comparison.judged(h))
+            for name, h in list(zip(step.aliases, step.equals, strict=True))[:_MOST_ALIASES]
         }
         sentences += advice(step.effect, differ)
     return (*sentences, *more_excitation(fits))
@@ -454,7 +454,7 @@ def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, left: 
         candidate.effect,
         candidate.location,
         _numbers(last, candidate, written.added[place]),
-        tuple(h.newest.effect for h in step.equals),
+        step.aliases,
         step.share,
         candidate.signature,
         candidate.source,
