@@ -49,9 +49,9 @@ _OWN = 0.5
 """Share of the floor of a block that comes from the noise of a signal, at least, for the block to show it."""
 _CONTRADICTED = 4.0
 """Standard errors by which a test may be missed: some forty are made, and the model is not exact."""
-_BESIDE = 0.1
+_BESIDE = (0.003, 0.03, 0.1)
 """Noise in the rows of a block beside that of the signal, in the variance of its white one: what is taken of
-counts, and what the filter passes of frequencies at which it passes next to nothing."""
+counts, and what a filter passes where it passes next to nothing. The likeliest is taken."""
 _MOST_ROWS, _LEAST_ROWS, _TIMES, _LAGS, _CLASSES = 400, 40, 12, 3, 3
 _LONGEST = 0.1
 """Share of a record after which a process has forgotten all but 37 %, at most: what is slower is not seen."""
@@ -168,17 +168,19 @@ def _likeliest(
         return np.asarray(lags[apart], dtype=np.float64)
 
     white = behind(0.0)
-    unit, own = rows.share / (noise.level[signal] ** 2 * white[0, 0]), np.eye(len(rows.left))
-    beside = (1.0 - min(rows.share, 1.0) + _BESIDE) * own
+    unit = rows.share / (noise.level[signal] ** 2 * white[0, 0])
+    others = 1.0 - min(rows.share, 1.0)
     best, result = -math.inf, (Colour(noise.level[signal] ** 2, ()), rows.left)
     for time in _times(record):
         fit = fitted_at(time, bands, record.step)
-        factor = np.linalg.cholesky(unit * (fit.white * white + fit.variance * behind(time)) + beside)
-        whitened = solve_triangular(factor, rows.left, lower=True)
-        likelihood = -0.5 * float(whitened @ whitened) - float(np.sum(np.log(np.diag(factor))))
-        if likelihood - 0.5 * fit.deviance > best:
-            best = likelihood - 0.5 * fit.deviance
-            result = Colour(fit.white, (NoisePart(fit.variance, time),)), whitened
+        known = unit * (fit.white * white + fit.variance * behind(time))
+        for beside in _BESIDE:
+            factor = np.linalg.cholesky(known + (others + beside) * np.eye(len(known)))
+            whitened = solve_triangular(factor, rows.left, lower=True)
+            likelihood = -0.5 * float(whitened @ whitened) - float(np.sum(np.log(np.diag(factor))))
+            if likelihood - 0.5 * fit.deviance > best:
+                best = likelihood - 0.5 * fit.deviance
+                result = Colour(fit.white, (NoisePart(fit.variance, time),)), whitened
     return result
 
 
