@@ -315,3 +315,14 @@ def plain_terms(block: Block, record: Record, span: float) -> Iterator[Array]:
         rate = derivative(place, record.step, order=1, span=span)
         yield from (place, np.sin(place), np.cos(place), rate, rate * np.abs(rate))
         yield from (np.sign(rate) * size for size in (1.0, *inputs))
+
+
+def functions_of_motion(block: Block, record: Record, span: float) -> Iterator[Array]:
+    """Yield what a block may lack that goes with its motion, as friction over the place or a delay does."""
+    yield from plain_terms(block, record, span)
+    for signal in dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0):
+        place = record.trace[signal]
+        rate = derivative(place, record.step, order=1, span=span)
+        for wave in (np.sin(place), np.cos(place)):
+            yield np.sign(rate) * wave
+        yield np.gradient(derivative(place, record.step, order=2), record.step)

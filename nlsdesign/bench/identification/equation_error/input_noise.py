@@ -22,7 +22,7 @@ Source: Söderström and Stoica 1989, chapter 11 (tests of whiteness and of inde
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,9 +32,8 @@ from scipy.linalg import solve_triangular
 from ....foundation.arrays import Array
 from ..filters import derivative
 from ..records.measurement import Record, RecordSet
-from .block import Block
 from .block_noise import measured_inputs, output_slopes
-from .inferred_sampling import SeenBlock, freed, plain_terms, rows_of
+from .inferred_sampling import SeenBlock, freed, functions_of_motion, rows_of
 from .noise import Band, Colour, Noise, NoisePart, Stretch, bands_of, fitted_at, scatter
 
 _SURELY = 3.0
@@ -66,85 +65,16 @@ def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[SeenB
     for signal in dict.fromkeys(d.signal for d in drives if d.signal not in {*moving, *targets}):
         if noise.rounded[signal] or noise.parts.get(signal):
             continue
-        shown = {
-            record.name: bands
-            for record in records.deciding
-            if (bands := _above_motion(record, counts, signal, noise.level[signal]))
-        }
+        read = _Signal(signal, noise)
+        above = {r.name: read.above_motion(r, counts) for r in records.deciding}
+        shown = {name: bands for name, bands in above.items() if bands}
         for each in seen if shown else ():
-            colours = _colours(each, records, noise, signal, shown)
+            colours = read.colours(each, records.deciding, shown)
             if colours:
                 lengths = [r.step * len(r.trace) for r in records.deciding if r.name in colours]
                 noise = noise.with_colours(signal, colours, lengths)
                 break
     return noise
-
-
-def _above_motion(record: Record, counts: Mapping[str, float], signal: str, white: float) -> list[Band]:
-    """Return the bands of a signal above all motion; none where they look white, or may be real."""
-    highest, hidden = 0.0, 0.0
-    spent = bands_of([Stretch(record.trace[signal], record.step, 0)])
-    for name, count in counts.items():
-        unseen = count**2 / 4.0
-        moved = bands_of([Stretch(record.trace[name], record.step, 0)])
-        costs = {
-            own.frequency: own.density / (motion.density * own.frequency**4)
-            for motion, own in zip(moved, spent, strict=True)
-            if motion.density > unseen * math.exp(_SURELY * scatter(motion.number))
-        }
-        if costs:
-            highest = max(highest, max(costs))
-            hidden = max(hidden, unseen * min(costs.values()))
-    above = [band for band in spent if band.frequency > highest][1:]  # the next band is partly below
-    if not counts or len(above) < _LEAST_BANDS or hidden * above[0].frequency ** 4 >= white**2:
-        return []
-    plain = fitted_at(0.0, above, record.step).deviance
-    best = min(fitted_at(time, above, record.step).deviance for time in _times(record))
-    return above if best < plain - _SEEN else []
-
-
-def _times(record: Record) -> list[float]:
-    return [float(t) for t in np.geomspace(record.step, _LONGEST * record.step * len(record.trace), _TIMES)]
-
-
-def _colours(
-    seen: SeenBlock, records: RecordSet, noise: Noise, signal: str, shown: Mapping[str, list[Band]]
-) -> dict[str, Colour]:
-    """Return the colour of a signal in each record that shows it; none where one contradicts."""
-    block, filters, floors = seen
-    chosen = [record for record in records.deciding if record.name in floors]
-    shares = {record.name: _share(seen, record, noise, signal) for record in chosen}
-    if not shares or float(np.mean(list(shares.values()))) < _OWN:
-        return {}
-    rows = rows_of(seen, chosen, [{}], _functions_of_motion)
-    left = freed(rows.residuals, np.column_stack([*rows.numbers.values(), rows.own]))[0][0]
-    if float(np.mean(left**2)) < _OPEN:
-        return {}
-    colours, behind = dict[str, Colour](), 0
-    for record in chosen:
-        places = floors[record.name].places
-        own, behind = left[behind : behind + len(places)], behind + len(places)
-        if record.name in shown and len(own) >= _LEAST_ROWS:
-            rows_seen = _Rows(own[:_MOST_ROWS], places[:_MOST_ROWS], shares[record.name], filters.width)
-            colour, white = _likeliest(record, signal, noise, rows_seen, shown[record.name])
-            motions = dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0)
-            rates = (derivative(record.trace[m], record.step, order=1, span=filters.span) for m in motions)
-            if any(_goes_with(white, np.abs(rate[rows_seen.places])) for rate in rates):
-                return {}
-            colours[record.name] = colour
-    return colours
-
-
-def _share(seen: SeenBlock, record: Record, noise: Noise, signal: str) -> float:
-    """Return the share of the variance of a block's noise floor that comes from the noise of a signal."""
-    block, filters, floors = seen
-    stride = max(1, round(filters.spacing / record.step))
-    gains = output_slopes(block, measured_inputs(block, record, filters.span), stride)
-    behind = noise.behind(signal, record.step, width=filters.width)
-    names = [v.name for v in block.model.inputs]
-    driven = [names.index(n) for n, d in block.drives.items() if d.signal == signal and d.order == 0]
-    power = sum((float(np.nanmean(gains[k] ** 2)) for k in driven), 0.0)
-    return power * behind**2 / float(np.mean(floors[record.name].sigma ** 2))
 
 
 class _Rows(NamedTuple):
@@ -153,35 +83,103 @@ class _Rows(NamedTuple):
     left: Array
     places: NDArray[np.int64]
     share: float
-    width: float
+    width: float  # of the filter in s
 
 
-def _likeliest(
-    record: Record, signal: str, noise: Noise, rows: _Rows, bands: Sequence[Band]
-) -> tuple[Colour, Array]:
-    """Return the colour of a signal by bands above all motion and rows of a block, and the whitened rows."""
-    apart = np.abs(rows.places[:, None] - rows.places[None, :])
+class _Signal(NamedTuple):
+    """A signal whose colour is looked for, with all noise as it is without that."""
 
-    def behind(time: float) -> Array:
-        count = int(apart.max())
-        lags = noise.covariance(signal, record.step, width=rows.width, time=time, count=count)
-        return np.asarray(lags[apart], dtype=np.float64)
+    name: str
+    noise: Noise
 
-    white = behind(0.0)
-    unit = rows.share / (noise.level[signal] ** 2 * white[0, 0])
-    others = 1.0 - min(rows.share, 1.0)
-    best, result = -math.inf, (Colour(noise.level[signal] ** 2, ()), rows.left)
-    for time in _times(record):
-        fit = fitted_at(time, bands, record.step)
-        known = unit * (fit.white * white + fit.variance * behind(time))
-        for beside in _BESIDE:
-            factor = np.linalg.cholesky(known + (others + beside) * np.eye(len(known)))
-            whitened = solve_triangular(factor, rows.left, lower=True)
-            likelihood = -0.5 * float(whitened @ whitened) - float(np.sum(np.log(np.diag(factor))))
-            if likelihood - 0.5 * fit.deviance > best:
-                best = likelihood - 0.5 * fit.deviance
-                result = Colour(fit.white, (NoisePart(fit.variance, time),)), whitened
-    return result
+    def above_motion(self, record: Record, counts: Mapping[str, float]) -> list[Band]:
+        """Return the bands of the signal above all motion; none where they look white, or may be real."""
+        highest, hidden = 0.0, 0.0
+        spent = bands_of([Stretch(record.trace[self.name], record.step, 0)])
+        for name, count in counts.items():
+            unseen = count**2 / 4.0
+            moved = bands_of([Stretch(record.trace[name], record.step, 0)])
+            costs = {
+                own.frequency: own.density / (motion.density * own.frequency**4)
+                for motion, own in zip(moved, spent, strict=True)
+                if motion.density > unseen * math.exp(_SURELY * scatter(motion.number))
+            }
+            if costs:
+                highest = max(highest, max(costs))
+                hidden = max(hidden, unseen * min(costs.values()))
+        above = [band for band in spent if band.frequency > highest][1:]  # the next band is partly below
+        if not counts or len(above) < _LEAST_BANDS:
+            return []
+        if hidden * above[0].frequency ** 4 >= self.noise.level[self.name] ** 2:
+            return []
+        plain, *others = (fitted_at(time, above, record.step).deviance for time in (0.0, *_times(record)))
+        return above if min(others) < plain - _SEEN else []
+
+    def colours(
+        self, seen: SeenBlock, records: Sequence[Record], shown: Mapping[str, list[Band]]
+    ) -> dict[str, Colour]:
+        """Return the colour of the signal in each record that shows it; none where one contradicts."""
+        block, filters, floors = seen
+        chosen = [record for record in records if record.name in floors]
+        shares = {record.name: self.share(seen, record) for record in chosen}
+        if not shares or float(np.mean(list(shares.values()))) < _OWN:
+            return {}
+        rows = rows_of(seen, chosen, [{}], functions_of_motion)
+        left = freed(rows.residuals, np.column_stack([*rows.numbers.values(), rows.own]))[0][0]
+        if float(np.mean(left**2)) < _OPEN:
+            return {}
+        motions = dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0)
+        colours, behind = dict[str, Colour](), 0
+        for record in chosen:
+            places = floors[record.name].places
+            own, behind = left[behind : behind + len(places)], behind + len(places)
+            if record.name in shown and len(own) >= _LEAST_ROWS:
+                first = _Rows(own[:_MOST_ROWS], places[:_MOST_ROWS], shares[record.name], filters.width)
+                colour, white = self.likeliest(record, first, shown[record.name])
+                rates = (
+                    derivative(record.trace[m], record.step, order=1, span=filters.span) for m in motions
+                )
+                if any(_goes_with(white, np.abs(rate[first.places])) for rate in rates):
+                    return {}
+                colours[record.name] = colour
+        return colours
+
+    def share(self, seen: SeenBlock, record: Record) -> float:
+        """Return the share of the variance of a block's floor that comes from the noise of the signal."""
+        block, filters, floors = seen
+        stride = max(1, round(filters.spacing / record.step))
+        gains = output_slopes(block, measured_inputs(block, record, filters.span), stride)
+        behind = self.noise.behind(self.name, record.step, width=filters.width)
+        names = [v.name for v in block.model.inputs]
+        driven = [names.index(n) for n, d in block.drives.items() if d.signal == self.name and d.order == 0]
+        power = sum((float(np.nanmean(gains[k] ** 2)) for k in driven), 0.0)
+        return power * behind**2 / float(np.mean(floors[record.name].sigma ** 2))
+
+    def likeliest(self, record: Record, rows: _Rows, bands: Sequence[Band]) -> tuple[Colour, Array]:
+        """Return the colour by bands above all motion and rows of a block, and these rows whitened."""
+        apart = np.abs(rows.places[:, None] - rows.places[None, :])
+        count, behind = int(apart.max()), dict[float, Array]()
+        for time in (0.0, *_times(record)):
+            lags = self.noise.covariance(self.name, record.step, width=rows.width, time=time, count=count)
+            behind[time] = lags[apart]
+        level, others = self.noise.level[self.name] ** 2, 1.0 - min(rows.share, 1.0)
+        best, result = -math.inf, (Colour(level, ()), rows.left)
+        for time in _times(record):
+            fit = fitted_at(time, bands, record.step)
+            own = fit.white * behind[0.0] + fit.variance * behind[time]
+            for beside in _BESIDE:
+                whole = rows.share / (level * behind[0.0][0, 0]) * own + (others + beside) * np.eye(len(own))
+                factor = np.linalg.cholesky(whole)
+                whitened = solve_triangular(factor, rows.left, lower=True)
+                likelihood = -0.5 * float(whitened @ whitened) - float(np.sum(np.log(np.diag(factor))))
+                if likelihood - 0.5 * fit.deviance > best:
+                    best = likelihood - 0.5 * fit.deviance
+                    result = Colour(fit.white, (NoisePart(fit.variance, time),)), whitened
+        return result
+
+
+def _times(record: Record) -> list[float]:
+    return [float(t) for t in np.geomspace(record.step, _LONGEST * record.step * len(record.trace), _TIMES)]
 
 
 def _goes_with(white: Array, speed: Array) -> bool:
@@ -194,14 +192,3 @@ def _goes_with(white: Array, speed: Array) -> bool:
     ]
     misses += [float(white[k:] @ white[:-k]) / math.sqrt(count) for k in range(1, _LAGS + 1)]
     return bool(np.max(np.abs(misses)) > _CONTRADICTED)
-
-
-def _functions_of_motion(block: Block, record: Record, span: float) -> Iterator[Array]:
-    """Yield what a block may lack that goes with its motion, as friction over the place or a delay does."""
-    yield from plain_terms(block, record, span)
-    for signal in dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0):
-        place = record.trace[signal]
-        rate = derivative(place, record.step, order=1, span=span)
-        for wave in (np.sin(place), np.cos(place)):
-            yield np.sign(rate) * wave
-        yield np.gradient(derivative(place, record.step, order=2), record.step)
