@@ -90,7 +90,7 @@ def test_another_record_of_the_bench_has_the_mean_of_the_colours() -> None:
 @pytest.mark.parametrize(
     ("clause", "no_clause", "what"),
     [
-        ("_SEEN", -np.inf, {"slow": 0.5 * WHITE, "memory": 1.0}),
+        ("_SEEN", -np.inf, {"slow": 0.3 * WHITE, "memory": 0.5}),
         ("_CONTRADICTED", np.inf, {"slow": SLOW, "beside_reversals": 1.5}),
         ("_CONTRADICTED", np.inf, {"slow": SLOW, "ripple": 0.2}),
     ],
