@@ -157,7 +157,8 @@ def force_of(strip: Strip, missing: MissingInStrip, way: np.ndarray) -> np.ndarr
         if missing.softening:
             largest = max(largest, strain)
             stress *= 1.0 - missing.softening * (1.0 - strain / largest if largest else 0.0)
-        forces[i] = AREA * stress
+        # What hangs slack in its grips, or on a cable that is too long, cannot push.
+        forces[i] = AREA * (max(stress, 0.0) if missing.slack else stress)
     return forces
 
 

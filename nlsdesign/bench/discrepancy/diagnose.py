@@ -26,7 +26,7 @@ from ...model.origin import derived
 from ..identification.equation_error.block import Block
 from ..identification.equation_error.block_noise import LEAST_COVERED
 from ..identification.equation_error.evidence import Bench
-from ..identification.equation_error.inferred_sampling import no_terms
+from ..identification.equation_error.inferred_sampling import no_terms, plain_terms
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from .effects import Candidate
@@ -170,13 +170,17 @@ class _Case:
     def read_as_inferred_beside(self, outcome: Outcome, decision: _Decision) -> _Case | None:
         """Return the case with inputs read between their samples as records tell it beside what was found.
 
-        Backlash that nobody declared, for instance, hides at first that a current is held. Where nothing may
-        be named, it is asked beside the best that closes every block, as if nothing were missing then: inputs
-        that are read half a sample early spoil the quickest record, and a right name with it. Nothing is
-        returned where the inputs are read so already.
+        Backlash that nobody declared, for instance, hides at first that a current is held. Where what was
+        named leaves no block open, it is asked as if nothing were missing: plain terms would hide a shift.
+        Where nothing may be named, it is asked so beside the best that closes every block: inputs that are
+        read half a sample early spoil the quickest record, and a right name with it. Nothing is returned
+        where the inputs are read so already.
         """
         if outcome.steps:
-            return self._read_as(self.bench.inferred(self._blocks(outcome.last.fitted)), _SAME_SAMPLING)
+            lacks = no_terms if outcome.complete else plain_terms
+            return self._read_as(
+                self.bench.inferred(self._blocks(outcome.last.fitted), lacks), _SAME_SAMPLING
+            )
         if decision.verdict not in ("unknown", "undecidable"):
             return None
         fitted = (each.hypothesis for each in outcome.tried)
@@ -390,8 +394,8 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     for step in steps:
         judged = comparison.judged(step.chosen) if step.equals else ()
         differ = {
-            h.newest.effect: where_they_differ(judged, comparison.judged(h))
-            for h in step.equals[:_MOST_ALIASES]
+            name: where_they_differ(judged, comparison.judged(h))
+            for name, h in list(zip(step.aliases, step.equals, strict=True))[:_MOST_ALIASES]
         }
         sentences += advice(step.effect, differ)
     return (*sentences, *more_excitation(fits))
@@ -450,7 +454,7 @@ def _named(last: Hypothesis, written: Hypothesis, step: Step, place: int, left: 
         candidate.effect,
         candidate.location,
         _numbers(last, candidate, written.added[place]),
-        tuple(h.newest.effect for h in step.equals),
+        step.aliases,
         step.share,
         candidate.signature,
         candidate.source,

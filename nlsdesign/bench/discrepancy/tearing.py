@@ -445,8 +445,11 @@ class _Tearing:
         value = behind_ratio(measured, seen, self._known)
         if order == 0:
             return value
-        # A reading is a static function of what it reads, so rates follow by its slope.
-        return ca.jacobian(value, self._reading(measured, 0)) * self._reading(measured, order)
+        # A reading is a static function of what it reads, so rates follow by its slope, which may change.
+        slope = ca.jacobian(value, self._reading(measured, 0))
+        bend = ca.simplify(ca.jacobian(slope, self._reading(measured, 0)))
+        derived = slope * self._reading(measured, order)
+        return derived if order < 2 or bend.is_zero() else derived + bend * self._reading(measured, 1) ** 2
 
     def _replacements(self) -> Iterator[tuple[str, Expression]]:
         """Yield the variables of the model that follow from readings, with what they follow as."""

@@ -12,6 +12,7 @@ from ....components import (
     CapstanFriction,
     Element,
     InextensibleCable,
+    PullOnly,
     Slack,
     Specimen,
     StretchyCable,
@@ -66,8 +67,23 @@ def _slack(assembly: Assembly, path: str) -> Iterator[Edit]:
     def around(name: str, element: Element) -> Element:
         return Slack(members=((name, element),), length=number(1e-4, "m")).smooth()
 
-    length = Unknown(f"{path.rpartition('.')[0]}.slack.length", (0.02, 0.1), 1e-4, 0.8, f"{path}.extension")
-    yield Edit(wrapped(assembly, path, "slack", around), (length,))
+    edited = wrapped(assembly, path, "slack", around)
+    yield Edit(edited, (_too_long(f"{path.rpartition('.')[0]}.slack", path),))
+
+
+def _too_long(slack: str, path: str) -> Unknown:
+    return Unknown(f"{slack}.length", (0.02, 0.1), 1e-4, 0.8, f"{path}.extension")
+
+
+def _slack_in_grips(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Yield a piece that hangs slack between its grips, which then cannot push whatever it remembers."""
+
+    def around(inner: str, element: Element) -> Element:
+        slack = Slack(members=((inner, element),), length=number(1e-4, "m")).smooth()
+        return PullOnly(members=(("slack", slack),), width=number(1e-3, "N"))
+
+    edited = wrapped(assembly, name, "piece", around, read_outside=True)
+    yield Edit(edited, (_too_long(f"{name}.slack", name),))
 
 
 def _tied_specimens(assembly: Assembly) -> list[str]:
@@ -154,6 +170,13 @@ cable_slack = Effect(
     (
         Form(
             _pulled, _slack, "no force until a certain extension, the same at any speed", "geometry", "slack"
+        ),
+        Form(
+            _tied_specimens,
+            _slack_in_grips,
+            "no force until a certain extension, the same in every cycle, and never a push",
+            "geometry",
+            "slack",
         ),
         Form(
             _tied_specimens,

@@ -275,7 +275,7 @@ spring_damping = Effect(
 )
 constant_force = Effect(
     "constant_force",
-    "A force that never changes on a freely sliding body: an offset of the drive, a weight.",
+    "A constant force on a freely sliding body: a weight, an offset of the drive or of what reads it.",
     260,
     (
         Form(
@@ -289,7 +289,7 @@ constant_force = Effect(
 )
 constant_torque = Effect(
     "constant_torque",
-    "A torque that never changes on a freely turning body: an offset of the drive, a preloaded seal.",
+    "A constant torque on a freely turning body: a preloaded seal, an offset of the drive or of its reading.",
     75,
     (
         Form(

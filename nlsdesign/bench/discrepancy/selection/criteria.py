@@ -292,6 +292,7 @@ class Rival(Generic[T]):
     excesses: Excesses  # what it leaves
     standing: Standing = field(default_factory=Standing)  # what the fitted numbers say
     simpler: tuple[str, ...] = ()  # effects of which it is a richer form
+    place: str = ""  # where the effect sits
 
     def left_in(self, block: str) -> float:
         """Return the excess that it leaves in a block."""
@@ -312,7 +313,10 @@ class Rival(Generic[T]):
 
 @dataclass(frozen=True, eq=False)
 class Choice(Generic[T]):
-    """The rival that is taken, and those that the records cannot tell from it, one for each effect."""
+    """The rival that is taken, and those that the records cannot tell from it.
+
+    One for each other effect, and one for each other place of its own.
+    """
 
     taken: Rival[T]
     equals: tuple[Rival[T], ...]
@@ -329,6 +333,9 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
         spoilt = sum(max(0.0, e.excess - before[n].excess) for n, e in after if n != block)
         return rival.left_in(block) + spoilt
 
+    def in_all(rival: Rival[T]) -> tuple[float, float]:
+        return left(rival), total_excess(rival.excesses)
+
     able = [rival for rival in rivals if not rival.objections(criteria, before)]
     able = [rival for rival in able if explained(before, rival.excesses).get(block, 0.0) > 0.0] or able
     if not able:
@@ -339,15 +346,17 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     simplest = min(rival.numbers for rival in near)
     alike = dict[str, Rival[T]]()
     for rival in reversed(near):
-        # Of several forms or places of one effect the best is told.
-        if rival.numbers == simplest and left(rival) <= left(alike.get(rival.effect, rival)):
+        # Of several forms or places of one effect the best is told, by what it leaves elsewhere if need be.
+        if rival.numbers == simplest and in_all(rival) <= in_all(alike.get(rival.effect, rival)):
             alike[rival.effect] = rival
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     taken = alike.pop(next(reversed(alike)))
     unknown = [rival for rival in rivals if rival.is_undecided(criteria, before)]
     if any(imitates(criteria, taken, rival, block) for rival in unknown):
         return None
-    return Choice(taken, tuple(alike.values()))
+    elsewhere = {r.place: r for r in near if r.effect == taken.effect and r.numbers == simplest}
+    elsewhere.pop(taken.place, None)
+    return Choice(taken, (*alike.values(), *elsewhere.values()))
 
 
 def predict_alike(

@@ -287,7 +287,8 @@ class _Search:
         def stands_out(step: Step) -> bool:
             """Tell whether an effect explains plainly more than any other, and than those in its class."""
             own = excesses_of(step.chosen)[step.block].excess
-            alike = (excesses_of(each)[step.block].excess / max(own, 1.0) for each in step.equals)
+            others = (each for each in step.equals if each.newest.effect != step.effect)
+            alike = (excesses_of(each)[step.block].excess / max(own, 1.0) for each in others)
             nearest = min(alike, default=math.inf)
             return criteria.is_outstanding(min(step.distance, math.log(max(nearest, 1e-300))))
 

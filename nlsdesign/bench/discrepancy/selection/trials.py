@@ -30,13 +30,19 @@ class Step:
     # gain, gains: what prediction gains by it, over all records and on each
     gain: Gain = _UNKNOWN_GAIN
     gains: Mapping[str, float] = field(default_factory=dict)
-    # equals: hypotheses with another last effect that predict as well with as few numbers
+    # equals: hypotheses with another last effect, or that at another place, that predict as well
     equals: tuple[Hypothesis, ...] = ()
 
     @property
     def effect(self) -> str:
         """Identifier of what was added."""
         return self.chosen.newest.effect
+
+    @property
+    def aliases(self) -> tuple[str, ...]:
+        """Identifiers of what predicts as well, with the place where that alone differs."""
+        added = (each.newest for each in self.equals)
+        return tuple(a.effect if a.effect != self.effect else f"{a.effect} at {a.location}" for a in added)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,4 +254,5 @@ def rival_of(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:
         after,
         standing_of(newest.unknowns, hypothesis.fits.values()),
         newest.simpler,
+        newest.location,
     )

@@ -176,6 +176,7 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     noise is remembered only where the block does not take rates of it.
     """
     step, width, span = record.step, filters.width, filters.span
+    noise = noise.in_record(record.name)
     stride = max(1, round(filters.spacing / step))
     inputs = measured_inputs(block, record, span)
     rows, covered = _rows(block, record, noise, filters, inputs)

@@ -21,6 +21,7 @@ from .block import Block
 from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
 from .inferred_sampling import Missing, SeenBlock, plain_terms, with_inferred_sampling, with_sampling
+from .input_noise import with_colour_of_inputs
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
 
@@ -98,6 +99,11 @@ class Bench:
         self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
         self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
         self._scales = {block.name: block.effort_per_drive for block in blocks}
+        if noise is None:
+            coloured = with_colour_of_inputs(self.noise, self.records, self._seen(blocks, self.floors))
+            if coloured is not self.noise:
+                self.noise = coloured
+                self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
         self._as_measured, self._floors_as_measured = self.records, dict(self.floors)
         if sampling is None:
             self.records = self.inferred(blocks)
@@ -144,20 +150,20 @@ class Bench:
         ``blocks``: of the declared model, or of a better one with the same names. ``missing``: what they may
         lack, see :mod:`.inferred_sampling`.
         """
-        seen = [
+        seen = self._seen(blocks, self._floors_as_measured)
+        return with_inferred_sampling(self._as_measured, seen, missing)
+
+    def _seen(self, blocks: Sequence[Block], floors: Mapping[tuple[str, str], BlockNoise]) -> list[SeenBlock]:
+        """Return how blocks with the names of the declared ones read the records."""
+        return [
             SeenBlock(
                 block.scaled_to(self._scales[block.name]),
                 self.filters[block.name],
-                {
-                    record: floor
-                    for (name, record), floor in self._floors_as_measured.items()
-                    if name == block.name
-                },
+                {record: floor for (name, record), floor in floors.items() if name == block.name},
             )
             for block in blocks
             if block.name in self.filters
         ]
-        return with_inferred_sampling(self._as_measured, seen, missing)
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None

@@ -43,6 +43,7 @@ _NO_FORM = 10.0
 """The same for a shift that none of the usual ways explains: it is rare, and what a model lacks looks so."""
 _LEAST = 0.05
 """Share of the noise that the numbers of a machine leave at least, where they do not make it vanish."""
+_WEIGHINGS = 2
 _MOST = 1.0
 """Samples by which two channels can be shifted against each other: half a sample of each."""
 
@@ -92,7 +93,7 @@ def _as(record: Record, sampling: Mapping[str, Sampling]) -> Record:
     return replace(record, sampling={s: form for s, form in known.items() if form is not SAMPLED})
 
 
-class _Rows(NamedTuple):
+class BlockRows(NamedTuple):
     """Residuals of a block for each form, shape (forms, rows), and what may explain them.
 
     ``numbers``: what each contributes, by name, shape (rows,); blocks may share them. ``own``: of this block,
@@ -180,9 +181,10 @@ def _asked(
     while known != (known := {name for each in asked for name in _free(each)}):
         asked += [each for each in left if known & set(_free(each))]
         left = [each for each in left if not known & set(_free(each))]
+    forms = [{signal: form} for form in _FORMS]
     try:
         plain, sharper = (
-            _likelihood([_rows(each, records.deciding, signal, terms) for each in asked]) if asked else None
+            _likelihood([rows_of(each, records.deciding, forms, terms) for each in asked]) if asked else None
             for terms in (plain_terms, missing)
         )
     except ConvergenceError:
@@ -194,16 +196,16 @@ def _free(seen: SeenBlock) -> tuple[str, ...]:
     return free_in(seen.block, [v.name for v in seen.block.model.parameters if v.spread])
 
 
-def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
+def _likelihood(blocks: Sequence[BlockRows]) -> _Likelihood | None:
     """Return how likely each form is; nothing where the blocks do not depend on it.
 
-    The residuals are freed of all terms: one for each number, and those of each block alone. What is left
-    beyond the noise scales the noise, and rows that depend on each other count as fewer: the blocks then say
-    as much less.
+    The residuals are freed of all terms: one for each number, and those of each block alone. What is left of
+    a block beyond its noise scales the noise of that block, and rows of it that depend on each other count as
+    fewer: it then says as much less, and others as much as before.
     """
     names = [*dict.fromkeys(name for each in blocks for name in each.numbers)]
     residuals = np.hstack([each.residuals for each in blocks])
-    rows, rank = _freed(residuals, _terms(blocks, names))
+    rows, rank = freed(residuals, _terms(blocks, names))
     # A balance vanishes with all of its numbers, its noise too. Where that is found, the largest is held.
     while names and np.min(np.mean(rows**2, axis=1)) < _LEAST * (1.0 - rank / rows.shape[1]):
         sizes = [
@@ -211,25 +213,48 @@ def _likelihood(blocks: Sequence[_Rows]) -> _Likelihood | None:
             for name in names
         ]
         names.pop(int(np.argmax(sizes)))
-        rows, rank = _freed(residuals, _terms(blocks, names))
-    sampled, held, averaged = rows
-    slope = held - averaged
-    information = float(slope @ slope)
-    count = rows.shape[1] - rank - 1
-    if count <= 0 or information == 0.0:
+        rows, rank = freed(residuals, _terms(blocks, names))
+    if rank + 1 >= rows.shape[1] or not np.any(rows[1] - rows[2]):
         return None
-    shift = -float(slope @ sampled) / information
-    best = sampled + shift * slope
-    scale = max(1.0, float(best @ best) / count) * rows.shape[1] / effective_size(best)
+    terms, scale = _terms(blocks, names), np.ones(rows.shape[1])
+    # What is left of a noisy block also moves the numbers that it shares with others.
+    for _ in range(_WEIGHINGS):
+        scale = _scales(blocks, rows * np.sqrt(scale), 1.0 - (rank + 1) / rows.shape[1])
+        rows, _ = freed(residuals / np.sqrt(scale), terms / np.sqrt(scale)[:, None])
+    shift, best = _best_shift(rows)
+    slope = rows[1] - rows[2]
     return _Likelihood(
-        tuple(-0.5 * float(row @ row) / scale for row in rows),
-        -0.5 * float(best @ best) / scale,
+        tuple(-0.5 * float(row @ row) for row in rows),
+        -0.5 * float(best @ best),
         shift,
-        math.sqrt(scale / information),
+        1.0 / float(np.linalg.norm(slope)),
     )
 
 
-def _terms(blocks: Sequence[_Rows], names: Sequence[str]) -> Array:
+def _best_shift(rows: Array) -> tuple[float, Array]:
+    """Return the shift in samples that leaves least of the rows of each form, and what it leaves."""
+    sampled, held, averaged = rows
+    slope = held - averaged
+    information = float(slope @ slope)
+    shift = -float(slope @ sampled) / information if information else 0.0
+    return shift, sampled + shift * slope
+
+
+def _scales(blocks: Sequence[BlockRows], rows: Array, free: float) -> Array:
+    """Return for each row the variance of the noise of its block, as many as are independent counted.
+
+    It is what the shift that suits the block best leaves of it. ``free``: share of the rows that the terms
+    have not taken.
+    """
+    scales, behind = [], 0
+    for each in blocks:
+        part, behind = rows[:, behind : behind + (n := each.residuals.shape[1])], behind + n
+        best = _best_shift(part)[1]
+        scales.append(np.full(n, max(1.0, float(best @ best) / (free * n)) * n / effective_size(best)))
+    return np.hstack(scales)
+
+
+def _terms(blocks: Sequence[BlockRows], names: Sequence[str]) -> Array:
     """Return what may explain the residuals of all blocks: numbers that they share, then terms of each."""
     bands = []
     for k, each in enumerate(blocks):
@@ -240,7 +265,7 @@ def _terms(blocks: Sequence[_Rows], names: Sequence[str]) -> Array:
     return np.vstack(bands)
 
 
-def _freed(residuals: Array, terms: Array) -> tuple[Array, int]:
+def freed(residuals: Array, terms: Array) -> tuple[Array, int]:
     """Return the residuals without what the terms can explain, and how many terms count."""
     size = np.linalg.norm(terms, axis=0)
     terms = terms[:, size > 0.0] / size[size > 0.0]
@@ -249,8 +274,10 @@ def _freed(residuals: Array, terms: Array) -> tuple[Array, int]:
     return residuals - (residuals @ basis) @ basis.T, basis.shape[1]
 
 
-def _rows(seen: SeenBlock, records: Sequence[Record], signal: str, missing: Missing) -> _Rows:
-    """Return the residuals of a block on all records for each form, with its terms."""
+def rows_of(
+    seen: SeenBlock, records: Sequence[Record], forms: Sequence[Mapping[str, Sampling]], missing: Missing
+) -> BlockRows:
+    """Return the residuals of a block on the records that it sees, for each way to read it."""
     block, filters, free = seen.block, seen.filters, _free(seen)
     chosen = [r for r in records if r.name in seen.floors]
     driven = DrivenBlock(block, free, records=chosen, span=filters.span, straightened=filters.straightened)
@@ -258,8 +285,8 @@ def _rows(seen: SeenBlock, records: Sequence[Record], signal: str, missing: Miss
     for record in chosen:
         floor = seen.floors[record.name]
         values, rows = block.model.values, []
-        for form in _FORMS:
-            read = _as(record, {signal: form})
+        for form in forms:
+            read = _as(record, form)
             response = driven.respond(driven.samples(read, values), values)
             error = (read.as_computed(block.target) if block.target else 0.0) - response.output
             rows.append((floor.filter @ error) / floor.sigma)
@@ -269,7 +296,7 @@ def _rows(seen: SeenBlock, records: Sequence[Record], signal: str, missing: Miss
         own = [(floor.filter @ term) / floor.sigma for term in missing(block, record, filters.span)]
         terms.append(np.reshape(own, (len(own), len(floor.sigma))).T)
     parts = np.vstack(slopes) * [values[name] or 1.0 for name in free]
-    return _Rows(np.hstack(residuals), dict(zip(free, parts.T, strict=True)), np.vstack(terms))
+    return BlockRows(np.hstack(residuals), dict(zip(free, parts.T, strict=True)), np.vstack(terms))
 
 
 def no_terms(_block: Block, _record: Record, _span: float) -> Iterator[Array]:
@@ -288,3 +315,14 @@ def plain_terms(block: Block, record: Record, span: float) -> Iterator[Array]:
         rate = derivative(place, record.step, order=1, span=span)
         yield from (place, np.sin(place), np.cos(place), rate, rate * np.abs(rate))
         yield from (np.sign(rate) * size for size in (1.0, *inputs))
+
+
+def functions_of_motion(block: Block, record: Record, span: float) -> Iterator[Array]:
+    """Yield what a block may lack that goes with its motion, as friction over the place or a delay does."""
+    yield from plain_terms(block, record, span)
+    for signal in dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0):
+        place = record.trace[signal]
+        rate = derivative(place, record.step, order=1, span=span)
+        for wave in (np.sin(place), np.cos(place)):
+            yield np.sign(rate) * wave
+        yield np.gradient(derivative(place, record.step, order=2), record.step)

@@ -70,6 +70,22 @@ class Stretch(NamedTuple):
     lag: int  # samples after which it was subtracted from itself, divided by √2; zero where it was not
 
 
+class Band(NamedTuple):
+    """A band of a spectrum: its middle in Hz, its density per sample, and of how many frequencies it is."""
+
+    frequency: float
+    density: float
+    number: int
+
+
+class OneProcess(NamedTuple):
+    """Variances of white noise and of one first-order process, and twice the likelihood that they lose."""
+
+    white: float
+    variance: float
+    deviance: float
+
+
 class NoisePart(NamedTuple):
     """A first-order process: its variance, and the time in s after which it has forgotten all but 37 %."""
 
@@ -113,7 +129,7 @@ def colour_of(stretches: Sequence[Stretch], duration: float = 0.0) -> Colour | N
     ``duration``: of the longest record in s, down to one period in which noise that rises is taken to rise
     on; zero to end where the stretches end.
     """
-    bands = _bands([_periodogram(s) for s in stretches if len(s.samples) > 8 * _DEGREE])
+    bands = bands_of([s for s in stretches if len(s.samples) > 8 * _DEGREE])
     if len(bands) < _LEAST_BANDS:
         return None
     step = float(np.median([s.step for s in stretches]))
@@ -163,14 +179,24 @@ def _has_one_time(frequency: Array, density: Array, count: Array, step: float) -
     """
     longest = 1.0 / (2.0 * math.pi * frequency.min())
     times = np.geomspace(step, max(2.0 * step, _STEEPER * longest), 6 * _TIMES_PER_DECADE)
-    corners = [_deviance(_density(float(t), frequency, step), density, count) for t in times]
+    corners = [_one_process(_density(float(t), frequency, step), density, count).deviance for t in times]
     best = int(np.argmin(corners))
-    powers = [_deviance((frequency / frequency[0]) ** -power, density, count) for power in _POWERS]
+    rising = [(frequency / frequency[0]) ** -power for power in _POWERS]
+    powers = [_one_process(each, density, count).deviance for each in rising]
     return bool(times[best] <= longest and corners[best] < min(powers) - _PLAINLY_ONE)
 
 
-def _deviance(coloured: Array, density: Array, count: Array) -> float:
-    """Return twice the loss in log likelihood of white noise and one part, of bands of a periodogram."""
+def fitted_at(time: float, bands: Sequence[Band], step: float) -> OneProcess:
+    """Return the white noise and the first-order process of one time in s nearest to bands of a periodogram.
+
+    ``time``: zero for white noise alone.
+    """
+    frequency, density, count = (np.array(column) for column in zip(*bands, strict=True))
+    return _one_process(_density(time, frequency, step) if time else np.zeros_like(density), density, count)
+
+
+def _one_process(coloured: Array, density: Array, count: Array) -> OneProcess:
+    """Return the white noise and the part of one form nearest to bands of a periodogram."""
     columns, model = np.column_stack([np.ones_like(density), coloured]), density
     for _ in range(_ROUNDS):
         weights = np.sqrt(count) / model
@@ -178,7 +204,7 @@ def _deviance(coloured: Array, density: Array, count: Array) -> float:
         model = np.maximum(columns @ solution, 1e-12 * density.max())
     # A median knows as much as ln²2 of the numbers that it is taken from.
     off = np.log(np.maximum(density, 1e-300) / model)
-    return float(math.log(2.0) ** 2 * count @ off**2)
+    return OneProcess(float(solution[0]), float(solution[1]), float(math.log(2.0) ** 2 * count @ off**2))
 
 
 def _continued(frequency: Array, risen: Array, count: Array, duration: float) -> tuple[Array, Array] | None:
@@ -238,10 +264,11 @@ def _periodogram(stretch: Stretch) -> tuple[Array, Array]:
     return frequency[seen], power[seen] / gain[seen]
 
 
-def _bands(given: Sequence[tuple[Array, Array]]) -> list[tuple[float, float, int]]:
-    """Return middle, density and number of frequencies of each band, from the median of all in it."""
-    if not given:
+def bands_of(stretches: Sequence[Stretch]) -> list[Band]:
+    """Return the bands of the periodograms of some stretches, from the median of all in each."""
+    if not stretches:
         return []
+    given = [_periodogram(each) for each in stretches]
     frequency, power = (np.concatenate([pair[k] for pair in given]) for k in (0, 1))
     order = np.argsort(frequency)
     frequency, power = frequency[order], power[order]
@@ -254,12 +281,17 @@ def _bands(given: Sequence[tuple[Array, Array]]) -> list[tuple[float, float, int
         some = power[first:behind]
         # The median of an exponential distribution is ln 2 of its mean.
         middle = float(np.exp(np.mean(np.log(frequency[first:behind]))))
-        result.append((middle, float(np.median(some)) / math.log(2.0), len(some)))
+        result.append(Band(middle, float(np.median(some)) / math.log(2.0), len(some)))
         first = behind
     return result
 
 
-Evidence: TypeAlias = Literal["rest", "repetition", "white only"]
+def scatter(count: int) -> float:
+    """Return the standard error of the logarithm of the median of so many exponential numbers."""
+    return 1.0 / (math.log(2.0) * math.sqrt(count))
+
+
+Evidence: TypeAlias = Literal["rest", "repetition", "above motion", "white only"]
 """Where the colour of a noise is known from; ``white only`` where nothing shows it."""
 
 
@@ -276,6 +308,8 @@ class Noise:
     seen: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     # taps: weights of neighbouring samples with which a signal is read that is held or averaged
     taps: Mapping[str, Array] = field(default_factory=dict)
+    # colours: of a signal in each record that shows it, by signal and record
+    colours: Mapping[str, Mapping[str, Colour]] = field(default_factory=dict)
 
     def deviation(self, signal: str) -> float:
         """Return the standard deviation of the whole noise of a signal."""
@@ -297,6 +331,39 @@ class Noise:
         weights = self._weights(signal, width, 0, step, 0.0)
         parts = self.parts.get(signal, ())
         return tuple(NoisePart(variance_behind([p], weights, step), p.time) for p in parts)
+
+    def covariance(self, signal: str, step: float, *, width: float, time: float, count: int) -> Array:
+        """Return the covariance at lags of 0 to ``count`` samples of a first-order process behind a filter.
+
+        Per variance of the process. ``time``: after which it has forgotten all but 37 %, in s; zero where it
+        is white.
+        """
+        weights = self._weights(signal, width, 0, step, 0.0)
+        size = 1 << (2 * (len(weights) + count) + math.ceil(8.0 * time / step)).bit_length()
+        power: Array = np.abs(np.fft.rfft(weights, size)) ** 2
+        if time:
+            power *= _density(time, np.asarray(np.fft.rfftfreq(size, step), dtype=np.float64), step)
+        return np.asarray(np.fft.irfft(power, size)[: count + 1], dtype=np.float64)
+
+    def with_colours(self, signal: str, colours: Mapping[str, Colour], lengths: Sequence[float]) -> Noise:
+        """Return the noise with the colour of a signal in records of so many s, and elsewhere their mean."""
+        white = sum(each.white for each in colours.values()) / len(colours)
+        parts = tuple(NoisePart(p.variance / len(colours), p.time) for c in colours.values() for p in c.parts)
+        return replace(
+            self,
+            level={**self.level, signal: math.sqrt(white)},
+            parts={**self.parts, signal: parts},
+            evidence={**self.evidence, signal: "above motion"},
+            seen={**self.seen, signal: tuple(lengths)},
+            colours={**self.colours, signal: colours},
+        )
+
+    def in_record(self, name: str) -> Noise:
+        """Return the noise in one record, where that shows a colour of its own."""
+        own = {signal: of[name] for signal, of in self.colours.items() if name in of}
+        level = {signal: math.sqrt(colour.white) for signal, colour in own.items()}
+        parts = {signal: colour.parts for signal, colour in own.items()}
+        return replace(self, level={**self.level, **level}, parts={**self.parts, **parts}) if own else self
 
     def read_as(self, records: RecordSet) -> Noise:
         """Return the noise as it is behind the way in which records run between their samples.

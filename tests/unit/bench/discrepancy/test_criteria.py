@@ -323,6 +323,24 @@ def test_among_what_cannot_be_told_apart_the_first_of_the_catalogue_is_taken() -
     assert taken(rival("one", 1, 1300.0), other) == ("other",)
 
 
+def test_places_that_the_records_cannot_tell_apart_are_a_class() -> None:
+    """An encoder is late against another, or that one is early: both are said. A far worse place is not."""
+    places = {"motor": 105.0, "joint": 100.0, "third": 5e3}
+    rivals = [replace(rival("late", 1, left), place=place) for place, left in places.items()]
+    choice = choose(RULE, FIRST, rivals, "spring")
+    assert choice is not None
+    assert choice.taken.place == "joint"
+    assert [(r.effect, r.place) for r in choice.equals] == [("late", "motor")]
+
+
+def test_of_two_places_that_close_a_block_the_one_that_closes_the_others_is_told() -> None:
+    rivals = [replace(rival("disc", 2, 0.0, left), place=str(left)) for left in (200.0, 0.0)]
+    for order in (rivals, rivals[::-1]):
+        choice = choose(RULE, FIRST, order, "spring")
+        assert choice is not None
+        assert choice.taken.place == "0.0"
+
+
 def test_an_effect_at_two_places_is_one_alias() -> None:
     places = [replace(rival("ripple", 1, 1000.0), hypothesis=f"ripple at {k}") for k in range(2)]
     choice = choose(RULE, FIRST, [*places, rival("other", 1, 1000.0)], "spring")

@@ -15,6 +15,7 @@ from nlsdesign.components import (
     ROTATION,
     Assembly,
     CurrentDrivenMotor,
+    Eccentricity,
     Encoder,
     Fixed,
     Gear,
@@ -29,7 +30,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
-from nlsdesign.simulation import simulate
+from nlsdesign.simulation import Trace, simulate
 
 SIGNALS = ("motor_encoder.reading", "current_sensor.reading", "force_sensor.reading")
 TIME = np.arange(2000) * 0.001
@@ -78,6 +79,22 @@ def test_a_chain_of_sensors_is_read_back_to_what_its_first_one_sees(rig: Assembl
     sizes = {"spring": np.max(record.trace["bus.reading"]), "motor": 0.755 * 3.0}
     for block in (spring, motor):
         assert remaining(block, record) < 2e-3 * sizes[block.name], block.name
+
+
+@pytest.mark.parametrize("cosine", [0.0, 0.025])
+def test_a_bent_reading_bends_the_acceleration_behind_it(cosine: float) -> None:
+    """The reading of an eccentric encoder accelerates by its slope, and by its curvature times the speed²."""
+    disc = Eccentricity(of="body.angle", sine=0.04, cosine=cosine)
+    encoder = Encoder(of="disc.reading", quantum=1e-9)
+    turning = assembly("turning", body=Inertia(inertia=0.5), disc=disc, encoder=encoder)
+    time = np.arange(4000) * 1e-3
+    angle = 1.5 * np.sin(3.0 * time)
+    units = {"encoder.reading": "rad", "body.torque": "N*m"}
+    reading = angle + 0.04 * np.sin(angle) + cosine * (np.cos(angle) - 1.0)
+    rows = dict(zip(units, (reading, -0.5 * 9.0 * angle), strict=True))
+    record = Record("turning", Trace(time, rows, units, "turning"))
+    (block,) = blocks_of(flatten(turning), tuple(units))
+    assert remaining(block, record) < 1e-4 * 0.5 * 9.0 * 1.5
 
 
 def geared(rig: Assembly) -> Assembly:

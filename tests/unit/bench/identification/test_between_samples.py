@@ -17,7 +17,7 @@ from nlsdesign.bench.identification.equation_error.between_samples import on_clo
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.bench.identification.records.sampling import SAMPLED
+from nlsdesign.bench.identification.records.sampling import HELD, SAMPLED
 from nlsdesign.components import ROTATION, Dashpot, Encoder, Inertia, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
@@ -130,8 +130,26 @@ def test_a_balance_whose_numbers_are_all_free_does_not_vanish_with_them() -> Non
     residuals = np.array([accelerating - current[late] for late in (0.0, 0.5, -0.5)]) / 1e-2
     # The slopes are those of the last way to run: with them the balance is made of its own numbers.
     numbers = {"motor.inertia": accelerating / 1e-2, "motor.torque_constant": -current[-0.5] / 1e-2}
-    rows = inferred_sampling._Rows(residuals, numbers, np.zeros((len(time), 0)))
+    rows = inferred_sampling.BlockRows(residuals, numbers, np.zeros((len(time), 0)))
     found = inferred_sampling._likelihood([rows])
     assert found is not None
     assert abs(found.shift) < 0.1
     assert found.taken() == (SAMPLED, "")
+
+
+def test_a_noisy_balance_does_not_drown_what_another_tells() -> None:
+    """One tells that a signal is held; another, with a hundred times its noise, leans the other way."""
+    draw, time = np.random.default_rng(3), 2e-3 * np.arange(400)
+    slope = np.cos(30.0 * time)
+    clear, noisy = draw.standard_normal((2, len(time)))
+    residuals = [
+        np.array([own + size * (late - shift) * slope for late in (0.0, 0.5, -0.5)])
+        for own, size, shift in ((clear, 2.0, 0.5), (100.0 * noisy, 4.0, -0.5))
+    ]
+    rows = [inferred_sampling.BlockRows(each, {}, np.zeros((len(time), 0))) for each in residuals]
+    alone, both = (inferred_sampling._likelihood(some) for some in (rows[:1], rows))
+    assert alone is not None
+    assert both is not None
+    assert alone.taken()[0] is HELD
+    assert both.taken()[0] is HELD
+    assert both.error == pytest.approx(alone.error, rel=0.01)

@@ -1,0 +1,194 @@
+"""The colour of the noise of an input, such as a current, that is no motion.
+
+What drives a block varies for other reasons than noise, and at rest too, so neither rest nor repetition shows
+its noise. Two other looks do, and both must show the same:
+
+- *Above all motion.* From the frequency on from which no motion leaves the counts that it is between, what is
+  in a signal moves nothing. A reading that flips between two counts has a variance of a quarter of their
+  square, the most that it can have; what a signal may do there unseen follows from what a motion costs at
+  least, per acceleration, where it is seen. A record in which that is more than the white noise is not used.
+- *What is left of a block* that the signal drives, whatever its numbers are and whichever plain functions of
+  the motion it lacks. It bounds the noise from above at the frequencies of the motion.
+
+Noise is taken to be white noise and one first-order process, with a time of its own in each record. It is
+accepted if this describes both, and if what is left of the block is then white, and as large in slow as in
+fast motion, early as late: what a machine lacks goes with its motion, noise does not. Jumps of a current by
+friction that sticks come with reversals. Where one record that shows its noise contradicts, or where nothing
+is left of the block beyond white noise, noise counts as white.
+
+Source: Söderström and Stoica 1989, chapter 11 (tests of whiteness and of independence).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from ....foundation.arrays import Array
+from ..filters import derivative
+from ..records.measurement import Record, RecordSet
+from .block_noise import measured_inputs, output_slopes
+from .inferred_sampling import SeenBlock, freed, functions_of_motion, rows_of
+from .noise import Band, Colour, Noise, NoisePart, Stretch, bands_of, fitted_at, scatter
+
+_SURELY = 3.0
+"""Standard errors of a band by which a motion stands out of its counts to be seen: by chance, one band in a
+thousand does."""
+_LEAST_BANDS = 4
+_SEEN = 9.0
+"""Deviance by which a first-order process must describe the bands above all motion better than none does."""
+_OPEN = 1.2
+"""Mean square of what is left of a block, in that of white noise, up to which there is nothing to explain."""
+_OWN = 0.5
+"""Share of the floor of a block that comes from the noise of a signal, at least, for the block to show it."""
+_CONTRADICTED = 4.0
+"""Standard errors by which a test may be missed: some forty are made, and the model is not exact."""
+_BESIDE = (0.003, 0.03, 0.1)
+"""Noise in the rows of a block beside that of the signal, in the variance of its white one: what is taken of
+counts, and what a filter passes where it passes next to nothing. The likeliest is taken."""
+_MOST_ROWS, _LEAST_ROWS, _TIMES, _LAGS, _CLASSES = 400, 40, 12, 3, 3
+_LONGEST = 0.1
+"""Share of a record after which a process has forgotten all but 37 %, at most: what is slower is not seen."""
+
+
+def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[SeenBlock]) -> Noise:
+    """Return the noise with the colour of inputs of blocks that are no motions, where the records show it."""
+    drives = [drive for each in seen for drive in each.block.drives.values()]
+    moving = dict.fromkeys(d.signal for d in drives if d.order > 0)
+    targets = {each.block.target for each in seen}
+    counts = {name: math.sqrt(12.0) * noise.level[name] for name in moving if noise.rounded[name]}
+    for signal in dict.fromkeys(d.signal for d in drives if d.signal not in {*moving, *targets}):
+        if noise.rounded[signal] or noise.parts.get(signal):
+            continue
+        read = _Signal(signal, noise)
+        above = {r.name: read.above_motion(r, counts) for r in records.deciding}
+        shown = {name: bands for name, bands in above.items() if bands}
+        for each in seen if shown else ():
+            colours = read.colours(each, records.deciding, shown)
+            if colours:
+                lengths = [r.step * len(r.trace) for r in records.deciding if r.name in colours]
+                noise = noise.with_colours(signal, colours, lengths)
+                break
+    return noise
+
+
+class _Rows(NamedTuple):
+    """What is left of a block in some rows over its floor, and the share of a signal in that."""
+
+    left: Array
+    places: NDArray[np.int64]
+    share: float
+    width: float  # of the filter in s
+
+
+class _Signal(NamedTuple):
+    """A signal whose colour is looked for, with all noise as it is without that."""
+
+    name: str
+    noise: Noise
+
+    def above_motion(self, record: Record, counts: Mapping[str, float]) -> list[Band]:
+        """Return the bands of the signal above all motion; none where they look white, or may be real."""
+        highest, hidden = 0.0, 0.0
+        spent = bands_of([Stretch(record.trace[self.name], record.step, 0)])
+        for name, count in counts.items():
+            unseen = count**2 / 4.0
+            moved = bands_of([Stretch(record.trace[name], record.step, 0)])
+            costs = {
+                own.frequency: own.density / (motion.density * own.frequency**4)
+                for motion, own in zip(moved, spent, strict=True)
+                if motion.density > unseen * math.exp(_SURELY * scatter(motion.number))
+            }
+            if costs:
+                highest = max(highest, max(costs))
+                hidden = max(hidden, unseen * min(costs.values()))
+        above = [band for band in spent if band.frequency > highest][1:]  # the next band is partly below
+        if not counts or len(above) < _LEAST_BANDS:
+            return []
+        if hidden * above[0].frequency ** 4 >= self.noise.level[self.name] ** 2:
+            return []
+        plain, *others = (fitted_at(time, above, record.step).deviance for time in (0.0, *_times(record)))
+        return above if min(others) < plain - _SEEN else []
+
+    def colours(
+        self, seen: SeenBlock, records: Sequence[Record], shown: Mapping[str, list[Band]]
+    ) -> dict[str, Colour]:
+        """Return the colour of the signal in each record that shows it; none where one contradicts."""
+        block, filters, floors = seen
+        chosen = [record for record in records if record.name in floors]
+        shares = {record.name: self.share(seen, record) for record in chosen}
+        if not shares or float(np.mean(list(shares.values()))) < _OWN:
+            return {}
+        rows = rows_of(seen, chosen, [{}], functions_of_motion)
+        left = freed(rows.residuals, np.column_stack([*rows.numbers.values(), rows.own]))[0][0]
+        if float(np.mean(left**2)) < _OPEN:
+            return {}
+        motions = dict.fromkeys(d.signal for d in block.drives.values() if d.order > 0)
+        colours, behind = dict[str, Colour](), 0
+        for record in chosen:
+            places = floors[record.name].places
+            own, behind = left[behind : behind + len(places)], behind + len(places)
+            if record.name in shown and len(own) >= _LEAST_ROWS:
+                first = _Rows(own[:_MOST_ROWS], places[:_MOST_ROWS], shares[record.name], filters.width)
+                colour, white = self.likeliest(record, first, shown[record.name])
+                rates = (
+                    derivative(record.trace[m], record.step, order=1, span=filters.span) for m in motions
+                )
+                if any(_goes_with(white, np.abs(rate[first.places])) for rate in rates):
+                    return {}
+                colours[record.name] = colour
+        return colours
+
+    def share(self, seen: SeenBlock, record: Record) -> float:
+        """Return the share of the variance of a block's floor that comes from the noise of the signal."""
+        block, filters, floors = seen
+        stride = max(1, round(filters.spacing / record.step))
+        gains = output_slopes(block, measured_inputs(block, record, filters.span), stride)
+        behind = self.noise.behind(self.name, record.step, width=filters.width)
+        names = [v.name for v in block.model.inputs]
+        driven = [names.index(n) for n, d in block.drives.items() if d.signal == self.name and d.order == 0]
+        power = sum((float(np.nanmean(gains[k] ** 2)) for k in driven), 0.0)
+        return power * behind**2 / float(np.mean(floors[record.name].sigma ** 2))
+
+    def likeliest(self, record: Record, rows: _Rows, bands: Sequence[Band]) -> tuple[Colour, Array]:
+        """Return the colour by bands above all motion and rows of a block, and these rows whitened."""
+        apart = np.abs(rows.places[:, None] - rows.places[None, :])
+        count, behind = int(apart.max()), dict[float, Array]()
+        for time in (0.0, *_times(record)):
+            lags = self.noise.covariance(self.name, record.step, width=rows.width, time=time, count=count)
+            behind[time] = lags[apart]
+        level, others = self.noise.level[self.name] ** 2, 1.0 - min(rows.share, 1.0)
+        best, result = -math.inf, (Colour(level, ()), rows.left)
+        for time in _times(record):
+            fit = fitted_at(time, bands, record.step)
+            own = fit.white * behind[0.0] + fit.variance * behind[time]
+            for beside in _BESIDE:
+                whole = rows.share / (level * behind[0.0][0, 0]) * own + (others + beside) * np.eye(len(own))
+                factor = np.linalg.cholesky(whole)
+                whitened = solve_triangular(factor, rows.left, lower=True)
+                likelihood = -0.5 * float(whitened @ whitened) - float(np.sum(np.log(np.diag(factor))))
+                if likelihood - 0.5 * fit.deviance > best:
+                    best = likelihood - 0.5 * fit.deviance
+                    result = Colour(fit.white, (NoisePart(fit.variance, time),)), whitened
+        return result
+
+
+def _times(record: Record) -> list[float]:
+    return [float(t) for t in np.geomspace(record.step, _LONGEST * record.step * len(record.trace), _TIMES)]
+
+
+def _goes_with(white: Array, speed: Array) -> bool:
+    """Tell whether rows are no white noise of variance 1, early and late, in slow and in fast motion."""
+    count = len(white)
+    by_speed = np.array_split(white[np.argsort(speed, kind="stable")], _CLASSES)
+    misses = [
+        (float(np.mean(part**2)) - 1.0) * math.sqrt(len(part) / 2.0)
+        for part in (*by_speed, *np.array_split(white, _CLASSES))
+    ]
+    misses += [float(white[k:] @ white[:-k]) / math.sqrt(count) for k in range(1, _LAGS + 1)]
+    return bool(np.max(np.abs(misses)) > _CONTRADICTED)

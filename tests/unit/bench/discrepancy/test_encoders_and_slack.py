@@ -1,0 +1,81 @@
+"""Machines of the rig with a fault of an encoder, and a strip that is slack: the right place is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from benchmarks._score_run import opened
+from nlsdesign.bench.discrepancy import Verdict, diagnose, effects
+from nlsdesign.bench.discrepancy.diagnose import _Case, _Decision
+from nlsdesign.bench.discrepancy.effects.effect import EffectFunction
+from nlsdesign.bench.discrepancy.selection.search import Outcome
+from nlsdesign.bench.identification.equation_error.inferred_sampling import no_terms, plain_terms
+from tests.rig.kind_cases import names_of, write_kind_case
+
+NO: Any = None
+
+
+def diagnosed(
+    folder: Path, kind: str, effect: str, seed: int, condition: str, *rivals: EffectFunction
+) -> Verdict:
+    write_kind_case(folder, kind, (effect,), 1.0, seed, condition=condition)
+    return diagnose(*opened(folder), catalogue=rivals)
+
+
+@pytest.mark.parametrize(("seed", "condition"), [(1171, "coarse"), (1196, "plain")])
+def test_an_eccentric_disc_is_told_at_its_own_encoder(seed: int, condition: str, tmp_path: Path) -> None:
+    """What the disc does to an acceleration was left out; the motor's encoder then left as little."""
+    rivals = effects.angle_sensor_eccentricity, effects.angle_sensor_bias
+    verdict = diagnosed(tmp_path, "elastic_joint", "joint_eccentricity", seed, condition, *rivals)
+    (disc,) = verdict.effects
+    assert (disc.name, disc.location) == (
+        "angle_sensor_eccentricity",
+        names_of("elastic_joint", seed)["load_encoder"],
+    )
+    assert verdict.complete
+    assert condition == "coarse" or disc.aliases == ()
+
+
+def test_an_eccentric_disc_shows_in_the_balance_of_a_direct_drive(tmp_path: Path) -> None:
+    rivals = effects.angle_sensor_eccentricity, effects.torque_ripple
+    verdict = diagnosed(tmp_path, "direct_drive", "angle_sensor_eccentricity", 1195, "coarse", *rivals)
+    assert [effect.name for effect in verdict.effects] == ["angle_sensor_eccentricity"]
+    assert verdict.complete
+
+
+def test_the_zero_of_either_of_two_encoders_is_one_class(tmp_path: Path) -> None:
+    rivals = (effects.angle_sensor_bias,)
+    verdict = diagnosed(tmp_path, "belt_axis", "angle_sensor_bias", 1196, "plain", *rivals)
+    (zero,) = verdict.effects
+    places = {zero.location, *(alias.rpartition(" at ")[2] for alias in zero.aliases)}
+    assert len(places) == 2
+    assert all(alias.startswith("angle_sensor_bias at ") for alias in zero.aliases)
+
+
+def test_a_strip_that_hangs_slack_in_its_grips_is_no_permanent_set(tmp_path: Path) -> None:
+    rivals = effects.cable_slack, effects.permanent_set, effects.force_sensor_bias
+    verdict = diagnosed(tmp_path, "specimen", "cable_slack", 1171, "coloured", *rivals)
+    (slack,) = verdict.effects
+    assert slack.name == "cable_slack"
+    ((length, _, error),) = slack.parameters.values()
+    assert abs(length - 1.5e-3) < 3.0 * error < 0.5e-3
+
+
+@pytest.mark.parametrize(("complete", "lacks"), [(True, no_terms), (False, plain_terms)])
+def test_inputs_are_asked_as_if_nothing_were_missing_where_nothing_is(
+    complete: bool, lacks: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Plain terms hide a shift of a current: it stayed read as sampled beside a name that explained all."""
+    asked = list[object]()
+    bench: Any = SimpleNamespace(inferred=lambda _, missing=plain_terms: asked.append(missing))
+    monkeypatch.setattr(_Case, "_blocks", lambda *_: [])
+    monkeypatch.setattr(_Case, "_read_as", lambda *_: None)
+    step: Any = SimpleNamespace()
+    last: Any = SimpleNamespace(fitted=None)
+    outcome = Outcome(last, (step,), complete=complete)
+    assert _Case(NO, bench, NO, NO).read_as_inferred_beside(outcome, _Decision("named")) is None
+    assert asked == [lacks]

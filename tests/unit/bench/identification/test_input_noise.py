@@ -1,0 +1,117 @@
+"""The colour of the noise of what drives a body: told above all motion and by what the balance leaves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks._score_run import opened
+from nlsdesign.bench.discrepancy import diagnose
+from nlsdesign.bench.discrepancy.tearing import blocks_of
+from nlsdesign.bench.identification import Record, RecordSet
+from nlsdesign.bench.identification.equation_error import input_noise
+from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.records.mapping import Column
+from nlsdesign.components import ROTATION, Assembly, Dashpot, Encoder, Inertia, tie
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.foundation.arrays import Array
+from nlsdesign.model import flatten
+from nlsdesign.simulation import Trace
+from tests.rig.conditions import first_order_noise
+from tests.rig.kind_cases import write_kind_case
+
+STEP, COUNT, WHITE, SLOW, TIME = 0.002, 3000, 0.02, 0.03, 0.03
+UNITS = {"encoder.reading": "rad", "ball.torque": "N*m"}
+
+
+def machine() -> Assembly:
+    """A body that is turned by a measured torque."""
+    numbers = tie(Dashpot(damping=0.05, domain=ROTATION), "ball")
+    return assembly(
+        "machine", ball=Inertia(inertia=0.01), loss=numbers, encoder=Encoder(of="ball.angle", quantum=1e-5)
+    )
+
+
+def turned(
+    slow: float,
+    *,
+    memory: float = TIME,
+    beside_reversals: float = 0.0,
+    ripple: float = 0.0,
+    count: float = 1e-5,
+) -> tuple[Bench, Array]:
+    """Two records with noise in the torque, ``slow`` of it remembered; with the noise of the first.
+
+    ``beside_reversals``: by how much more there is where the body is slow. ``ripple``: torque over the angle.
+    """
+    draw, time, records, noises = np.random.default_rng(7), STEP * np.arange(COUNT), [], []
+    for name, frequency in (("slow", 0.7), ("quick", 1.6)):
+        pace = 2.0 * np.pi * frequency
+        angle, rate = np.sin(pace * time), pace * np.cos(pace * time)
+        remembered = first_order_noise(COUNT, memory / STEP, draw)
+        remembered *= 1.0 + beside_reversals * (np.abs(rate) < 0.4 * pace)
+        noise = WHITE * draw.standard_normal(COUNT) + slow * remembered
+        torque = -0.01 * pace**2 * angle + 0.05 * rate + ripple * np.sin(9.0 * angle) + noise
+        rows = (count * np.round(angle / count), torque)
+        records.append(Record(name, Trace(time, dict(zip(UNITS, rows, strict=True)), UNITS, name)))
+        noises.append(noise)
+    columns = tuple(Column(name, name, unit) for name, unit in UNITS.items())
+    bench = Bench(RecordSet(tuple(records), columns), blocks_of(flatten(machine()), tuple(UNITS)))
+    return bench, noises[0]
+
+
+def test_noise_that_remembers_is_in_the_floor_of_the_block_that_it_drives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench, noise = turned(SLOW)
+    assert bench.noise.evidence["ball.torque"] == "above motion"
+    assert bench.noise.deviation("ball.torque") == pytest.approx(float(np.hypot(WHITE, SLOW)), rel=0.15)
+    (colour,) = bench.noise.colours["ball.torque"]["slow"].parts
+    assert 0.5 * TIME < colour.time < 2.0 * TIME
+    monkeypatch.setattr(input_noise, "_OPEN", np.inf)
+    floors = [each.floors["ball", "slow"] for each in (bench, turned(SLOW)[0])]
+    true = float(np.std(floors[0].filter @ noise))
+    assert float(np.median(floors[0].sigma)) == pytest.approx(true, rel=0.2)
+    assert float(np.median(floors[1].sigma)) < 0.6 * true, "or the test would show nothing"
+    assert floors[0].independent < len(floors[0].sigma)
+
+
+def test_another_record_of_the_bench_has_the_mean_of_the_colours() -> None:
+    noise = turned(SLOW)[0].noise
+    each = [noise.in_record(name).deviation("ball.torque") for name in ("slow", "quick")]
+    assert each[0] != each[1]
+    assert noise.in_record("another").deviation("ball.torque") == pytest.approx(
+        float(np.hypot(*each)) / 2**0.5
+    )
+
+
+@pytest.mark.parametrize(
+    ("clause", "no_clause", "what"),
+    [
+        ("_SEEN", -np.inf, {"slow": 0.3 * WHITE, "memory": 0.5}),
+        ("_CONTRADICTED", np.inf, {"slow": SLOW, "beside_reversals": 1.5}),
+        ("_CONTRADICTED", np.inf, {"slow": SLOW, "ripple": 0.2}),
+    ],
+    ids=["white above motion", "with reversals", "with the angle"],
+)
+def test_what_is_no_noise_is_not_taken_for_it(
+    clause: str, no_clause: float, what: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert turned(**what)[0].noise.evidence["ball.torque"] == "white only"
+    monkeypatch.setattr(input_noise, clause, no_clause)
+    assert turned(**what)[0].noise.evidence["ball.torque"] == "above motion", "this clause decides"
+
+
+def test_counts_that_hide_what_a_torque_does_show_no_colour() -> None:
+    assert turned(SLOW, count=3e-3)[0].noise.evidence["ball.torque"] == "white only"
+
+
+@pytest.mark.long_cases("belt_axis")
+@pytest.mark.parametrize("kind", ["screw_carriage", "belt_axis"])
+def test_a_clean_machine_whose_current_has_a_colour_gets_no_name(kind: str, tmp_path: Path) -> None:
+    """A drifting clock was named on the belt: its floor was too low, and half a sample of a hold was left."""
+    write_kind_case(tmp_path, kind, (), 0.0, 1192, condition="coloured")
+    verdict = diagnose(*opened(tmp_path))
+    assert (verdict.verdict, verdict.effects) == ("none", ())
