@@ -12,10 +12,12 @@ from ....components import (
     Backlash,
     ConstantLoad,
     Dashpot,
+    Element,
     GravityLoad,
     HorizontalTorque,
     Inertia,
     Inertial,
+    Mass,
     Rounded,
     Spring,
     Tie,
@@ -34,6 +36,7 @@ from .places import (
     domain_of,
     effort_over_motion,
     laws,
+    moving_bodies,
     restoring_ties,
     sliding_bodies,
     ties_between_bodies,
@@ -47,8 +50,14 @@ _ORDERS = (*range(1, 37), *range(38, 121, 2))
 """Periods per turn where fits begin; a start between two of them is reached from either."""
 _OF_A_MOTOR = (1, 2, 6, 7, 12, 14, 21, 24, 28, 42)
 """Periods per turn of a motor: of its pole pairs, slots and what they have in common."""
-_SHARE_BEHIND = 0.2
-"""Part of an inertia that is put behind a shaft at first."""
+_SHARE_BEHIND, _LARGER = 0.2, 2.5
+"""Part of an inertia that is put behind a shaft at first, and how many times that beside it."""
+_NATURAL = tuple(2.0 ** (k / 2.0) for k in range(-6, 7))
+"""Natural frequencies at which a second inertia swings at first, as multiples of that of the quickest motion.
+
+From a seventh less or a fifth more a fit reaches the true one; below an eighth the inertia moves as if it were
+held, beyond eight times as if it were rigid. The slopes of a swing that is out of step point anywhere.
+"""
 
 
 def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -76,10 +85,17 @@ def _driven_springs(assembly: Assembly) -> list[str]:
     return [name for name in restoring_ties(assembly) if _drivers(assembly, name)]
 
 
+def _inertia_of(assembly: Assembly, body: str) -> str:
+    """Return the name of the inertia or mass of a body."""
+    part = assembly[body]
+    assert isinstance(part, Free)
+    return f"{body}.{part.inertia_name}"
+
+
 def _without_shaft(assembly: Assembly) -> list[str]:
-    """Return the turning bodies, unless an effect has put one of them behind a shaft already."""
-    bodies, numbers = turning_bodies(assembly), assembly.quantities()
-    return [] if any(numbers[f"{body}.inertia"].source == SOURCE for body in bodies) else bodies
+    """Return the moving bodies, unless an effect has put one of them behind a shaft already."""
+    bodies, numbers = moving_bodies(assembly), assembly.quantities()
+    return [] if any(numbers[_inertia_of(assembly, body)].source == SOURCE for body in bodies) else bodies
 
 
 def _rigidly_driven_springs(assembly: Assembly) -> list[str]:
@@ -129,6 +145,41 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, unknowns, {"strategy": Continuation(through=massless)})
 
 
+def _springs_between(assembly: Assembly) -> list[str]:
+    """Return the springs between two moving bodies."""
+    return list(ties_between_bodies(assembly))
+
+
+def _dead_zone(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Put a spring behind a gap, with what else is tied to the same two bodies: nothing acts within it.
+
+    No inertia lies between gap and spring, as where a coupling or a belt has the play.
+    """
+    spring = assembly[name]
+    assert isinstance(spring, Tie)
+    beside = {
+        other: part.element
+        for other, part in assembly.parts
+        if other != name and isinstance(part, Tie) and part.between == spring.between
+    }
+    domain, way = spring.element.domain, effort_over_motion(assembly, name)[1]
+    edited = assembly
+    for other in beside:
+        edited = edited.without_part(other)
+
+    def behind(inner: str, element: Element) -> Element:
+        gap, width = (number(value, domain.motion_unit) for value in (1e-2, 1e-4))
+        members = ((inner, element), *beside.items())
+        return Backlash(gap=gap, contact=Rounded(width=width), members=members)
+
+    edited = wrapped(edited, name, "behind_backlash", behind)
+    unknowns = (
+        Unknown(f"{name}.gap", (0.1, 0.4), 2e-3, 1.8, way),
+        Unknown(f"{name}.width", (1e-3,), 1e-4, 0.1, way, null=None, limiting=True),
+    )
+    yield Edit(edited, unknowns)
+
+
 def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
     domain = domain_of(assembly, body)
     load = ConstantLoad(load=number(0.0, domain.effort_unit), domain=domain)
@@ -162,25 +213,34 @@ def _shaft(
 
     Fits begin at natural frequencies that are given as multiples of that of the quickest motion.
     """
-    name = f"{behind}.inertia"
+    name, domain = _inertia_of(assembly, behind), domain_of(assembly, behind)
     inertia = assembly.quantities()[name]
     second = _SHARE_BEHIND * inertia.number
+    hidden = number(second, domain.inertia_unit)
     body = free_name(assembly, "second_inertia")
-    edited = assembly.with_part(body, Inertia(inertia=number(second, "kg*m^2")))
+    kind = Inertia(inertia=hidden) if domain == ROTATION else Mass(mass=hidden)
+    edited = assembly.with_part(body, kind)
     shaft = free_name(edited, "shaft")
+    stiffness, loss = (domain.unit(unit) for unit in ("{effort}/{motion}", "{effort}*s/{motion}"))
     twist = parallel(
-        stiffness=Spring(stiffness=number(1.0, "N*m/rad")),
-        loss=Dashpot(damping=number(1e-3, "N*m*s/rad"), domain=ROTATION),
+        stiffness=Spring(stiffness=number(1.0, stiffness), domain=domain),
+        loss=Dashpot(damping=number(1e-3, loss), domain=domain),
     )
     edited = edited.with_part(shaft, tie(twist, behind, body))
     left = _reduced(inertia, 1.0 - _SHARE_BEHIND, 0.3)
     edited = edited.with_values({name: left})
     unknowns = (
-        Unknown(f"{body}.inertia", (second,), 1e-3 * second, 5.0 * second, null=None),
+        Unknown(
+            _inertia_of(edited, body),
+            (second, _LARGER * second),
+            1e-3 * second,
+            5.0 * second,
+            null=None,
+        ),
         Unknown(
             f"{shaft}.stiffness.stiffness",
             tuple(second * omega**2 for omega in frequencies),
-            second * 0.1,
+            second * 1e-3,
             second * 1e4,
             f"1 / {QUICKEST} / {QUICKEST}",
             null=math.inf,
@@ -199,7 +259,7 @@ def _shaft(
 
 def _absorber(assembly: Assembly, body: str) -> Iterator[Edit]:
     """Let a part of the inertia hang on a shaft; what acts on the body goes on acting on it."""
-    edited, _, unknowns = _shaft(assembly, body, (3.0, 8.0))
+    edited, _, unknowns = _shaft(assembly, body, _NATURAL)
     yield Edit(edited, unknowns)
 
 
@@ -236,6 +296,13 @@ backlash = Effect(
             _driven_springs,
             _backlash,
             "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
+            "Nordin and Gutman 2002",
+            "backlash",
+        ),
+        Form(
+            _springs_between,
+            _dead_zone,
+            "no effort at all over a dead way around zero, the same at any speed",
             "Nordin and Gutman 2002",
             "backlash",
         ),

@@ -29,8 +29,8 @@ TABLE = """
     position_dependent_friction x  x  x  x  x  x  x  .
     asymmetric_friction         .  .  .  .  .  .  .  .
     torque_ripple               x  x  x  x  x  o  x  .
-    backlash                    x  x  o  .  x  o  o  .
-    drivetrain_resonance        x  x  x  x  x  o  x  .
+    backlash                    x  x  o  .  x  o  x  .
+    drivetrain_resonance        x  x  x  x  x  x  x  .
     spring_damping              .  x  .  .  x  .  x  .
     constant_torque             x  x  x  x  x  .  x  .
     constant_force              .  .  .  .  .  x  x  .
@@ -76,7 +76,6 @@ WHERE = {
 WANTED = {
     "torque_ripple": "ripple is locked to the angle of a turning body: a screw's carriage moves in metres",
     "backlash": "backlash is put between a body and the spring it drives: these machines drive no spring",
-    "drivetrain_resonance": "a shaft is put at a turning body: a screw's carriage moves in metres",
 }
 """Why an effect that can be on a machine is not offered there yet."""
 ROWS = {row[0]: row[1:] for line in TABLE.strip().splitlines() if (row := line.split())}
