@@ -190,8 +190,8 @@ class _Case:
     def is_read_otherwise_beside(self, hypothesis: Hypothesis) -> bool:
         """Tell whether inputs run otherwise beside what is named so far than they were read.
 
-        Then what a block still lacks is that shift before it is an effect. It is not asked beside a lag, which
-        may stand for the shift itself.
+        Then what a block still lacks is that shift before it is an effect. It is not asked beside a lag,
+        which may stand for the shift itself.
         """
         if self.settled or hypothesis.newest.explains_lag:
             return False

@@ -416,7 +416,9 @@ def best_fit(
     """Return the best of fits from several starts, the most promising first."""
     rows = [{p.name: p.start for p in start} for start in starts]
     several = {name for name in rows[0] if len({row[name] for row in rows}) > 1} if rows else set()
-    choices = [(_promise(evidence, start, several) if several else Promise(0.0, 0.0), start) for start in starts]
+    choices = [
+        (_promise(evidence, start, several) if several else Promise(0.0, 0.0), start) for start in starts
+    ]
     best: Fit | None = None
     failure = ConvergenceError("fit", "has no start")
     for promised, start in sorted(choices, key=lambda pair: pair[0].near)[: BUDGET.full_starts]:

@@ -417,7 +417,7 @@ def promised_costs(
 ) -> Promise:
     """Return the costs that the linearised problem reaches from a start, at the price of one evaluation.
 
-    ``held``: names of numbers in which the cost has several minima, so that slopes say nothing of the next one.
+    ``held``: names of numbers in which the cost has several minima, so that its slopes say nothing of others.
     """
     low, high, start = box(parameters)
     residual, slope = StackedRows(evidence, parameters)(start)

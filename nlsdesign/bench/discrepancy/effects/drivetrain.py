@@ -55,8 +55,8 @@ _SHARE_BEHIND, _LARGER = 0.2, 2.5
 _NATURAL = tuple(2.0 ** (k / 2.0) for k in range(-6, 7))
 """Natural frequencies at which a second inertia swings at first, as multiples of that of the quickest motion.
 
-From a seventh less or a fifth more a fit reaches the true one; below an eighth the inertia moves as if it were
-held, beyond eight times as if it were rigid. The slopes of a swing that is out of step point anywhere.
+A fit reaches the true one from within a fifth of it. Below an eighth the inertia moves as if it were held,
+beyond eight times as if it were rigid.
 """
 
 

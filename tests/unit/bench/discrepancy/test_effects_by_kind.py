@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.bench.discrepancy.effects import ALL, Effect
+from nlsdesign.bench.discrepancy.effects.places import effort_over_motion
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck, read_deck
+from nlsdesign.model import flatten
 from tests.rig.kind_cases import ALL_KINDS, names_of
 from tests.rig.kind_decks import deck_of
 from tests.rig.kinds import KINDS
@@ -139,3 +141,30 @@ def test_every_effect_of_a_case_is_one_of_the_table_or_said_to_be_in_no_list() -
         assert {alias.get(effect, effect) for effect in kind.effects} <= set(ROWS), kind.name
         assert not set(kind.not_listed) & set(ROWS), kind.name
         assert {effect for pair in kind.pairs for effect in pair} <= set(kind.effects), kind.name
+
+
+@pytest.mark.parametrize("kind", ["elastic_joint", "rack_carriage"])
+def test_within_a_gap_nothing_acts_between_two_bodies(kind: str) -> None:
+    """A dashpot beside the spring is behind the gap too; no inertia lies between gap and spring."""
+    names, row = names_of(kind, 0), next(row for row in ALL if row.identifier == "backlash")
+    (candidate,) = (c for c in row(machine(kind)) if not c.strategy.takes_long)
+    spring, place = names["spring"], "position" if kind == "rack_carriage" else "angle"
+    assert (candidate.location, names["spring_damping"] in dict(candidate.assembly.parts)) == (spring, False)
+    gap = candidate.assembly.quantities()[f"{spring}.gap"].number
+    model, (effort, motion) = flatten(candidate.assembly), effort_over_motion(candidate.assembly, spring)
+
+    def at(turn: float) -> tuple[float, float]:
+        """Way and effort of the spring while the motor alone has turned, and both bodies move."""
+        states = {v.name: 1.0 for v in model.states}
+        states |= {
+            f"{names['load']}.{place}": 0.0,
+            f"{names['motor']}.angle": turn,
+            f"{names['motor']}.speed": 2.0,
+        }
+        shown = model.evaluate([states[v.name] for v in model.states], [0.0] * len(model.inputs))
+        return shown[motion], shown[effort]
+
+    way = at(1.0)[0]
+    (inside, nothing), (beyond, pull) = at(0.4 * gap / way), at(0.6 * gap / way)
+    assert (inside, beyond) == pytest.approx((0.4 * gap, 0.6 * gap))
+    assert abs(nothing) < 1e-3 * abs(pull)
