@@ -50,6 +50,8 @@ _ORDERS = (*range(1, 37), *range(38, 121, 2))
 """Periods per turn where fits begin; a start between two of them is reached from either."""
 _OF_A_MOTOR = (1, 2, 6, 7, 12, 14, 21, 24, 28, 42)
 """Periods per turn of a motor: of its pole pairs, slots and what they have in common."""
+_SHARPER = 0.04
+"""Share of the usual rounding of a contact that a dead zone has: encoders on both sides would see more."""
 _SHARE_BEHIND, _LARGER = 0.2, 2.5
 """Part of an inertia that is put behind a shaft at first, and how many times that beside it."""
 _NATURAL = tuple(2.0 ** (k / 2.0) for k in range(-6, 7))
@@ -163,21 +165,16 @@ def _dead_zone(assembly: Assembly, name: str) -> Iterator[Edit]:
         if other != name and isinstance(part, Tie) and part.between == spring.between
     }
     domain, way = spring.element.domain, effort_over_motion(assembly, name)[1]
-    edited = assembly
+    sharp, edited = _SHARPER * Backlash.rounding[domain], assembly
     for other in beside:
         edited = edited.without_part(other)
 
     def behind(inner: str, element: Element) -> Element:
-        gap, width = (number(value, domain.motion_unit) for value in (1e-2, 1e-4))
-        members = ((inner, element), *beside.items())
-        return Backlash(gap=gap, contact=Rounded(width=width), members=members)
+        gap, width = (number(value, domain.motion_unit) for value in (1e-2, sharp))
+        return Backlash(gap=gap, contact=Rounded(width=width), members=((inner, element), *beside.items()))
 
     edited = wrapped(edited, name, "behind_backlash", behind)
-    unknowns = (
-        Unknown(f"{name}.gap", (0.1, 0.4), 2e-3, 1.8, way),
-        Unknown(f"{name}.width", (1e-3,), 1e-4, 0.1, way, null=None, limiting=True),
-    )
-    yield Edit(edited, unknowns)
+    yield Edit(edited, (Unknown(f"{name}.gap", (0.1, 0.4), 2e-3, 1.8, way),))
 
 
 def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
