@@ -52,8 +52,8 @@ _OF_A_MOTOR = (1, 2, 6, 7, 12, 14, 21, 24, 28, 42)
 """Periods per turn of a motor: of its pole pairs, slots and what they have in common."""
 _SHARPER = 0.04
 """Share of the usual rounding of a contact that a dead zone has: encoders on both sides would see more."""
-_SHARE_BEHIND, _LARGER = 0.2, 2.5
-"""Part of an inertia that is put behind a shaft at first, and how many times that beside it."""
+_SHARE_BEHIND = 0.35
+"""Part of an inertia that is put behind a shaft at first: within three times of a tenth and of the whole."""
 _NATURAL = tuple(2.0 ** (k / 2.0) for k in range(-6, 7))
 """Natural frequencies at which a second inertia swings at first, as multiples of that of the quickest motion.
 
@@ -227,13 +227,7 @@ def _shaft(
     left = _reduced(inertia, 1.0 - _SHARE_BEHIND, 0.3)
     edited = edited.with_values({name: left})
     unknowns = (
-        Unknown(
-            _inertia_of(edited, body),
-            (second, _LARGER * second),
-            1e-3 * second,
-            5.0 * second,
-            null=None,
-        ),
+        Unknown(_inertia_of(edited, body), (second,), 1e-3 * second, 2.8 * second, null=None),
         Unknown(
             f"{shaft}.stiffness.stiffness",
             tuple(second * omega**2 for omega in frequencies),
