@@ -429,10 +429,8 @@ def promised_costs(
     free = used & [p.name not in held for p in parameters]
     if not free.any():
         return Promise(0.5 * float(residual @ residual), far)
-    # The triangle of the stacked rows holds all that the bounded problem asks of them.
-    triangle = np.linalg.qr(np.column_stack([slope[:, free] / size[free], -residual]), mode="r")
     bounds = (low - start)[free] * size[free], (high - start)[free] * size[free]
-    bounded = lsq_linear(triangle[:, :-1], triangle[:, -1], bounds, method="bvls")
+    bounded = lsq_linear(slope[:, free] / size[free], -residual, bounds, method="bvls")
     return Promise(float(bounded.cost), far)
 
 
