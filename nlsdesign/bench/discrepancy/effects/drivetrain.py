@@ -147,11 +147,6 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, unknowns, {"strategy": Continuation(through=massless)})
 
 
-def _springs_between(assembly: Assembly) -> list[str]:
-    """Return the springs between two moving bodies."""
-    return list(ties_between_bodies(assembly))
-
-
 def _dead_zone(assembly: Assembly, name: str) -> Iterator[Edit]:
     """Put a spring behind a gap, with what else is tied to the same two bodies: nothing acts within it.
 
@@ -291,7 +286,7 @@ backlash = Effect(
             "backlash",
         ),
         Form(
-            _springs_between,
+            ties_between_bodies,
             _dead_zone,
             "no effort at all over a dead way around zero, the same at any speed",
             "Nordin and Gutman 2002",
