@@ -415,9 +415,10 @@ def best_fit(
 ) -> Fit:
     """Return the best of fits from several starts, the most promising first."""
     rows = [{p.name: p.start for p in start} for start in starts]
-    several = {name for name in rows[0] if len({row[name] for row in rows}) > 1} if rows else set()
+    several = {name for row in rows for name in row if row[name] != rows[0][name]}
     choices = [
-        (_promise(evidence, start, several) if several else Promise(0.0, 0.0), start) for start in starts
+        (promised_costs(evidence, start, several) if several else Promise(0.0, 0.0), start)
+        for start in starts
     ]
     best: Fit | None = None
     failure = ConvergenceError("fit", "has no start")
@@ -441,14 +442,6 @@ def best_fit(
     if best is None:
         raise failure
     return best
-
-
-def _promise(evidence: Sequence[Evidence], start: Sequence[Parameter], held: Collection[str]) -> Promise:
-    """Return the costs that the linearised problem would reach; infinite where there is no response."""
-    try:
-        return promised_costs(evidence, start, held)
-    except ConvergenceError:
-        return Promise(math.inf, math.inf)
 
 
 def explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:

@@ -417,10 +417,14 @@ def promised_costs(
 ) -> Promise:
     """Return the costs that the linearised problem reaches from a start, at the price of one evaluation.
 
-    ``held``: names of numbers in which the cost has several minima, so that its slopes say nothing of others.
+    They are infinite where there is no response. ``held``: names of numbers in which the cost has several
+    minima, so that its slopes say nothing of others.
     """
     low, high, start = box(parameters)
-    residual, slope = StackedRows(evidence, parameters)(start)
+    try:
+        residual, slope = StackedRows(evidence, parameters)(start)
+    except ConvergenceError:
+        return Promise(math.inf, math.inf)
     size = np.linalg.norm(slope, axis=0)
     used = size > 0.0
     step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]

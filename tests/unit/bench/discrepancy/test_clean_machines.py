@@ -78,6 +78,7 @@ def test_a_shift_that_explains_a_third_is_no_answer(tmp_path: Path) -> None:
     assert [effect.name for effect in verdict.effects] == ["load_dependent_friction"]
 
 
+@pytest.mark.long_cases("drivetrain_resonance-1170", "backlash-1200")
 @pytest.mark.parametrize(("effect", "seed"), [("drivetrain_resonance", 1170), ("backlash", 1200)])
 def test_what_a_name_leaves_is_a_shift_within_a_sample_before_it_is_a_fault(
     effect: str, seed: int, tmp_path: Path
