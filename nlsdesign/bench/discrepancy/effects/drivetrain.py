@@ -60,6 +60,8 @@ _NATURAL = tuple(2.0 ** (k / 2.0) for k in range(-6, 7))
 A fit reaches the true one from within a fifth of it. Below an eighth the inertia moves as if it were held,
 beyond eight times as if it were rigid.
 """
+_CATCHING = (5.0, 12.0, 28.0)
+"""The same of a load between the flanks of a gear: beyond, these are as if rigid."""
 
 
 def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -260,6 +262,38 @@ def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
     )
 
 
+def _unsprung(assembly: Assembly) -> list[str]:
+    """Return the moving bodies on which no spring acts: their load is one with them in the model."""
+    springs = [assembly[name] for name in restoring_ties(assembly)]
+    ends = {end for spring in springs if isinstance(spring, Tie) for end in spring.between}
+    return [body for body in _without_shaft(assembly) if body not in ends]
+
+
+def _gear_with_play(assembly: Assembly, body: str) -> Iterator[Edit]:
+    """Put a part of the inertia and all weights of a body behind a gap between flanks that give way.
+
+    A load that hangs on nothing else flies freely through the gap; how stiff and how lossy the flanks are
+    decides how it is caught, and the drive feels both.
+    """
+    edited, load, (inertia, stiffness, loss) = _shaft(assembly, body, _CATCHING)
+    shaft, domain = stiffness.name.partition(".")[0], domain_of(assembly, body)
+    width = number(_SHARPER * Backlash.rounding[domain], domain.motion_unit)
+    gap = number(1e-2, domain.motion_unit)
+    flanks = wrapping(Backlash, gap=gap, contact=Rounded(width=width))
+    edited = wrapped(edited, shaft, "flanks", flanks)
+    for name, part in assembly.parts:
+        if isinstance(part, Tie) and part.between == (body,) and "gravity" in part.element.phenomena:
+            edited = edited.with_part(name, replace(part, between=(load,)))
+    way, _ = assembly[body].motion_names  # type: ignore[attr-defined]
+    unknowns = (
+        Unknown(f"{shaft}.gap", (0.002, 0.005, 0.012), 1e-4, 0.2, f"{body}.{way}"),
+        inertia,
+        replace(stiffness, name=f"{shaft}.flanks.stiffness.stiffness", null=None),
+        replace(loss, name=f"{shaft}.flanks.loss.damping", starts=(2.5 * inertia.starts[0],)),
+    )
+    yield Edit(edited, unknowns, {"strategy": Plain(takes_long=True)})
+
+
 torque_ripple = Effect(
     "torque_ripple",
     "A torque locked to the angle of a freely turning body, such as cogging; there may be several orders.",
@@ -291,6 +325,12 @@ backlash = Effect(
             "no effort at all over a dead way around zero, the same at any speed",
             "Nordin and Gutman 2002",
             "backlash",
+        ),
+        Form(
+            _unsprung,
+            _gear_with_play,
+            "a part of the inertia that is missing for a moment after each reversal, and then comes at once",
+            "Nordin and Gutman 2002",
         ),
     ),
 )

@@ -9,7 +9,7 @@ import pytest
 
 from nlsdesign.bench.discrepancy.effects import ALL, Effect
 from nlsdesign.bench.discrepancy.effects.places import effort_over_motion
-from nlsdesign.components import Assembly
+from nlsdesign.components import Assembly, Tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.model import flatten
@@ -31,7 +31,7 @@ TABLE = """
     position_dependent_friction x  x  x  x  x  x  x  .
     asymmetric_friction         .  .  .  .  .  .  .  .
     torque_ripple               x  x  x  x  x  o  x  .
-    backlash                    x  x  o  .  x  o  x  .
+    backlash                    x  x  x  x  x  x  x  .
     drivetrain_resonance        x  x  x  x  x  x  x  .
     spring_damping              .  x  .  .  x  .  x  .
     constant_torque             x  x  x  x  x  .  x  .
@@ -77,7 +77,6 @@ WHERE = {
 """Roles of the parts at which an effect must be offered, where there are several."""
 WANTED = {
     "torque_ripple": "ripple is locked to the angle of a turning body: a screw's carriage moves in metres",
-    "backlash": "backlash is put between a body and the spring it drives: these machines drive no spring",
 }
 """Why an effect that can be on a machine is not offered there yet."""
 ROWS = {row[0]: row[1:] for line in TABLE.strip().splitlines() if (row := line.split())}
@@ -168,3 +167,23 @@ def test_within_a_gap_nothing_acts_between_two_bodies(kind: str) -> None:
     (inside, nothing), (beyond, pull) = at(0.4 * gap / way), at(0.6 * gap / way)
     assert (inside, beyond) == pytest.approx((0.4 * gap, 0.6 * gap))
     assert abs(nothing) < 1e-3 * abs(pull)
+
+
+def test_behind_the_play_of_a_gear_is_a_part_of_the_inertia_and_all_of_the_weight() -> None:
+    """Nothing else is tied to the load; a body that a spring pulls at has its load behind the spring."""
+    names, row = names_of("geared_joint", 0), next(row for row in ALL if row.identifier == "backlash")
+    (candidate,) = row(machine("geared_joint"))
+    assert (candidate.location, candidate.strategy.takes_long) == (names["motor"], True)
+    load = "second_inertia"
+    tied = {name: part.between for name, part in candidate.assembly.parts if isinstance(part, Tie)}
+    assert tied == {
+        names["bearing"]: (names["motor"],),
+        names["arm"]: (load,),
+        "shaft": (names["motor"], load),
+    }
+    whole, now = machine("geared_joint").quantities(), candidate.assembly.quantities()
+    inertia = f"{names['motor']}.inertia"
+    assert now[inertia].number + now[f"{load}.inertia"].number == pytest.approx(whole[inertia].number)
+    springs = [c.location for c in row(machine("elastic_joint"))]
+    assert springs == [names["spring"]] * 2
+    assert not row(candidate.assembly), "a gear has play once"
