@@ -26,7 +26,7 @@ from ...model.origin import derived
 from ..identification.equation_error.block import Block
 from ..identification.equation_error.block_noise import LEAST_COVERED
 from ..identification.equation_error.evidence import Bench
-from ..identification.equation_error.inferred_sampling import no_terms, plain_terms
+from ..identification.equation_error.inferred_sampling import Missing, no_terms, plain_terms
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from .effects import Candidate
@@ -124,6 +124,7 @@ def diagnose(
     again = case.read_as_inferred_beside(outcome, decision)
     if again is not None:
         progress("reading inputs between their samples as they run beside what was found")
+        again = replace(again, settled=True)
         fresh = again.comparison.base(actuator)
         anew = _decided(again, fresh, effects, progress)
         if outcome.steps or anew[0].steps:
@@ -144,6 +145,7 @@ class _Case:
     bench: Bench
     comparison: Comparison
     criteria: Criteria
+    settled: bool = False  # whether inputs are read as they run beside what was found already
 
     def excesses(self, hypothesis: Hypothesis) -> Excesses:
         """Return the excess of each block on all samples."""
@@ -177,10 +179,7 @@ class _Case:
         where the inputs are read so already.
         """
         if outcome.steps:
-            lacks = no_terms if outcome.complete else plain_terms
-            return self._read_as(
-                self.bench.inferred(self._blocks(outcome.last.fitted), lacks), _SAME_SAMPLING
-            )
+            return self._read_beside(outcome.last, no_terms if outcome.complete else plain_terms)
         if decision.verdict not in ("unknown", "undecidable"):
             return None
         fitted = (each.hypothesis for each in outcome.tried)
@@ -188,6 +187,19 @@ class _Case:
         if closing is None:
             return None
         return self._read_as(self.bench.inferred(self._blocks(closing.fitted), no_terms), _SAME_SAMPLING)
+
+    def is_read_otherwise_beside(self, hypothesis: Hypothesis) -> bool:
+        """Tell whether inputs run otherwise beside what is named so far than they were read.
+
+        Then what a block still lacks is that shift before it is an effect. It is not asked beside a lag,
+        which may stand for the shift itself.
+        """
+        if self.settled or hypothesis.newest.explains_lag:
+            return False
+        return self._read_beside(hypothesis, plain_terms) is not None
+
+    def _read_beside(self, hypothesis: Hypothesis, lacks: Missing) -> _Case | None:
+        return self._read_as(self.bench.inferred(self._blocks(hypothesis.fitted), lacks), _SAME_SAMPLING)
 
     def _read_as(self, records: RecordSet, least: float) -> _Case | None:
         """Return the case with inputs read otherwise; nothing where none moves by more samples than that."""
@@ -230,6 +242,8 @@ def _decided(
         findings += lagging.findings
         return Outcome(base), _Decision("data_suspect", tuple(str(f) for f in findings))
     outcome = _searched(case, base, catalogue, progress)
+    if outcome.stopped:
+        return outcome, _Decision("unknown")
     if lagging.findings and not any(step.chosen.newest.explains_lag for step in outcome.steps):
         return outcome, _Decision("data_suspect", tuple(str(f) for f in lagging.findings))
     return outcome, _decision(case, base, outcome)
@@ -243,7 +257,10 @@ def _searched(
     closing = free if free and is_complete(case.excesses(free)) else None
     if closing and len(wrong_numbers(closing)) == 1:
         return Outcome(closing, complete=True)  # no effect has fewer numbers
-    outcome = search(case.comparison, base, catalogue, case.criteria, progress)
+    stop = case.is_read_otherwise_beside
+    outcome = search(case.comparison, base, catalogue, case.criteria, progress, stop=stop)
+    if outcome.stopped:
+        return outcome
     if closing and len(wrong_numbers(closing)) < len(outcome.last.unknowns):
         return replace(outcome, last=closing, steps=(), complete=True)
     progress("letting go declared numbers at the end of their ranges")

@@ -26,7 +26,7 @@ from ...foundation.errors import ConvergenceError
 from ...model import flatten
 from ..identification.equation_error.evidence import Bench, Evidence
 from ..identification.filters import derivative
-from ..identification.least_squares import Fit, fit, predicted_cost
+from ..identification.least_squares import Fit, Promise, fit, promised_costs
 from ..identification.parameters import Parameter
 from ..identification.residuals import rmse
 from .tearing import blocks_of
@@ -414,13 +414,17 @@ def best_fit(
     known: Mapping[Key, float] | None = None,
 ) -> Fit:
     """Return the best of fits from several starts, the most promising first."""
-    several = len(starts) > 1
-    choices = [(_promise(evidence, start) if several else 0.0, start) for start in starts]
+    rows = [{p.name: p.start for p in start} for start in starts]
+    several = {name for row in rows for name in row if row[name] != rows[0][name]}
+    choices = [
+        (promised_costs(evidence, start, several) if several else Promise(0.0, 0.0), start)
+        for start in starts
+    ]
     best: Fit | None = None
     failure = ConvergenceError("fit", "has no start")
-    for promised, start in sorted(choices, key=lambda pair: pair[0])[: BUDGET.full_starts]:
+    for promised, start in sorted(choices, key=lambda pair: pair[0].near)[: BUDGET.full_starts]:
         # What does not even promise to reach the best so far is left alone.
-        if best is not None and promised >= best.cost:
+        if best is not None and promised.far >= best.cost:
             continue
         try:
             ended = fit(
@@ -438,14 +442,6 @@ def best_fit(
     if best is None:
         raise failure
     return best
-
-
-def _promise(evidence: Sequence[Evidence], start: Sequence[Parameter]) -> float:
-    """Return the cost that the linearised problem would reach; infinite where there is no response."""
-    try:
-        return predicted_cost(evidence, start)
-    except ConvergenceError:
-        return float("inf")
 
 
 def explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:

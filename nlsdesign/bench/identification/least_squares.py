@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -405,15 +405,37 @@ def fit(
     return Fit(tuple(parameters), values, covariance, ended.cost, misfit, ended.converged, white)
 
 
-def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
-    """Return the cost that the linearised problem reaches from a start, at the price of one evaluation."""
+class Promise(NamedTuple):
+    """What a linearised problem reaches from a start."""
+
+    near: float  # cost with some numbers held at the start
+    far: float  # cost with all numbers free
+
+
+def promised_costs(
+    evidence: Sequence[Evidence], parameters: Sequence[Parameter], held: Collection[str] = ()
+) -> Promise:
+    """Return the costs that the linearised problem reaches from a start, at the price of one evaluation.
+
+    They are infinite where there is no response. ``held``: names of numbers in which the cost has several
+    minima, so that its slopes say nothing of others.
+    """
     low, high, start = box(parameters)
-    residual, slope = StackedRows(evidence, parameters)(start)
+    try:
+        residual, slope = StackedRows(evidence, parameters)(start)
+    except ConvergenceError:
+        return Promise(math.inf, math.inf)
     size = np.linalg.norm(slope, axis=0)
     used = size > 0.0
     step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]
     step = np.clip(start[used] + step, low[used], high[used]) - start[used]
-    return 0.5 * float(np.sum((residual + slope[:, used] @ step) ** 2))
+    far = 0.5 * float(np.sum((residual + slope[:, used] @ step) ** 2))
+    free = used & [p.name not in held for p in parameters]
+    if not free.any():
+        return Promise(0.5 * float(residual @ residual), far)
+    bounds = (low - start)[free] * size[free], (high - start)[free] * size[free]
+    bounded = lsq_linear(slope[:, free] / size[free], -residual, bounds, method="bvls")
+    return Promise(float(bounded.cost), far)
 
 
 class StackedRows:

@@ -12,10 +12,12 @@ from ....components import (
     Backlash,
     ConstantLoad,
     Dashpot,
+    Element,
     GravityLoad,
     HorizontalTorque,
     Inertia,
     Inertial,
+    Mass,
     Rounded,
     Spring,
     Tie,
@@ -34,6 +36,7 @@ from .places import (
     domain_of,
     effort_over_motion,
     laws,
+    moving_bodies,
     restoring_ties,
     sliding_bodies,
     ties_between_bodies,
@@ -47,8 +50,18 @@ _ORDERS = (*range(1, 37), *range(38, 121, 2))
 """Periods per turn where fits begin; a start between two of them is reached from either."""
 _OF_A_MOTOR = (1, 2, 6, 7, 12, 14, 21, 24, 28, 42)
 """Periods per turn of a motor: of its pole pairs, slots and what they have in common."""
-_SHARE_BEHIND = 0.2
-"""Part of an inertia that is put behind a shaft at first."""
+_SHARPER = 0.04
+"""Share of the usual rounding of a contact that a dead zone has: encoders on both sides would see more."""
+_SHARE_BEHIND = 0.35
+"""Part of an inertia that is put behind a shaft at first: within three times of a tenth and of the whole."""
+_NATURAL = tuple(2.0 ** (k / 2.0) for k in range(-6, 7))
+"""Natural frequencies at which a second inertia swings at first, as multiples of that of the quickest motion.
+
+A fit reaches the true one from within a fifth of it. Below an eighth the inertia moves as if it were held,
+beyond eight times as if it were rigid.
+"""
+_CATCHING = (5.0, 12.0, 28.0)
+"""The same of a load between the flanks of a gear: beyond, these are as if rigid."""
 
 
 def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -76,10 +89,17 @@ def _driven_springs(assembly: Assembly) -> list[str]:
     return [name for name in restoring_ties(assembly) if _drivers(assembly, name)]
 
 
+def _inertia_of(assembly: Assembly, body: str) -> str:
+    """Return the name of the inertia or mass of a body."""
+    part = assembly[body]
+    assert isinstance(part, Free)
+    return f"{body}.{part.inertia_name}"
+
+
 def _without_shaft(assembly: Assembly) -> list[str]:
-    """Return the turning bodies, unless an effect has put one of them behind a shaft already."""
-    bodies, numbers = turning_bodies(assembly), assembly.quantities()
-    return [] if any(numbers[f"{body}.inertia"].source == SOURCE for body in bodies) else bodies
+    """Return the moving bodies, unless an effect has put one of them behind a shaft already."""
+    bodies, numbers = moving_bodies(assembly), assembly.quantities()
+    return [] if any(numbers[_inertia_of(assembly, body)].source == SOURCE for body in bodies) else bodies
 
 
 def _rigidly_driven_springs(assembly: Assembly) -> list[str]:
@@ -129,6 +149,31 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(edited, unknowns, {"strategy": Continuation(through=massless)})
 
 
+def _dead_zone(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Put a spring behind a gap, with what else is tied to the same two bodies: nothing acts within it.
+
+    No inertia lies between gap and spring, as where a coupling or a belt has the play.
+    """
+    spring = assembly[name]
+    assert isinstance(spring, Tie)
+    beside = {
+        other: part.element
+        for other, part in assembly.parts
+        if other != name and isinstance(part, Tie) and part.between == spring.between
+    }
+    domain, way = spring.element.domain, effort_over_motion(assembly, name)[1]
+    sharp, edited = _SHARPER * Backlash.rounding[domain], assembly
+    for other in beside:
+        edited = edited.without_part(other)
+
+    def behind(inner: str, element: Element) -> Element:
+        gap, width = (number(value, domain.motion_unit) for value in (1e-2, sharp))
+        return Backlash(gap=gap, contact=Rounded(width=width), members=((inner, element), *beside.items()))
+
+    edited = wrapped(edited, name, "behind_backlash", behind)
+    yield Edit(edited, (Unknown(f"{name}.gap", (0.1, 0.4), 2e-3, 1.8, way),))
+
+
 def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
     domain = domain_of(assembly, body)
     load = ConstantLoad(load=number(0.0, domain.effort_unit), domain=domain)
@@ -162,25 +207,28 @@ def _shaft(
 
     Fits begin at natural frequencies that are given as multiples of that of the quickest motion.
     """
-    name = f"{behind}.inertia"
+    name, domain = _inertia_of(assembly, behind), domain_of(assembly, behind)
     inertia = assembly.quantities()[name]
     second = _SHARE_BEHIND * inertia.number
+    hidden = number(second, domain.inertia_unit)
     body = free_name(assembly, "second_inertia")
-    edited = assembly.with_part(body, Inertia(inertia=number(second, "kg*m^2")))
+    kind = Inertia(inertia=hidden) if domain == ROTATION else Mass(mass=hidden)
+    edited = assembly.with_part(body, kind)
     shaft = free_name(edited, "shaft")
+    stiffness, loss = (domain.unit(unit) for unit in ("{effort}/{motion}", "{effort}*s/{motion}"))
     twist = parallel(
-        stiffness=Spring(stiffness=number(1.0, "N*m/rad")),
-        loss=Dashpot(damping=number(1e-3, "N*m*s/rad"), domain=ROTATION),
+        stiffness=Spring(stiffness=number(1.0, stiffness), domain=domain),
+        loss=Dashpot(damping=number(1e-3, loss), domain=domain),
     )
     edited = edited.with_part(shaft, tie(twist, behind, body))
     left = _reduced(inertia, 1.0 - _SHARE_BEHIND, 0.3)
     edited = edited.with_values({name: left})
     unknowns = (
-        Unknown(f"{body}.inertia", (second,), 1e-3 * second, 5.0 * second, null=None),
+        Unknown(_inertia_of(edited, body), (second,), 1e-3 * second, 2.8 * second, null=None),
         Unknown(
             f"{shaft}.stiffness.stiffness",
             tuple(second * omega**2 for omega in frequencies),
-            second * 0.1,
+            second * 1e-3,
             second * 1e4,
             f"1 / {QUICKEST} / {QUICKEST}",
             null=math.inf,
@@ -199,7 +247,7 @@ def _shaft(
 
 def _absorber(assembly: Assembly, body: str) -> Iterator[Edit]:
     """Let a part of the inertia hang on a shaft; what acts on the body goes on acting on it."""
-    edited, _, unknowns = _shaft(assembly, body, (3.0, 8.0))
+    edited, _, unknowns = _shaft(assembly, body, _NATURAL)
     yield Edit(edited, unknowns)
 
 
@@ -212,6 +260,38 @@ def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield Edit(
         edited.with_part(name, replace(part, between=ends)), unknowns, {"strategy": Plain(takes_long=True)}
     )
+
+
+def _unsprung(assembly: Assembly) -> list[str]:
+    """Return the moving bodies on which no spring acts: their load is one with them in the model."""
+    springs = [assembly[name] for name in restoring_ties(assembly)]
+    ends = {end for spring in springs if isinstance(spring, Tie) for end in spring.between}
+    return [body for body in _without_shaft(assembly) if body not in ends]
+
+
+def _gear_with_play(assembly: Assembly, body: str) -> Iterator[Edit]:
+    """Put a part of the inertia and all weights of a body behind a gap between flanks that give way.
+
+    A load that hangs on nothing else flies freely through the gap; how stiff and how lossy the flanks are
+    decides how it is caught, and the drive feels both.
+    """
+    edited, load, (inertia, stiffness, loss) = _shaft(assembly, body, _CATCHING)
+    shaft, domain = stiffness.name.partition(".")[0], domain_of(assembly, body)
+    width = number(_SHARPER * Backlash.rounding[domain], domain.motion_unit)
+    gap = number(1e-2, domain.motion_unit)
+    flanks = wrapping(Backlash, gap=gap, contact=Rounded(width=width))
+    edited = wrapped(edited, shaft, "flanks", flanks)
+    for name, part in assembly.parts:
+        if isinstance(part, Tie) and part.between == (body,) and "gravity" in part.element.phenomena:
+            edited = edited.with_part(name, replace(part, between=(load,)))
+    way, _ = assembly[body].motion_names  # type: ignore[attr-defined]
+    unknowns = (
+        Unknown(f"{shaft}.gap", (0.002, 0.005, 0.012), 1e-4, 0.2, f"{body}.{way}"),
+        inertia,
+        replace(stiffness, name=f"{shaft}.flanks.stiffness.stiffness", null=None),
+        replace(loss, name=f"{shaft}.flanks.loss.damping", starts=(2.5 * inertia.starts[0],)),
+    )
+    yield Edit(edited, unknowns, {"strategy": Plain(takes_long=True)})
 
 
 torque_ripple = Effect(
@@ -238,6 +318,19 @@ backlash = Effect(
             "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
             "Nordin and Gutman 2002",
             "backlash",
+        ),
+        Form(
+            ties_between_bodies,
+            _dead_zone,
+            "no effort at all over a dead way around zero, the same at any speed",
+            "Nordin and Gutman 2002",
+            "backlash",
+        ),
+        Form(
+            _unsprung,
+            _gear_with_play,
+            "a part of the inertia that is missing for a moment after each reversal, and then comes at once",
+            "Nordin and Gutman 2002",
         ),
     ),
 )

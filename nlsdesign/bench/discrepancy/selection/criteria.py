@@ -340,7 +340,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     able = [rival for rival in able if explained(before, rival.excesses).get(block, 0.0) > 0.0] or able
     if not able:
         return None
-    best = min(able, key=left)
+    best = min(able, key=lambda rival: (left(rival), rival.excesses[block].chi2))
 
     near = [rival for rival in able if predict_alike(criteria, rival, best, block, left)]
     simplest = min(rival.numbers for rival in near)
@@ -364,13 +364,16 @@ def predict_alike(
 ) -> bool:
     """Tell whether a rival predicts about as well as the best: within noise, or in proportion.
 
-    What it gains in another block does not make up for what it leaves in this one.
+    What it gains in another block does not make up for what it leaves in this one. Below the floor no excess
+    tells two apart; but what the best one leaves is not less than the noise, so the floor of the block is too
+    high then, and the squares themselves stand in the proportion.
     """
     here, there = ({block: each.excesses[block]} for each in (rival, best))
     gains = gain(here, there), gain(rival.excesses, best.excesses)
     within = not any(criteria.is_more_than_noise(each) for each in gains)
-    nested = rival.effect in best.simpler
-    return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
+    factor = criteria.richer if rival.effect in best.simpler else criteria.equal
+    squares = rival.excesses[block].chi2 <= factor * best.excesses[block].chi2
+    return within or (squares and left(rival) <= factor * left(best))
 
 
 def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -> bool:

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 from ....foundation.errors import ConvergenceError
 from ..effects.effect import Candidate, EffectFunction
@@ -220,6 +221,16 @@ class Outcome:
     tried: tuple[Tried, ...] = ()  # what was tried first, the best first
     complete: bool = False  # whether nothing is left beyond the noise
     skipped: tuple[Skipped, ...] = ()  # what could not be compared, and why
+    stopped: bool = False  # whether the search was given up for one that reads the records otherwise
+
+
+Stop: TypeAlias = Callable[[Hypothesis], bool]
+"""Tells beside which names a search is given up."""
+
+
+def never(hypothesis: Hypothesis) -> bool:
+    """Let a search go on to its end."""
+    return False
 
 
 def search(
@@ -228,9 +239,11 @@ def search(
     catalogue: Sequence[EffectFunction],
     criteria: Criteria,
     progress: Callable[[str], None],
+    *,
+    stop: Stop = never,
 ) -> Outcome:
     """Add effects to a hypothesis while a block stays open and one may be named."""
-    return _Search(Trials(comparison, catalogue, criteria, progress)).outcome(base)
+    return _Search(Trials(comparison, catalogue, criteria, progress), stop).outcome(base)
 
 
 @dataclass(eq=False)
@@ -238,7 +251,9 @@ class _Search:
     """The order in which effects are added, dropped and exchanged."""
 
     trials: Trials
+    stop: Stop = never  # asked beside what is named so far
     tried: tuple[Tried, ...] = ()
+    stopped: bool = False
 
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.trials.comparison.coarsely(base)
@@ -247,7 +262,10 @@ class _Search:
         # beside the effects that stay. Only then is it known what all of them leave, and whether a block
         # with much left may have a name at all. Fits to all samples are the dearest, so they come after
         # that. What each effect gains is asked of the final set, because dropping any other one changes it.
-        steps = revision.simplified(revision.backward(self._forward(start)))
+        steps = self._forward(start)
+        if self.stopped:
+            return Outcome(steps[-1].chosen, tuple(steps), self.tried, stopped=True)
+        steps = revision.simplified(revision.backward(steps))
         steps = self._explaining(start, revision.sound(steps))
         last = self._fitted_to_all(start, steps)
         skipped = tuple(dict.fromkeys(self.trials.skipped))
@@ -334,6 +352,9 @@ class _Search:
             # A richer form of what is named comes before one more name.
             steps = Revision(self.trials, start).enriched(steps + further)
             present = steps[-1].chosen
+            self.stopped = self.stop(present)
+            if self.stopped:
+                break
         return steps
 
     def _is_far_from_closed(self, start: Hypothesis, present: Hypothesis, block: str) -> bool:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
 from benchmarks._score_run import opened
 from nlsdesign.bench.discrepancy import diagnose, effects
-from nlsdesign.bench.discrepancy.diagnose import blocks_of
+from nlsdesign.bench.discrepancy.diagnose import _Case, blocks_of
+from nlsdesign.bench.discrepancy.effects.effect import Candidate
+from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.identification.equation_error import block_noise
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.equation_error.inferred_sampling import no_terms
+from nlsdesign.components import Fixed
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from tests.rig.kind_cases import write_kind_case
 
@@ -70,3 +76,39 @@ def test_a_shift_that_explains_a_third_is_no_answer(tmp_path: Path) -> None:
     rivals = (effects.load_dependent_friction, effects.coulomb_friction, effects.current_sensor_bias)
     verdict = diagnose(*opened(tmp_path), catalogue=rivals)
     assert [effect.name for effect in verdict.effects] == ["load_dependent_friction"]
+
+
+@pytest.mark.long_cases("drivetrain_resonance-1170", "backlash-1200")
+@pytest.mark.parametrize(("effect", "seed"), [("drivetrain_resonance", 1170), ("backlash", 1200)])
+def test_what_a_name_leaves_is_a_shift_within_a_sample_before_it_is_a_fault(
+    effect: str, seed: int, tmp_path: Path
+) -> None:
+    """The effect hides at first that the current is held; a clock that drifts was named for it.
+
+    The resonance is found from a start at half the frequency of the quickest motion.
+    """
+    write_kind_case(tmp_path, "elastic_joint", (effect,), 1.0, seed)
+    rivals = (getattr(effects, effect), effects.clock_drift)
+    verdict = diagnose(*opened(tmp_path), catalogue=rivals)
+    assert [each.name for each in verdict.effects] == [effect]
+    assert verdict.complete
+
+
+def test_a_lag_is_not_what_inputs_are_read_beside() -> None:
+    """It may stand for the shift itself, and would hide it for good."""
+    asked = list[str]()
+
+    class Case(_Case):
+        def _read_beside(self, hypothesis: Hypothesis) -> _Case | None:
+            asked.append(hypothesis.newest.effect)
+            return self
+
+    case = Case(cast(Any, None), cast(Any, None), cast(Any, None), cast(Any, None))
+    blank = assembly("blank", load=Fixed())
+    friction, lag = (
+        Hypothesis(blank, (Candidate(name, "motor", blank, (), "sign", "source", explains_lag=late),))
+        for name, late in (("friction", False), ("delay", True))
+    )
+    assert (case.is_read_otherwise_beside(friction), case.is_read_otherwise_beside(lag)) == (True, False)
+    assert not replace(case, settled=True).is_read_otherwise_beside(friction), "once is enough"
+    assert asked == ["friction"]

@@ -311,6 +311,19 @@ def test_a_richer_form_must_halve_what_its_simpler_form_leaves() -> None:
     assert total_excess(FIRST) > 50.0 * 4.1e3
 
 
+def test_below_a_floor_that_is_too_high_the_squares_stand_in_the_proportion() -> None:
+    """Behind coarse counts neither leaves an excess; one leaves a tenth of the squares of the other."""
+
+    def below(effect: str, numbers: int, share: float, simpler: tuple[str, ...] = ()) -> Rival[str]:
+        return rival(effect, numbers, (share - 1.0) * ROWS, motor=100.0, simpler=simpler)
+
+    stribeck = below("stribeck", 3, 0.05, ("coulomb",))
+    assert not below("coulomb", 1, 0.5).excesses["spring"].excess
+    assert taken(below("coulomb", 1, 0.5), stribeck) == ("stribeck",)
+    assert taken(below("coulomb", 1, 0.09), stribeck) == ("coulomb",), "twice the squares are not enough"
+    assert taken(below("one", 1, 0.95), below("other", 1, 0.85)) == ("one", "other"), "nor a tenth more"
+
+
 def test_an_effect_that_spoils_another_block_pays_for_it() -> None:
     spoiling, clean = rival("spoiling", 1, 1e4, motor=4e4), rival("clean", 1, 2e4)
     assert taken(spoiling, clean, rule=SHARES_ONLY) == ("clean",)

@@ -208,7 +208,7 @@ def test_a_motor_without_a_spring_has_the_effects_of_a_drive() -> None:
         "coulomb_friction": 1, "stribeck_friction": 1, "quadratic_drag": 1, "torque_ripple": 1,
         "drive_delay": 1, "torque_constant_saturation": 2, "angle_sensor_eccentricity": 2,
         "constant_torque": 1, "gravity_load": 1, "position_dependent_friction": 2, "drivetrain_resonance": 1,
-        "command_compression": 1, "winding_heat": 1, "torque_constant_drift": 2,
+        "command_compression": 1, "winding_heat": 1, "torque_constant_drift": 2, "backlash": 1,
     }  # fmt: skip
     once, on_motor = (
         c.assembly.quantities()["encoder_eccentricity.order"].number for c in angle_sensor_eccentricity(drive)

@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.bench.discrepancy.effects import ALL, Effect
-from nlsdesign.components import Assembly
+from nlsdesign.bench.discrepancy.effects.places import effort_over_motion
+from nlsdesign.components import Assembly, Tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck, read_deck
+from nlsdesign.model import flatten
 from tests.rig.kind_cases import ALL_KINDS, names_of
 from tests.rig.kind_decks import deck_of
 from tests.rig.kinds import KINDS
@@ -29,8 +31,8 @@ TABLE = """
     position_dependent_friction x  x  x  x  x  x  x  .
     asymmetric_friction         .  .  .  .  .  .  .  .
     torque_ripple               x  x  x  x  x  o  x  .
-    backlash                    x  x  o  .  x  o  o  .
-    drivetrain_resonance        x  x  x  x  x  o  x  .
+    backlash                    x  x  x  x  x  x  x  .
+    drivetrain_resonance        x  x  x  x  x  x  x  .
     spring_damping              .  x  .  .  x  .  x  .
     constant_torque             x  x  x  x  x  .  x  .
     constant_force              .  .  .  .  .  x  x  .
@@ -75,8 +77,6 @@ WHERE = {
 """Roles of the parts at which an effect must be offered, where there are several."""
 WANTED = {
     "torque_ripple": "ripple is locked to the angle of a turning body: a screw's carriage moves in metres",
-    "backlash": "backlash is put between a body and the spring it drives: these machines drive no spring",
-    "drivetrain_resonance": "a shaft is put at a turning body: a screw's carriage moves in metres",
 }
 """Why an effect that can be on a machine is not offered there yet."""
 ROWS = {row[0]: row[1:] for line in TABLE.strip().splitlines() if (row := line.split())}
@@ -140,3 +140,50 @@ def test_every_effect_of_a_case_is_one_of_the_table_or_said_to_be_in_no_list() -
         assert {alias.get(effect, effect) for effect in kind.effects} <= set(ROWS), kind.name
         assert not set(kind.not_listed) & set(ROWS), kind.name
         assert {effect for pair in kind.pairs for effect in pair} <= set(kind.effects), kind.name
+
+
+@pytest.mark.parametrize("kind", ["elastic_joint", "rack_carriage"])
+def test_within_a_gap_nothing_acts_between_two_bodies(kind: str) -> None:
+    """A dashpot beside the spring is behind the gap too; no inertia lies between gap and spring."""
+    names, row = names_of(kind, 0), next(row for row in ALL if row.identifier == "backlash")
+    (candidate,) = (c for c in row(machine(kind)) if not c.strategy.takes_long)
+    spring, place = names["spring"], "position" if kind == "rack_carriage" else "angle"
+    assert (candidate.location, names["spring_damping"] in dict(candidate.assembly.parts)) == (spring, False)
+    gap = candidate.assembly.quantities()[f"{spring}.gap"].number
+    model, (effort, motion) = flatten(candidate.assembly), effort_over_motion(candidate.assembly, spring)
+
+    def at(turn: float) -> tuple[float, float]:
+        """Way and effort of the spring while the motor alone has turned, and both bodies move."""
+        states = {v.name: 1.0 for v in model.states}
+        states |= {
+            f"{names['load']}.{place}": 0.0,
+            f"{names['motor']}.angle": turn,
+            f"{names['motor']}.speed": 2.0,
+        }
+        shown = model.evaluate([states[v.name] for v in model.states], [0.0] * len(model.inputs))
+        return shown[motion], shown[effort]
+
+    way = at(1.0)[0]
+    (inside, nothing), (beyond, pull) = at(0.4 * gap / way), at(0.6 * gap / way)
+    assert (inside, beyond) == pytest.approx((0.4 * gap, 0.6 * gap))
+    assert abs(nothing) < 1e-3 * abs(pull)
+
+
+def test_behind_the_play_of_a_gear_is_a_part_of_the_inertia_and_all_of_the_weight() -> None:
+    """Nothing else is tied to the load; a body that a spring pulls at has its load behind the spring."""
+    names, row = names_of("geared_joint", 0), next(row for row in ALL if row.identifier == "backlash")
+    (candidate,) = row(machine("geared_joint"))
+    assert (candidate.location, candidate.strategy.takes_long) == (names["motor"], True)
+    load = "second_inertia"
+    tied = {name: part.between for name, part in candidate.assembly.parts if isinstance(part, Tie)}
+    assert tied == {
+        names["bearing"]: (names["motor"],),
+        names["arm"]: (load,),
+        "shaft": (names["motor"], load),
+    }
+    whole, now = machine("geared_joint").quantities(), candidate.assembly.quantities()
+    inertia = f"{names['motor']}.inertia"
+    assert now[inertia].number + now[f"{load}.inertia"].number == pytest.approx(whole[inertia].number)
+    springs = [c.location for c in row(machine("elastic_joint"))]
+    assert springs == [names["spring"]] * 2
+    assert not row(candidate.assembly), "a gear has play once"

@@ -16,7 +16,7 @@ from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.criteria import Criteria
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.selection.measures import EffectNumber, Standing
-from nlsdesign.bench.discrepancy.selection.search import Outcome, search
+from nlsdesign.bench.discrepancy.selection.search import Outcome, Stop, never, search
 from nlsdesign.bench.discrepancy.selection.trials import Skipped
 from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.bench.identification.parameters import Parameter
@@ -112,9 +112,9 @@ def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def outcome(table: Table, *effects: EffectFunction) -> Outcome:
+def outcome(table: Table, *effects: EffectFunction, stop: Stop = never) -> Outcome:
     base = table.hypothesis(())
-    return search(cast(Comparison, table), base, effects, Criteria(), lambda text: None)
+    return search(cast(Comparison, table), base, effects, Criteria(), lambda text: None, stop=stop)
 
 
 def names(found: Outcome) -> list[str]:
@@ -135,6 +135,17 @@ def test_the_one_effect_that_explains_is_named_and_fitted_to_all_samples() -> No
     assert [(e.candidate.effect, round(e.share, 2)) for e in found.tried] == [("b", 1.0), ("a", 0.1)]
     assert [bool(e.objections) for e in found.tried] == [False, True]
     assert found.steps[0].share == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_search_is_given_up_beside_what_asks_for_another_reading_of_the_records() -> None:
+    table = Table({(): (1e5,), ("a",): (3e3,), ("b",): (9e4,), ("a", "b"): (10.0,)})
+    effects = effect("a"), effect("b")
+    whole = outcome(table, *effects)
+    assert (names(whole), whole.stopped) == (["a", "b"], False)
+    table.asked.clear()
+    given_up = outcome(table, *effects, stop=lambda hypothesis: hypothesis.names == ("a",))
+    assert (names(given_up), given_up.stopped) == (["a"], True)
+    assert ("a", "b") not in table.asked, "nothing is tried beside it, and nothing looked at again"
 
 
 def test_a_second_effect_is_sought_while_a_block_is_open() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -34,7 +34,7 @@ from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.identification import Parameter
 from nlsdesign.bench.identification.equation_error.block import Drive
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Evidence
-from nlsdesign.bench.identification.least_squares import Fit
+from nlsdesign.bench.identification.least_squares import Fit, Promise
 from nlsdesign.components import Fixed
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
@@ -57,6 +57,8 @@ class Notebook:
     """Stands for the least squares: ends where it began, at a cost that is a table of starts."""
 
     costs: Mapping[float, float] = field(default_factory=dict)
+    near: Mapping[float, float] = field(default_factory=dict)
+    held: list[Collection[str]] = field(default_factory=list)
     fits: list[dict[str, Any]] = field(default_factory=list)
 
     def fit(self, evidence: Sequence[Evidence], parameters: Start, **settings: Any) -> Fit:
@@ -70,15 +72,20 @@ class Notebook:
         known = tuple(replace(p, sigma=p.sigma or 1.0) for p in parameters)
         return Fit(known, values, np.eye(len(parameters)), cost, {}, True)
 
-    def predicted_cost(self, evidence: Sequence[Evidence], parameters: Start) -> float:
-        return self.costs.get(parameters[0].start, 1.0)
+    def promised_costs(
+        self, evidence: Sequence[Evidence], parameters: Start, held: Collection[str]
+    ) -> Promise:
+        self.held.append(held)
+        begin = parameters[0].start
+        far = self.costs.get(begin, 1.0)
+        return Promise(self.near.get(begin, far), far)
 
 
 @pytest.fixture
 def notebook(monkeypatch: pytest.MonkeyPatch) -> Notebook:
     written = Notebook()
     monkeypatch.setattr(strategies, "fit", written.fit)
-    monkeypatch.setattr(strategies, "predicted_cost", written.predicted_cost)
+    monkeypatch.setattr(strategies, "promised_costs", written.promised_costs)
     return written
 
 
@@ -145,6 +152,17 @@ def test_the_best_start_is_fitted_first_and_what_promises_less_not_at_all(notebo
     assert [f["start"] for f in notebook.fits] == [0.5]
     assert notebook.fits[0]["records"] == ["a", "b", "c", "d"]
     assert notebook.fits[0]["known"] is None
+
+
+def test_starts_are_ranked_by_what_they_reach_without_leaving_their_place(notebook: Notebook) -> None:
+    """Slopes in a number with several minima promise the third start most, and lead nowhere from it."""
+    notebook.costs, notebook.near = {0.1: 5.0, 0.5: 6.0, 0.9: 1.0}, {0.1: 8.0, 0.5: 7.0, 0.9: 9.0}
+    best_fit([], [start(value) for value in (0.1, 0.5, 0.9)], Limits(5, 0.0))
+    assert [f["start"] for f in notebook.fits] == [0.5, 0.1, 0.9]
+    assert notebook.held == [{"spring.gap"}] * 3
+    both = [(*start(value), *start(0.2, "spring.width")) for value in (0.1, 0.5)]
+    best_fit([], both, Limits(5, 0.0))
+    assert notebook.held[-1] == {"spring.gap"}, "a number with one start is not held"
 
 
 def test_a_start_without_a_response_says_nothing_of_the_others(notebook: Notebook) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -22,7 +23,7 @@ from nlsdesign.bench.identification.least_squares import (
     declared_parameter,
     fit,
     minimise,
-    predicted_cost,
+    promised_costs,
 )
 from nlsdesign.bench.identification.records.measurement import Column, Record, RecordSet
 from nlsdesign.components import (
@@ -287,7 +288,14 @@ def test_a_look_ahead_equals_the_fit_of_a_linear_problem() -> None:
     )
     evidence = bench_of([record], block).evidence(driven, [record], block.model.values)
     parameters = [Parameter(n, "Pa", 1e6, 1e6, float("inf"), -1e8, 1e8, "linear", 1e6) for n in names]
-    assert predicted_cost(evidence, parameters) == pytest.approx(fit(evidence, parameters).cost, rel=1e-4)
+    promise = promised_costs(evidence, parameters)
+    assert promise.far == pytest.approx(fit(evidence, parameters).cost, rel=1e-4)
+    assert promise.near == pytest.approx(promise.far, rel=1e-6)
+    held = promised_costs(evidence, parameters, {names[1]})
+    assert held.far == promise.far
+    fixed = [parameters[0], replace(parameters[1], lower=1e6 - 1.0, upper=1e6 + 1.0)]
+    assert held.near == pytest.approx(fit(evidence, fixed).cost, rel=1e-4)
+    assert held.near > 2.0 * held.far
 
 
 def test_least_squares_meets_bounds_like_a_solver_for_linear_problems() -> None:
