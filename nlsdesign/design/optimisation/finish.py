@@ -17,7 +17,7 @@ from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.origin import derived
 from ..curves.target import Target
-from ..statics.contour import Contour, contour_from_curvature
+from ..statics.contour import Contour
 from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam
 from ..statics.equilibrium import cam_function, torque_function, with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
@@ -159,7 +159,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
     tolerance, remarks = _tolerance(solved)
     cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
     sentences = []
-    if "MaximumCableTension" not in kinds:
+    if cam.roller is None and "MaximumCableTension" not in kinds:
         sentences.append(
             f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
         )
@@ -276,7 +276,7 @@ def _beyond_defaults(solved: SolvedSearch) -> Iterator[str]:
         for bound in limit.bounds(problem.design):
             state = limit_state(problem, bound, solved.best.point)
             excess = (state.value - state.bound) * (1.0 if state.upper else -1.0)
-            if excess > _ACTIVE * bound.scale:
+            if excess > _ACTIVE * (bound.scale if bound.offset is None else abs(state.bound)):
                 yield f"beyond what the declared cable and rubber allow: {state}"
 
 
@@ -345,20 +345,10 @@ def _designed(old: Quantity, value: float, source: str) -> Quantity:
 
 
 def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
-    design = problem.design
     if problem.contour is None:
         return contour_of_cam(cam), None
-    anchor = design.cam.anchor_distance
-    contour = contour_from_curvature(
-        problem.evaluate(design.directions, best.point),
-        problem.evaluate(design.radii_of_curvature, best.point),
-        first_slope=float(problem.evaluate(problem.contour.first_slope.value, best.point)[0]),
-        first_lever_arm=float(problem.evaluate(design.lever_arms[0], best.point)[0]),
-        anchor_distance=(
-            np.inf if anchor is None else float(problem.evaluate(design.parameters[anchor], best.point)[0])
-        ),
-    )
-    given = None if anchor is None else contour.anchor_distance
+    contour = problem.contour.made(problem.design, lambda each: problem.evaluate(each, best.point))
+    given = None if problem.design.cam.anchor_distance is None else contour.anchor_distance
     fit = cam_from_profile(
         contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES, anchor_distance=given
     )
@@ -370,11 +360,12 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
+    read, end = bound.read(value), bound.read(bound.value)
     angles = problem.evaluate(problem.design.angles, point)
     where = ""
     if active and len(values) == len(angles):
         where = spans_of(angles, np.abs(values - bound.value) <= _ACTIVE * bound.scale)
-    return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active, where)
+    return LimitState(bound.limit, bound.of, read, end, bound.at_most, bound.unit, active, where)
 
 
 _ANGLES = 801

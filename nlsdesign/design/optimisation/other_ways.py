@@ -99,7 +99,7 @@ def hollow_contour(loose: Loosened) -> Hollow | None:
     All limits are kept but those on its curvature, with what is free, or else with all sizes freed.
     """
     problem = loose.open.problem
-    if problem.contour is None:
+    if problem.contour is None or not problem.contour.radii_of_curvature:
         return None
     names = [v.name for v in problem.variables]
     radii = [names.index(v.name) for v in problem.contour.radii_of_curvature]

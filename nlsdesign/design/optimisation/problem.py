@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import casadi as ca
 import numpy as np
@@ -16,12 +16,24 @@ from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
 from ...model.structure import CamNames
 from ..curves.target import Target
-from ..statics.declared_cam import declared_cam
+from ..statics.declared_cam import contour_of_cam, declared_cam
 from ..statics.energy import closed_form
 from ..statics.equilibrium import ElasticLaw, elastic_law
+from ..statics.roller_contour import RollerContour
 from .design_point import DesignPoint, Stretched
 from .program import DesignVariable, Rows, scalar
-from .shape import ContourVariables, Shape, Start, StartSizes, given, parallel, start_values, through_centre
+from .roller_shape import given_roller, rolled
+from .shape import (
+    INTERVALS,
+    FreeContour,
+    Shape,
+    Start,
+    StartSizes,
+    given,
+    parallel,
+    start_values,
+    through_centre,
+)
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""
@@ -50,7 +62,7 @@ class DesignProblem:
     design: DesignPoint  # the design in symbols
     structure: tuple[Rows, ...]  # rows that hold for any cam; no limit of the designer
     scalars: tuple[DesignVariable, ...]  # the single numbers that are free
-    contour: ContourVariables | None  # the variables of the contour; None where it is given
+    contour: FreeContour | None  # the variables of the contour; None where it is given
     sizes: StartSizes  # what starts are relative to
     # states: scaled values of the unknowns that the structure ties to the contour; they follow its variables
     states: Expression
@@ -130,8 +142,15 @@ def design_problem(
     parameters = {
         v.name: scalars[v.name].value if v.name in scalars else ca.SX(v.start) for v in model.parameters
     }
-    anchor, contour = law.cam.anchor_distance, None
-    if not contour_is_free:
+    anchor, roller = law.cam.anchor_distance, law.cam.roller
+    contour: FreeContour | None = None
+    if roller is not None and contour_is_free:
+        base, radius = parameters[roller.base_radius], model.values[roller.radius]
+        contour, shape = rolled(target, end, arm=arm, base=base, radius=radius)
+    elif roller is not None:
+        declared = contour_of_cam(cam, last_angle=target.last_angle, points=INTERVALS + 1)
+        shape = given_roller(cast(RollerContour, declared))
+    elif not contour_is_free:
         shape = given(model, cam, target.last_angle, law.cam.drive)
     elif made.through_centre and anchor is not None:
         contour, shape = through_centre(parameters[anchor], target.last_angle, arm, end=end)
@@ -168,7 +187,8 @@ def contour_names(cam: CamNames) -> tuple[str, str]:
 def movable_numbers(model: FlatModel, cam: CamNames) -> dict[str, Variable]:
     """Return the single numbers that a design may change, by name."""
     ratios = [body.motor.gear_ratio for body in model.bodies if body.motor is not None]
-    names = [*cam.numbers, cam.anchor_distance, *ratios]
+    base = [] if cam.roller is None else [cam.roller.base_radius]
+    names = [*cam.numbers, cam.anchor_distance, *base, *ratios]
     return {name: model.variable(name) for name in names if name is not None}
 
 
@@ -193,7 +213,9 @@ def _split(model: FlatModel, free: Sequence[str], cam: CamNames) -> tuple[bool, 
             "the anchor shapes the contour, so it can only be free together with it",
             next_step=f"free '{contours[0]}' too",
         )
-    return contour_is_free, [v for name, v in movable.items() if name in free]
+    # The base radius of a cam with a roller is chosen with its contour.
+    base = [cam.roller.base_radius] if cam.roller is not None and contour_is_free else []
+    return contour_is_free, [v for name, v in movable.items() if name in (*free, *base)]
 
 
 def _not_movable(name: str, model: FlatModel, movable: Sequence[str]) -> NlsError:
@@ -214,7 +236,7 @@ def _sizes(law: ElasticLaw, target: Target) -> tuple[float, float]:
     except InfeasibleError:
         # The rubber as it is cannot store the energy; what is free may change that.
         return 0.01, 0.01 * target.last_angle
-    return float(np.clip(profile.lever_arms[-1], 1e-4, 0.2)), float(profile.extensions[-1])
+    return float(np.clip(profile.lever_arms.max(), 1e-4, 0.2)), float(profile.extensions.max())
 
 
 def _lifted(problem: DesignProblem) -> DesignProblem:
@@ -264,7 +286,8 @@ def _design(
         lever_arms=shape.lever_arms,
         lever_arm_slopes=shape.lever_arm_slopes,
         radii_of_curvature=shape.radii_of_curvature,
-        radii=ca.sqrt(shape.lever_arms**2 + shape.slopes**2 + 1e-18),
+        radii=shape.radii,
+        edge=shape.edge,
         extensions=stretched,
         forces=forces,
         stiffnesses=ca.vertcat(*[column.stiffness for column in columns]),

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
+from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
+from .design_point import DesignPoint
+from .edges import CableEdge, Edge
+from .limits import Bound
 from .program import DesignVariable, Rows, scaled
+
+CONVEX = "ConvexContour"
+"""Name of what holds a contour under a cable: it is nowhere hollow."""
 
 INTERVALS = 40
 """Intervals of the contour; the number moves the results by less than their last digit shown."""
@@ -36,7 +46,7 @@ class Shape(NamedTuple):
     directions: Expression
     angles: Expression
     lever_arms: Expression
-    slopes: Expression
+    radii: Expression
     radii_of_curvature: Expression
     extensions: Expression
     lever_arm_slopes: Expression
@@ -44,22 +54,80 @@ class Shape(NamedTuple):
     through_centre: bool
     states: tuple[DesignVariable, ...]
     state_values: Expression
+    edge: Edge
 
 
-class ContourVariables(NamedTuple):
-    """The variables that shape a contour; the last is the last direction, or the first lever arm.
+@dataclass(frozen=True, eq=False)
+class FreeContour(ABC):
+    """The variables that shape the contour of one kind of cam, and what follows from them."""
+
+    # radii_of_curvature: those that must not be negative, or the contour is hollow; none where it may be
+    radii_of_curvature: tuple[DesignVariable, ...]
+
+    @abstractmethod
+    def all(self) -> list[DesignVariable]:
+        """Return them in the order of the vector."""
+
+    @abstractmethod
+    def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
+        """Return their scaled values at a start by name."""
+
+    @abstractmethod
+    def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
+        """Return what holds them besides the limits; ``curved``: whether a limit keeps the edge convex."""
+
+    @abstractmethod
+    def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
+        """Return the contour at a solution, at which ``value`` gives numbers for expressions."""
+
+
+def held(limit: str, of: str, expression: Expression, scale: float) -> Bound:
+    """Return what must not be negative."""
+    return Bound(limit, of, ca.SX(expression), 0.0, False, "mm", scale)
+
+
+@dataclass(frozen=True, eq=False)
+class ContourVariables(FreeContour):
+    """The variables of a contour under a cable; the last is the last direction, or the first lever arm.
 
     Where the cable passes through the centre the first lever arm is zero and the last direction follows from
     the anchor; where it stays parallel the last direction is the last angle and the first lever arm is free.
     """
 
-    radii_of_curvature: tuple[DesignVariable, ...]
     first_slope: DesignVariable
     last: DesignVariable
 
     def all(self) -> list[DesignVariable]:
         """Return them in the order of the vector."""
         return [*self.radii_of_curvature, self.first_slope, self.last]
+
+    def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
+        """Return their scaled values at a start by name."""
+        values = {v.name: v.start for v in self.all()}
+        # No start may reach to the anchor.
+        size = min(start.contour_size, sizes.largest_arm / sizes.arm)
+        slope = size * start.slope_share
+        values |= {radius.name: size - 0.5 * slope for radius in self.radii_of_curvature}
+        values[self.first_slope.name] = slope
+        return values
+
+    def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
+        """Return that the contour is convex and the cable pulls."""
+        bounds = [] if curved else [held(CONVEX, "radius of curvature", design.radii_of_curvature, arm)]
+        if design.cam.anchor_distance is None or not design.through_centre:
+            return [*bounds, held("PullingCable", "lever arm", design.lever_arms, arm)]
+        return [*bounds, held("PullingCable", "first slope", self.first_slope.value, arm)]
+
+    def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
+        """Return the contour at a solution."""
+        anchor = design.cam.anchor_distance
+        return contour_from_curvature(
+            value(design.directions),
+            value(design.radii_of_curvature),
+            first_slope=float(value(self.first_slope.value)[0]),
+            first_lever_arm=float(value(design.lever_arms[0])[0]),
+            anchor_distance=np.inf if anchor is None else float(value(design.parameters[anchor])[0]),
+        )
 
 
 class _Support(NamedTuple):
@@ -99,8 +167,8 @@ def through_centre(
     )
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     return variables, Shape(
-        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows, True,
-        support.states, support.state_values,
+        directions, angles, p, _distance(p, slope), rho, extensions, slope * root / (root - slope),
+        rows, True, support.states, support.state_values, CableEdge(directions, p, rho, 2),
     )  # fmt: skip
 
 
@@ -114,9 +182,13 @@ def parallel(last_angle: Expression, size: float) -> tuple[ContourVariables, Sha
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     rows = (support.rows, Rows(p / size, 0.0, ca.inf))
     return variables, Shape(
-        directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False,
-        support.states, support.state_values,
+        directions, directions, p, _distance(p, slopes), rho, arcs - (slopes - slopes[0]), slopes,
+        rows, False, support.states, support.state_values, CableEdge(directions, p, rho, 1),
     )  # fmt: skip
+
+
+def _distance(p: Expression, slopes: Expression) -> Expression:
+    return ca.sqrt(p**2 + slopes**2 + 1e-18)
 
 
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
@@ -130,11 +202,12 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
         extensions = np.array(law[1]).ravel()
     # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
     root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
+    rho, phi, p = (ca.SX(c) for c in (contour.radii_of_curvature, contour.directions, contour.lever_arms))
+    both = declared_cam(cam).through_centre
     return Shape(
-        ca.SX(contour.directions), ca.SX(contour.angles), ca.SX(contour.lever_arms), ca.SX(contour.slopes),
-        ca.SX(contour.radii_of_curvature), ca.SX(extensions),
-        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), declared_cam(cam).through_centre,
-        (), ca.SX(0, 1),
+        phi, ca.SX(contour.angles), p, _distance(p, ca.SX(contour.slopes)), rho, ca.SX(extensions),
+        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), both, (), ca.SX(0, 1),
+        CableEdge(phi, p, rho, 2 if both else 1),
     )  # fmt: skip
 
 
@@ -224,7 +297,7 @@ def start_values(
     start: Start,
     *,
     scalars: Sequence[DesignVariable],
-    contour: ContourVariables | None,
+    contour: FreeContour | None,
     sizes: StartSizes,
 ) -> dict[str, float]:
     """Return the scaled values of the variables at a start by name."""
@@ -236,12 +309,4 @@ def start_values(
         elif variable.name in start.factors:
             now = float(ca.evalf(ca.substitute(variable.value, variable.symbol, variable.start)))
             values[variable.name] = scaled(variable, start.factors[variable.name] * now)
-    if contour is None:
-        return values
-    values |= {v.name: v.start for v in contour.all()}
-    # No start may reach to the anchor.
-    size = min(start.contour_size, sizes.largest_arm / sizes.arm)
-    slope = size * start.slope_share
-    values |= {radius.name: size - 0.5 * slope for radius in contour.radii_of_curvature}
-    values[contour.first_slope.name] = slope
-    return values
+    return values if contour is None else values | contour.at(start, sizes)

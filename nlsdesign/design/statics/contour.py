@@ -152,7 +152,7 @@ class Contour:
             anchor = np.array([10.0 * self.radii.max(), side * touched[1]])
         return np.array([touched * [1.0, side], anchor])
 
-    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Array, Array]:
+    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Array, ...]:
         """Return the two halves of the cam as closed polygons in the resting frame: lower, upper.
 
         Between the ends of its two lips each half is closed by a straight line; so is the channel of the
