@@ -29,6 +29,7 @@ from .problem import DesignProblem
 from .program import Solution
 from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
+from .roller_limits import side_forces
 from .several_starts import same_design
 from .size_ranges import size_ranges
 
@@ -169,6 +170,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         )
     if cam.coils and "GoodmanSafety" not in kinds:
         sentences.append("wire and strength of the coil are not declared: nothing limits what the wire bears")
+    sentences += side_forces(design, lambda each: problem.evaluate(each, best.point))
     sentences += [f"{at}.{text}" for at, part in solved.changed.walk() for text in part.remarks()]
     return CamDesign(
         target=design.target,

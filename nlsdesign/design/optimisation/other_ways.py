@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ...components.assembly.named_parts import Assembly
+from ...components.transmission.roller_cam import RollerCam
 from ...foundation.errors import NlsError
+from ...foundation.quantity import Quantity
 from ..statics.declared_cam import declared_cam, one_sided
 from .design_search import Search, row_of, spans_of
 from .limits import MaximumCableTension, MinimumRadiusOfCurvature
@@ -18,6 +21,8 @@ from .program import Program, Rows
 from .shape import starts
 
 _STARTS = 4
+_ROLLER = 0.005
+"""Radius in m of the roller that is tried in place of a cable."""
 _MOST = 1e3
 _HOLLOW = 1e-6
 """Radius of curvature below zero, relative to the size of the contour, from which it counts as hollow."""
@@ -69,11 +74,26 @@ def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
         other = one_sided(part, search.question.target.last_angle)
         words = "a one-sided cam (OneSidedCam), which pulls to one side only"
         yield words, machine.with_part(cam.name, other)
+    if search.problem.contour is not None and cam.roller is None:
+        words = "a cam with a roller follower (RollerCam), whose edge may be hollow"
+        rolling = _with_roller(part, search.problem.sizes.arm, search.question.target.last_angle)
+        yield words, machine.with_part(cam.name, rolling)
     # Elements share the torque as areas do, but only they share the force of the cable.
     if any(bound.limit == MaximumCableTension.__name__ for bound in search.bounds):
         count = 2 * round(search.question.model.values[cam.elements])
         if count <= 100:
             yield f"{cam.elements} = {count}", machine.with_values({cam.elements: float(count)})
+
+
+def _with_roller(part: Any, arm: float, last_angle: float) -> RollerCam:
+    """Return a cam with a roller to begin with: a bearing of 10 mm, and room for the pressure angle."""
+    return RollerCam(
+        lever_arm=Quantity((0.0, *[0.5 * arm] * 7), "m"),
+        last_angle=Quantity(last_angle, "rad"),
+        base_radius=Quantity(2.0 * arm + _ROLLER, "m"),
+        roller_radius=Quantity(_ROLLER, "m", "assumed: a ball bearing 623 of 10 mm outer diameter"),
+        elements=part.elements,
+    )
 
 
 @dataclass(frozen=True)
@@ -88,8 +108,8 @@ class Hollow:
         besides = "" if self.freed is None else f" ({self.freed} besides)"
         return (
             f"ConvexContour: the contour would have to be hollow {self.spans}, with radii of curvature "
-            f"down to {1e3 * self.deepest:.3g} mm{besides}; a taut cable lifts off there, so this curve "
-            "takes a cam with a follower or a rolling pair, which are not designed here"
+            f"down to {1e3 * self.deepest:.3g} mm{besides}; a taut cable lifts off there; the roller of a "
+            "follower (RollerCam) does not, nor does a rolling pair, which is not designed here"
         )
 
 
@@ -130,7 +150,7 @@ def tried_otherwise(loose: Loosened, search: Search, free: Sequence[str]) -> lis
         f"{one}: it keeps all limits and leaves {percent(one.error, largest)}"
         for one in other_springs(search, free)
     ]
-    hollow = None if ways else hollow_contour(loose)
-    ways += [] if hollow is None else [str(hollow)]
+    hollow = hollow_contour(loose)
+    ways = [*([] if hollow is None else [str(hollow)]), *ways]
     sizes = f"all sizes free ({', '.join(loose.candidates)})" if loose.candidates else "no size left to free"
     return ways or [f"nothing that was tried keeps them: {sizes}, another kind of cam, a hollow contour"]

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import MM, Quantity
+from ...foundation.symbolic import Expression
 from ..curves.numbers import plain
 from .design_point import DesignPoint
 from .edges import RollerEdge
@@ -22,6 +26,32 @@ def _edge(limit: Limit, design: DesignPoint) -> RollerEdge:
             next_step="leave the limit out, or give the spring a RollerCam",
         )  # fmt: skip
     return design.edge
+
+
+_FRICTION = (0.05, 0.2)
+"""Coefficient of friction of guides, from greased bronze to dry polymer. Assumed."""
+
+
+def side_forces(design: DesignPoint, value: Callable[[Expression], Array]) -> Iterator[str]:
+    """Yield what a follower's guide bears, and how far its friction moves the torque from the curve at rest.
+
+    ``value``: gives the numbers of an expression at the design.
+    """
+    roller = design.cam.roller
+    if roller is None or not isinstance(design.edge, RollerEdge):
+        return
+    slopes = np.tan(value(design.edge.pressure_angles))
+    force = float(np.max(value(design.elements * design.forces) * slopes))
+    friction, of = _FRICTION, "that is not declared (SlidingGuide) but lies"
+    if roller.guide_friction is not None:
+        friction, of = (design.model.values[roller.guide_friction],) * 2, "as declared,"
+    shares = [100.0 * each * float(slopes.max()) / (1.0 - each * float(slopes.max())) for each in friction]
+    least, most = (f"at {each:.3g} up to {share:.2g} %" for each, share in zip(friction, shares, strict=True))
+    yield (
+        f"the guide of the follower bears up to {force:.3g} N sideways; with a friction {of} "
+        f"{least if least == most else f'between {least} and {most}'} more torque lifts it than the curve at "
+        "rest, and less lets it down; the roller's bearing is left out"
+    )
 
 
 @dataclass(frozen=True)

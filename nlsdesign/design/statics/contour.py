@@ -61,6 +61,16 @@ class Contour:
             [self.lever_arms * sine + self.slopes * cosine, self.lever_arms * cosine - self.slopes * sine]
         )
 
+    @property
+    def centre_line(self) -> Array:
+        """Centre line of what lies on the cam, shape (n, 2): of the cable these points."""
+        return self.points
+
+    @property
+    def drawn_line(self) -> str:
+        """What is drawn of it where no part is made."""
+        return "cable's centre line"
+
     @cached_property
     def radii(self) -> Array:
         """Distance of the points from the centre."""

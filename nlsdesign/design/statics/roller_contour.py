@@ -44,7 +44,8 @@ class RollerContour(Contour):
     @cached_property
     def normals(self) -> Array:
         """Outward normals of the edge, shape (n, 2)."""
-        return np.column_stack([np.sin(self.directions), np.cos(self.directions)])
+        result: Array = np.column_stack([np.sin(self.directions), np.cos(self.directions)])
+        return result
 
     @cached_property
     def centre_line(self) -> Array:
@@ -62,7 +63,8 @@ class RollerContour(Contour):
     @cached_property
     def radii(self) -> Array:
         """Distance of the edge from the axis."""
-        return np.hypot(*self.points.T)
+        result: Array = np.hypot(*self.points.T)
+        return result
 
     @cached_property
     def pressure_angles(self) -> Array:
@@ -76,8 +78,14 @@ class RollerContour(Contour):
         return result
 
     def surface(self, cable_radius: float = 0.0) -> Array:
-        """Return the points of the edge; it has its distance from the pitch curve already."""
-        return self.points
+        """Return the points at a distance inside the pitch curve: at the radius of the roller the edge."""
+        result: Array = self.centre_line - cable_radius * self.normals
+        return result
+
+    @property
+    def drawn_line(self) -> str:
+        """The edge."""
+        return "edge under the roller"
 
     def cable(self, angle: float) -> Array:
         """Return where roller and edge touch, and the roller's centre, in the resting frame."""
