@@ -117,8 +117,8 @@ class Target(ABC):
 
     @property
     def largest(self) -> float:
-        """Largest torque in N·m."""
-        return float(np.max(self.torque(np.linspace(0.0, self.last_angle, 201))))
+        """Largest magnitude of the torque in N·m."""
+        return float(np.max(np.abs(self.torque(np.linspace(0.0, self.last_angle, 201)))))
 
     def band(self, angle: ArrayLike) -> tuple[Array, Array]:
         """Return the lower and upper edge of the tolerance band.
@@ -247,7 +247,8 @@ class TabulatedTorque(Target):
     angles
         Ascending from zero, in rad.
     torques
-        From zero, nowhere negative, in N·m.
+        From zero, in N·m. They may fall below zero where the spring has taken up enough work before; a cam
+        with a cable cannot follow there, one with a roller can.
     weights
         Weight of the error at each point, see :meth:`Target.weight_law`; straight between them. Empty for one
         everywhere.
@@ -257,7 +258,8 @@ class TabulatedTorque(Target):
     Raises
     ------
     ValueRangeError
-        If the points are out of order, the curve does not start at zero, or a weight is negative.
+        If the points are out of order, the curve does not start at zero or gives work that it has not taken
+        up, or a weight is negative.
     """
 
     angles: tuple[float, ...]
@@ -270,8 +272,14 @@ class TabulatedTorque(Target):
         object.__setattr__(self, "angles", tuple(float(item) for item in self.angles))
         object.__setattr__(self, "torques", tuple(float(item) for item in self.torques))
         points = table_of_curve("target table", "torque", self.angles, self.torques)
-        if points[1, 0] != 0.0 or np.any(points[1] < 0.0):
-            raise ValueRangeError("target table", "torques must start at zero and be nowhere negative")
+        if points[1, 0] != 0.0:
+            raise ValueRangeError("target table", "torques must start at zero")
+        row = overdrawn(points[0], points[1])
+        if row is not None:
+            raise ValueRangeError(
+                f"target table, row {row + 1}", "gives more work than the spring has taken up before",
+                next_step="torque resists a positive angle: turn the sign of the torques, or of the angle",
+            )  # fmt: skip
         if self.slopes:
             object.__setattr__(self, "slopes", tuple(float(item) for item in self.slopes))
             table_of_curve("target table", "slope", self.angles, self.slopes)
@@ -323,6 +331,13 @@ def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tup
             next_step="sort the table by angle and convert degrees to rad",
         )  # fmt: skip
     return points
+
+
+def overdrawn(angles: Array, torques: Array) -> int | None:
+    """Return the first row up to which a curve, straight between its points, gives work; None where none."""
+    work = np.cumsum(np.diff(angles) * (torques[1:] + torques[:-1]) / 2.0)
+    given = np.flatnonzero((work < -1e-12 * np.max(np.abs(work))) & (torques[1:] < 0.0))
+    return int(given[0]) + 1 if len(given) else None
 
 
 def straight(at: tuple[float, ...], values: tuple[float, ...]) -> PPoly:

@@ -13,7 +13,7 @@ from ...foundation.csv_tables import heads_with_units, read_csv
 from ...foundation.errors import MeasurementError, UnitError, ValueRangeError, nearest
 from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
 from ...foundation.written_numbers import name_and_unit
-from .target import TabulatedStiffness, TabulatedTorque, Target, TorqueBand
+from .target import TabulatedStiffness, TabulatedTorque, Target, TorqueBand, overdrawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,8 @@ def read_target(path: Path | str) -> Target:
     UnitError
         If a unit is missing or of another dimension.
     ValueRangeError
-        If the angles do not ascend from zero, or a torque, stiffness or weight is negative.
+        If the angles do not ascend from zero, a stiffness or weight is negative, or a torque gives more work
+        than it has taken up.
     """
     table = read_columns(path, _COLUMNS)
     kinds = [name for name in ("torque", "stiffness") if name in table.values]
@@ -145,7 +146,10 @@ def read_target(path: Path | str) -> Target:
             next_step="keep one of them" if kinds else "name it 'torque [N*m]', or read a band by read_band",
         )
     _ascending_from_zero(table)
-    _nowhere_negative(table, kinds[0])
+    if kinds == ["torque"]:
+        _worked_for(table)
+    else:
+        _nowhere_negative(table, kinds[0])
     angles, values = tuple(table.values["angle"]), tuple(table.values[kinds[0]])
     if kinds == ["stiffness"]:
         if "weight" in table.values:
@@ -226,5 +230,16 @@ def _nowhere_negative(table: ReadColumns, name: str) -> None:
         row = int(np.argmax(negative))
         raise ValueRangeError(
             f"{table.cell(row, name)} = {table.values[name][row]:g}", "must be nowhere negative",
-            next_step="torque resists a positive angle: turn the sign of the column, or of the angle",
+            next_step="turn the sign of the column, or of the angle",
         )  # fmt: skip
+
+
+def _worked_for(table: ReadColumns) -> None:
+    """Refuse a torque that gives more work than it has taken up before."""
+    row = overdrawn(table.values["angle"], table.values["torque"])
+    if row is not None:
+        raise ValueRangeError(
+            f"{table.cell(row, 'torque')} = {table.values['torque'][row]:g}",
+            "must be nowhere negative before the spring has taken up as much work",
+            next_step="torque resists a positive angle: turn the sign of the column, or of the angle",
+        )

@@ -42,14 +42,14 @@ def side_forces(design: DesignPoint, value: Callable[[Expression], Array]) -> It
         return
     slopes = np.tan(value(design.edge.pressure_angles))
     force = float(np.max(value(design.elements * design.forces) * slopes))
-    friction, of = _FRICTION, "that is not declared (SlidingGuide) but lies"
+    friction, of = _FRICTION, "that is not declared (SlidingGuide),"
     if roller.guide_friction is not None:
         friction, of = (design.model.values[roller.guide_friction],) * 2, "as declared,"
     shares = [100.0 * each * float(slopes.max()) / (1.0 - each * float(slopes.max())) for each in friction]
     least, most = (f"at {each:.3g} up to {share:.2g} %" for each, share in zip(friction, shares, strict=True))
     yield (
         f"the guide of the follower bears up to {force:.3g} N sideways; with a friction {of} "
-        f"{least if least == most else f'between {least} and {most}'} more torque lifts it than the curve at "
+        f"{least if least == most else f'{least} and {most}'} more torque lifts it than the curve at "
         "rest, and less lets it down; the roller's bearing is left out"
     )
 

@@ -114,7 +114,7 @@ def _work(law: ElasticLaw, start: Array, end: Array) -> Array:
 
 def _stretched(law: ElasticLaw, energies: Array, pretension: float) -> Array:
     """Return the extensions beyond the pretension at which one element has taken up the given energies."""
-    grid, stored = _stored(law, float(energies[-1]), pretension)
+    grid, stored = _stored(law, float(np.max(energies)), pretension)
     cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
     low, high = grid[cell], grid[cell + 1]
     rest = energies - stored[cell]
