@@ -251,14 +251,14 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
 def _made_otherwise(solved: SolvedSearch) -> str:
     """Say that the contour would do and the declared cam does not hold it: over its onset, or its knots."""
     cam, largest = solved.search.problem.law.cam.name, solved.search.problem.design.target.largest
+    widths = [name for name in (f"{cam}.onset", f"{cam}.changeover") if name in solved.actuator.quantities()]
+    share, pretension = 100.0 * solved.predicted_rms / largest, solved.search.problem.law.cam.pretension
     if solved.search.problem.law.cam.roller is not None:
         step = math.degrees(solved.search.problem.design.target.last_angle) / INTERVALS
         return (
-            f"at its {INTERVALS} nodes the way of the roller leaves {100.0 * solved.predicted_rms / largest:.2g}"
-            f" %; between them the curve bends more than it can: spread its jumps over {step:.2g}° or more"
+            f"at its {INTERVALS} nodes the way of the roller leaves {share:.2g} %; between them the curve "
+            f"bends more than it can: spread its jumps over {step:.2g}° or more"
         )
-    widths = [name for name in (f"{cam}.onset", f"{cam}.changeover") if name in solved.actuator.quantities()]
-    share, pretension = 100.0 * solved.predicted_rms / largest, solved.search.problem.law.cam.pretension
     freed = "" if pretension in solved.free or solved.lost_travel <= 0.0 else f", free {pretension}"
     return (
         f"the contour itself leaves {share:.2g} %; the rest is the cam, which sets in over an angle: "
