@@ -31,7 +31,7 @@ from nlsdesign.design import (
     write_drawings,
 )
 from nlsdesign.design.statics.roller_contour import roller_contour
-from nlsdesign.foundation.errors import ArrangementError, NlsError, ValueRangeError
+from nlsdesign.foundation.errors import ArrangementError, InfeasibleError, NlsError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.live.gallery import question_of
 from tests.cam_cases import CONTOUR, KEEP, PRETENSION, TARGET, actuator
@@ -148,12 +148,23 @@ def test_what_the_guide_bears_is_said_with_its_friction() -> None:
 
 def test_a_contour_that_is_held_is_judged_by_the_same_limits() -> None:
     """Only the pretension is free; base radius and edge stay, and the pressure angle is that of the deck."""
-    held = design_cam(machine(), target=hill(54.0), free=["spring.pretension"], keep=[STRAIN], settings=QUICK)
+    row = (-0.002, 0.0, 0.002, 0.0035, 0.004, 0.004, 0.0035, 0.003)
+    made, target = replace(CAM, lever_arm=row), hill(54.0)
+    held = design_cam(machine(made), target=target, free=["spring.pretension"], keep=[STRAIN], settings=QUICK)
     assert held.values.keys() == {"spring.pretension"}
     (state,) = (each for each in held.limits if each.limit == "MaximumPressureAngle")
-    contour = contour_of_cam(CAM, last_angle=math.radians(54.0))
+    contour = contour_of_cam(made, last_angle=math.radians(54.0))
     assert isinstance(contour, RollerContour)
     assert state.value == pytest.approx(float(np.max(contour.pressure_angles)), rel=1e-3)
+
+
+def test_a_corner_of_a_declared_edge_is_named_with_what_would_have_to_give() -> None:
+    """The lever arm of this cam begins with a jump: a notch in which the roller touches two places."""
+    words = (
+        r"MinimumHollowRadius: cannot be kept.*radius of the hollow edge >= 6\.25 mm would have to give by"
+    )
+    with pytest.raises(InfeasibleError, match=words):
+        design_cam(machine(), target=hill(54.0), free=["spring.pretension"], keep=[STRAIN], settings=QUICK)
 
 
 def test_a_limit_on_a_radius_is_held_as_a_curvature_and_read_as_a_radius() -> None:
