@@ -360,6 +360,10 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
     (own, behind), cam = part.behind, f"{path}.cam"
     element, inner, of_cam = f"{path}.{own}", behind.domain, part.cam.parameters()
     pieces = dict(walk(behind, element))
+    roller = None
+    if isinstance(part.cam, RollerCam):
+        friction = f"{cam}.guide_friction" if part.cam.needs_rate else None
+        roller = RollerNames(f"{cam}.roller_radius", f"{cam}.base_radius", friction)
     return CamNames(
         name=cam,
         drive=path,
@@ -389,7 +393,7 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
             if isinstance(p, CapstanFriction)
         ),
         coils=tuple(_coil(name, p) for name, p in pieces.items() if isinstance(p, Coil)),
-        roller=_roller(cam, part.cam),
+        roller=roller,
     )
 
 
@@ -434,10 +438,3 @@ def _cable(path: str, part: Cam) -> CableNames | None:
     if not isinstance(part.cable, Cable):
         return None
     return CableNames(f"{path}.cable_diameter", f"{path}.cable_breaking_force", f"{path}.cable_bend_ratio")
-
-
-def _roller(path: str, part: Cam) -> RollerNames | None:
-    if not isinstance(part, RollerCam):
-        return None
-    friction = f"{path}.guide_friction" if part.needs_rate else None
-    return RollerNames(f"{path}.roller_radius", f"{path}.base_radius", friction)

@@ -146,10 +146,15 @@ def read_target(path: Path | str) -> Target:
             next_step="keep one of them" if kinds else "name it 'torque [N*m]', or read a band by read_band",
         )
     _ascending_from_zero(table)
-    if kinds == ["torque"]:
-        _worked_for(table)
-    else:
-        _nowhere_negative(table, kinds[0])
+    row = overdrawn(table.values["angle"], table.values[kinds[0]])
+    if kinds == ["stiffness"]:
+        _nowhere_negative(table, "stiffness")
+    elif row is not None:
+        raise ValueRangeError(
+            f"{table.cell(row, 'torque')} = {table.values['torque'][row]:g}",
+            "must be nowhere negative before the spring has taken up as much work",
+            next_step="torque resists a positive angle: turn the sign of the column, or of the angle",
+        )
     angles, values = tuple(table.values["angle"]), tuple(table.values[kinds[0]])
     if kinds == ["stiffness"]:
         if "weight" in table.values:
@@ -232,14 +237,3 @@ def _nowhere_negative(table: ReadColumns, name: str) -> None:
             f"{table.cell(row, name)} = {table.values[name][row]:g}", "must be nowhere negative",
             next_step="turn the sign of the column, or of the angle",
         )  # fmt: skip
-
-
-def _worked_for(table: ReadColumns) -> None:
-    """Refuse a torque that gives more work than it has taken up before."""
-    row = overdrawn(table.values["angle"], table.values["torque"])
-    if row is not None:
-        raise ValueRangeError(
-            f"{table.cell(row, 'torque')} = {table.values['torque'][row]:g}",
-            "must be nowhere negative before the spring has taken up as much work",
-            next_step="torque resists a positive angle: turn the sign of the column, or of the angle",
-        )

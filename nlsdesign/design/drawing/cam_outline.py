@@ -40,22 +40,40 @@ def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> Li
     Beyond the last angle the edge goes on as an arc with the last radius of curvature.
     """
     _check_curvature(contour, cable_radius)
-    phi = contour.directions
+    directions = contour.directions
     support = BPoly.from_derivatives(
-        phi,
+        directions,
         np.column_stack(
             [contour.lever_arms, contour.slopes, contour.radii_of_curvature - contour.lever_arms]
         ),
     )
-    path, deviation = few_arcs(lambda a, b: _biarc_over(support, a, b, cable_radius), phi)
+
+    def over(first: float, last: float) -> tuple[ArcPath, float]:
+        start, end = (
+            (float(support(phi)) - cable_radius) * _normal(phi) + float(support(phi, 1)) * _tangent(phi)
+            for phi in (first, last)
+        )
+        path = biarc(start, end, first=_tangent(first), last=_tangent(last))
+        phi = np.linspace(first, last, _CHECKED)
+        normals = np.column_stack([np.sin(phi), np.cos(phi)])
+        tangents = normals[:, ::-1] * [1.0, -1.0]
+        curve = (support(phi) - cable_radius)[:, None] * normals + support(phi, 1)[:, None] * tangents
+        # On convex arcs the direction of the normal says which of the two a point belongs to.
+        turned = -4.0 * math.atan(float(path.bulges[0]))
+        arc = (phi > first + turned).astype(int)
+        distance = np.hypot(*(curve - path.centres[arc]).T) - np.abs(path.radii)[arc]
+        error = float(np.max(np.abs(distance)))
+        return path, error if np.all(path.bulges[:2] < 0.0) else math.inf
+
+    path, deviation = few_arcs(over, directions)
     last = _run_out_end(contour, over_travel)
     radius = float(contour.radii_of_curvature[-1])
-    centre = contour.points[-1] - radius * _normal(phi[-1])
-    run_out = clockwise_arc(centre, radius - cable_radius, first=float(phi[-1]), last=last)
+    centre = contour.points[-1] - radius * _normal(directions[-1])
+    run_out = clockwise_arc(centre, radius - cable_radius, first=float(directions[-1]), last=last)
     return LipEdge(
-        joined(path, run_out) if last > phi[-1] else path,
+        joined(path, run_out) if last > directions[-1] else path,
         deviation,
-        float(phi[0]),
+        float(directions[0]),
         last,
         float(centre @ _normal(last)) + radius - cable_radius,
     )
@@ -112,24 +130,6 @@ def few_arcs(over: Callable[[float, float], tuple[ArcPath, float]], phi: Array) 
         pieces.append(piece)
         worst, at = max(worst, deviation), good
     return joined(*pieces), worst
-
-
-def _biarc_over(support: BPoly, first: float, last: float, cable_radius: float) -> tuple[ArcPath, float]:
-    start, end = (
-        (float(support(phi)) - cable_radius) * _normal(phi) + float(support(phi, 1)) * _tangent(phi)
-        for phi in (first, last)
-    )
-    path = biarc(start, end, first=_tangent(first), last=_tangent(last))
-    phi = np.linspace(first, last, _CHECKED)
-    normals = np.column_stack([np.sin(phi), np.cos(phi)])
-    tangents = normals[:, ::-1] * [1.0, -1.0]
-    curve = (support(phi) - cable_radius)[:, None] * normals + support(phi, 1)[:, None] * tangents
-    # On convex arcs the direction of the normal says which of the two a point belongs to.
-    turned = -4.0 * math.atan(float(path.bulges[0]))
-    arc = (phi > first + turned).astype(int)
-    distance = np.hypot(*(curve - path.centres[arc]).T) - np.abs(path.radii)[arc]
-    error = float(np.max(np.abs(distance)))
-    return path, error if np.all(path.bulges[:2] < 0.0) else math.inf
 
 
 def _run_out_end(contour: Contour, over_travel: float) -> float:

@@ -14,9 +14,9 @@ from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import MM, Quantity
 from ..curves.numbers import plain
 from ..statics.contour import Contour
-from ..statics.roller_contour import RollerContour
+from ..statics.roller_contour import STRAIGHT, RollerContour
 from .arc_path import ArcPath, biarc, joined
-from .cam_outline import ACCURACY, LipEdge, few_arcs, mirrored_back
+from .cam_outline import LipEdge, few_arcs, mirrored_back
 from .cam_part import Hole
 from .machined_cam import DrawnCam, MachinedCam, derived_size
 
@@ -60,11 +60,23 @@ class MachinedRollerCam(MachinedCam):
                 "contour under a cable", "is no edge for a roller",
                 next_step="draw it as a MachinedTwoSidedCam or MachinedOneSidedCam",
             )  # fmt: skip
-        _check_undercut(contour)
-        rho = contour.radii_of_curvature
-        for name, radii in (("sharpest_edge", rho[rho > 0.0]), ("narrowest_hollow", -rho[rho < 0.0])):
-            if len(radii):
-                numbers[name] = derived_size(float(radii.min()), "smallest radius of curvature of the edge")
+        rho, r = contour.radii_of_curvature, contour.roller_radius
+        under = np.flatnonzero((rho > -r) & (rho <= 0.0))
+        if len(under):
+            worst = under[np.argmin(rho[under])]
+            turns = float(rho[worst]) + r
+            first, last = (f"{math.degrees(contour.bearings[k]):.3g}°" for k in (under[0], under[-1]))
+            raise ValueRangeError(
+                f"edge from {first} to {last}",
+                f"is undercut: the centre of the roller of {MM * r:.4g} mm radius turns with "
+                f"{MM * turns:.4g} mm at {math.degrees(contour.bearings[worst]):.3g}°",
+                next_step=f"take a roller of at most {MM * turns:.3g} mm radius, a larger base radius, "
+                "or design with MinimumRadiusOfCurvature",
+            )
+        how = "smallest radius of curvature of the edge"
+        numbers["sharpest_edge"] = derived_size(float(np.min(rho, where=rho > 0.0, initial=STRAIGHT)), how)
+        if np.any(rho < 0.0):
+            numbers["narrowest_hollow"] = derived_size(float(-np.max(rho[rho < 0.0])), how)
         numbers["pitch_radius"] = derived_size(float(contour.centre_radii[0]), "base radius of the contour")
         return roller_edge(contour, over_travel=numbers["over_travel"].number)
 
@@ -86,70 +98,43 @@ class MachinedRollerCam(MachinedCam):
         return DrawnCam([outline], holes, cables, rollers)
 
 
-def _check_undercut(contour: RollerContour) -> None:
-    """Refuse an edge that the roller cuts away: its centre turns in less than its radius."""
-    rho, r = contour.radii_of_curvature, contour.roller_radius
-    under = np.flatnonzero((rho > -r) & (rho <= 0.0))
-    if len(under):
-        worst = under[np.argmin(rho[under])]
-        turns = float(rho[worst]) + r
-        first, last = (f"{math.degrees(contour.bearings[k]):.3g}°" for k in (under[0], under[-1]))
-        raise ValueRangeError(
-            f"edge from {first} to {last}",
-            f"is undercut: the centre of the roller of {MM * r:.4g} mm radius turns with "
-            f"{MM * turns:.4g} mm at {math.degrees(contour.bearings[worst]):.3g}°",
-            next_step=f"take a roller of at most {MM * turns:.3g} mm radius, a larger base radius, "
-            "or design with MinimumRadiusOfCurvature",
-        )
-
-
 def roller_edge(contour: RollerContour, *, over_travel: float) -> LipEdge:
     """Return the edge on which the centre of a roller follows its way, as arcs.
 
     Beyond the last angle the way goes on with the last lever arm.
     """
+    radius = contour.roller_radius
     end, rho, arm = (float(c[-1]) for c in (contour.bearings, contour.centre_radii, contour.lever_arms))
     way = np.column_stack([contour.centre_radii, contour.lever_arms, contour.slopes])
-    pieces = [(contour.bearings, way)]
+    path, deviation = _arcs_along(contour.bearings, way, radius)
     if over_travel > 0.0:
         turned = np.linspace(0.0, over_travel, _RUN_OUT)
         rest = np.column_stack([rho + arm * turned, np.full(_RUN_OUT, arm), np.zeros(_RUN_OUT)])
-        pieces.append((end + turned, rest))
-    paths, worst = [], 0.0
-    for bearings, columns in pieces:
-        centre = BPoly.from_derivatives(bearings, columns)
-        path, deviation = few_arcs(
-            lambda a, b, centre=centre: _biarc_along(centre, a, b, contour.roller_radius),  # type: ignore[misc]
-            bearings,
-        )
-        paths.append(path)
-        worst = max(worst, deviation)
-    rho += arm * over_travel
+        run_out, beyond = _arcs_along(end + turned, rest, radius)
+        path, deviation = joined(path, run_out), max(deviation, beyond)
+        rho += arm * over_travel
     last = end + over_travel - math.atan2(arm, rho)
-    support = rho**2 / math.hypot(rho, arm) - contour.roller_radius
-    return LipEdge(joined(*paths), worst, 0.0, last, support)
+    return LipEdge(path, deviation, 0.0, last, rho**2 / math.hypot(rho, arm) - radius)
 
 
-def _biarc_along(centre: BPoly, first: float, last: float, radius: float) -> tuple[ArcPath, float]:
-    """Return a biarc along the edge of a roller's way ρ(θ), and its largest distance from the edge."""
-    at = np.linspace(first, last, _CHECKED)
-    points, tangents = _edge_at(centre, at, radius)
-    path = biarc(points[0], points[-1], first=tangents[0], last=tangents[-1])
-    start, middle, _ = path.points
-    # A point belongs to the arc on whose side of their common point it lies.
-    which = ((points - middle) @ (points[-1] - start) > 0.0).astype(int)
-    with np.errstate(invalid="ignore"):
-        away = np.abs(np.hypot(*(points - path.centres[which]).T) - np.abs(path.radii)[which])
-    error = float(np.max(away))
-    return path, error if math.isfinite(error) else ACCURACY * 2.0
+def _arcs_along(bearings: Array, way: Array, radius: float) -> tuple[ArcPath, float]:
+    """Return the edge of a roller's way as arcs; columns of ``way``: ρ and its derivatives by the bearing."""
+    centre = BPoly.from_derivatives(bearings, way)
 
+    def over(first: float, last: float) -> tuple[ArcPath, float]:
+        at = np.linspace(first, last, _CHECKED)
+        rho, arm = centre(at)[:, None], centre(at, 1)[:, None]
+        outwards = np.column_stack([np.sin(at), np.cos(at)])
+        along, speed = outwards[:, ::-1] * [1.0, -1.0], np.hypot(rho, arm)
+        tangents = (arm * outwards + rho * along) / speed
+        points = rho * outwards - radius * (rho * outwards - arm * along) / speed
+        path = biarc(points[0], points[-1], first=tangents[0], last=tangents[-1])
+        # A point belongs to the arc on whose side of their common point it lies.
+        which = ((points - path.points[1]) @ (points[-1] - points[0]) > 0.0).astype(int)
+        with np.errstate(invalid="ignore"):
+            away = np.abs(np.hypot(*(points - path.centres[which]).T) - np.abs(path.radii)[which])
+        # An arc that is straight to the last digit has no centre; its span is halved.
+        error = float(np.max(away))
+        return path, error if math.isfinite(error) else math.inf
 
-def _edge_at(centre: BPoly, at: Array, radius: float) -> tuple[Array, Array]:
-    """Return points and unit tangents of the edge at bearings θ."""
-    rho, arm = centre(at), centre(at, 1)
-    outwards = np.column_stack([np.sin(at), np.cos(at)])
-    along = outwards[:, ::-1] * [1.0, -1.0]
-    speed = np.hypot(rho, arm)[:, None]
-    tangents = (arm[:, None] * outwards + rho[:, None] * along) / speed
-    normals = (rho[:, None] * outwards - arm[:, None] * along) / speed
-    return rho[:, None] * outwards - radius * normals, tangents
+    return few_arcs(over, bearings)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -76,24 +75,21 @@ def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
         yield words, machine.with_part(cam.name, other)
     if search.problem.contour is not None and cam.roller is None:
         words = "a cam with a roller follower (RollerCam), whose edge may be hollow"
-        rolling = _with_roller(part, search.problem.sizes.arm, search.question.target.last_angle)
+        arm = search.problem.sizes.arm
+        # To begin with: a bearing of 10 mm, and room for the pressure angle.
+        rolling = RollerCam(
+            lever_arm=Quantity((0.0, *[0.5 * arm] * 7), "m"),
+            last_angle=Quantity(search.question.target.last_angle, "rad"),
+            base_radius=Quantity(2.0 * arm + _ROLLER, "m"),
+            roller_radius=Quantity(_ROLLER, "m", "assumed: a ball bearing 623 of 10 mm outer diameter"),
+            elements=Quantity(search.question.model.values[cam.elements], "1"),
+        )
         yield words, machine.with_part(cam.name, rolling)
     # Elements share the torque as areas do, but only they share the force of the cable.
     if any(bound.limit == MaximumCableTension.__name__ for bound in search.bounds):
         count = 2 * round(search.question.model.values[cam.elements])
         if count <= 100:
             yield f"{cam.elements} = {count}", machine.with_values({cam.elements: float(count)})
-
-
-def _with_roller(part: Any, arm: float, last_angle: float) -> RollerCam:
-    """Return a cam with a roller to begin with: a bearing of 10 mm, and room for the pressure angle."""
-    return RollerCam(
-        lever_arm=Quantity((0.0, *[0.5 * arm] * 7), "m"),
-        last_angle=Quantity(last_angle, "rad"),
-        base_radius=Quantity(2.0 * arm + _ROLLER, "m"),
-        roller_radius=Quantity(_ROLLER, "m", "assumed: a ball bearing 623 of 10 mm outer diameter"),
-        elements=part.elements,
-    )
 
 
 @dataclass(frozen=True)

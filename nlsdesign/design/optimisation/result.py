@@ -332,6 +332,8 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"
     pulled = "cable" if design.cam.roller is None else "element"
+    arms = design.contour.lever_arms
+    least = float(arms.min())
     fit = f", contour held to {1e6 * design.fit_error:.2g} µm" if design.fit_error > 0.0 else ""
     rows = [("verdict", _MET if design.miss is None else str(design.miss))]
     if design.miss is not None:
@@ -361,7 +363,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         ),
         ("radius of curvature", _curvature(design)),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
-        ("lever arm", _lever_arm(design.contour.lever_arms)),
+        ("lever arm", f"{f'{MM * least:.4g}' if least < 0.0 else 'up'} to {MM * arms.max():.4g} mm"),
         (
             "sizes that cost nothing",
             "; ".join(str(each) for each in design.size_ranges if each.wide) or "none",
@@ -381,11 +383,6 @@ _SURE = 2
 """Starts from which a design was found where nothing more is said."""
 _EDGE = 1e-3
 """Radius of curvature, relative to the largest lever arm, up to which a contour is an edge."""
-
-
-def _lever_arm(arms: Array) -> str:
-    low = f"{MM * arms.min():.4g} to " if arms.min() < 0.0 else "up to "
-    return f"{low}{MM * arms.max():.4g} mm"
 
 
 def _curvature(design: CamDesign) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ...foundation.symbolic import Expression
 from ..curves.numbers import plain
 from .design_point import DesignPoint
 from .edges import RollerEdge
-from .limits import Bound, Limit, OneNumber
+from .limits import Bound, Limit
 
 
 def _edge(limit: Limit, design: DesignPoint) -> RollerEdge:
@@ -72,10 +71,6 @@ class MaximumPressureAngle(Limit):
     0.5236
     """
 
-    described: ClassVar[OneNumber | None] = OneNumber(
-        "angle", "pressure angle", unit="rad", shown_unit="deg", upper=True, of_shape=True
-    )
-
     angle: Quantity | float
 
     def __post_init__(self) -> None:
@@ -107,10 +102,6 @@ class MinimumHollowRadius(Limit):
     >>> MinimumHollowRadius(0.004).radius
     0.004
     """
-
-    described: ClassVar[OneNumber | None] = OneNumber(
-        "radius", "radius of a hollow edge", unit="m", shown_unit="mm", upper=False, of_shape=True
-    )
 
     radius: Quantity | float
 
