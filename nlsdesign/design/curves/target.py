@@ -11,6 +11,7 @@ from typing import overload
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
 from ...foundation.arrays import Array, Mask
@@ -18,6 +19,9 @@ from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity, with_unit
 from ...foundation.symbolic import Expression
 from .numbers import in_si, plain
+
+EXACT = 1e-9
+"""Work given beyond what was taken up, relative to the largest work, that is but rounding."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,10 +278,11 @@ class TabulatedTorque(Target):
         points = table_of_curve("target table", "torque", self.angles, self.torques)
         if points[1, 0] != 0.0:
             raise ValueRangeError("target table", "torques must start at zero")
-        row = overdrawn(points[0], points[1])
-        if row is not None:
+        work = cumulative_trapezoid(points[1], points[0])
+        given = np.flatnonzero(work < -EXACT * np.max(np.abs(work)))
+        if len(given):
             raise ValueRangeError(
-                f"target table, row {row + 1}", "gives more work than the spring has taken up before",
+                f"target table, row {given[0] + 2}", "gives more work than the spring has taken up before",
                 next_step="torque resists a positive angle: turn the sign of the torques, or of the angle",
             )  # fmt: skip
         if self.slopes:
@@ -331,13 +336,6 @@ def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tup
             next_step="sort the table by angle and convert degrees to rad",
         )  # fmt: skip
     return points
-
-
-def overdrawn(angles: Array, torques: Array) -> int | None:
-    """Return the first row up to which a curve, straight between its points, gives work; None where none."""
-    work = np.cumsum(np.diff(angles) * (torques[1:] + torques[:-1]) / 2.0)
-    given = np.flatnonzero((work < -1e-12 * np.max(np.abs(work))) & (torques[1:] < 0.0))
-    return int(given[0]) + 1 if len(given) else None
 
 
 def straight(at: tuple[float, ...], values: tuple[float, ...]) -> PPoly:

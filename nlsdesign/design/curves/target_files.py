@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from ...foundation.arrays import Array
 from ...foundation.csv_tables import heads_with_units, read_csv
 from ...foundation.errors import MeasurementError, UnitError, ValueRangeError, nearest
 from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
 from ...foundation.written_numbers import name_and_unit
-from .target import TabulatedStiffness, TabulatedTorque, Target, TorqueBand, overdrawn
+from .target import EXACT, TabulatedStiffness, TabulatedTorque, Target, TorqueBand
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,10 +147,12 @@ def read_target(path: Path | str) -> Target:
             next_step="keep one of them" if kinds else "name it 'torque [N*m]', or read a band by read_band",
         )
     _ascending_from_zero(table)
-    row = overdrawn(table.values["angle"], table.values[kinds[0]])
+    work = cumulative_trapezoid(table.values[kinds[0]], table.values["angle"])
+    given = np.flatnonzero(work < -EXACT * np.max(np.abs(work)))
     if kinds == ["stiffness"]:
         _nowhere_negative(table, "stiffness")
-    elif row is not None:
+    elif len(given):
+        row = int(given[0]) + 1
         raise ValueRangeError(
             f"{table.cell(row, 'torque')} = {table.values['torque'][row]:g}",
             "must be nowhere negative before the spring has taken up as much work",

@@ -9,10 +9,8 @@ import casadi as ca
 import numpy as np
 
 from ...components.assembly.named_parts import Assembly
-from ...components.transmission.roller_cam import RollerCam
 from ...foundation.errors import NlsError
-from ...foundation.quantity import Quantity
-from ..statics.declared_cam import declared_cam, one_sided
+from ..statics.declared_cam import declared_cam, one_sided, with_roller
 from .design_search import Search, row_of, spans_of
 from .limits import MaximumCableTension, MinimumRadiusOfCurvature
 from .loosening import Freed, Loosened
@@ -20,8 +18,6 @@ from .program import Program, Rows
 from .shape import starts
 
 _STARTS = 4
-_ROLLER = 0.005
-"""Radius in m of the roller that is tried in place of a cable."""
 _MOST = 1e3
 _HOLLOW = 1e-6
 """Radius of curvature below zero, relative to the size of the contour, from which it counts as hollow."""
@@ -75,15 +71,7 @@ def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
         yield words, machine.with_part(cam.name, other)
     if search.problem.contour is not None and cam.roller is None:
         words = "a cam with a roller follower (RollerCam), whose edge may be hollow"
-        arm = search.problem.sizes.arm
-        # To begin with: a bearing of 10 mm, and room for the pressure angle.
-        rolling = RollerCam(
-            lever_arm=Quantity((0.0, *[0.5 * arm] * 7), "m"),
-            last_angle=Quantity(search.question.target.last_angle, "rad"),
-            base_radius=Quantity(2.0 * arm + _ROLLER, "m"),
-            roller_radius=Quantity(_ROLLER, "m", "assumed: a ball bearing 623 of 10 mm outer diameter"),
-            elements=Quantity(search.question.model.values[cam.elements], "1"),
-        )
+        rolling = with_roller(part, search.problem.sizes.arm, search.question.target.last_angle)
         yield words, machine.with_part(cam.name, rolling)
     # Elements share the torque as areas do, but only they share the force of the cable.
     if any(bound.limit == MaximumCableTension.__name__ for bound in search.bounds):

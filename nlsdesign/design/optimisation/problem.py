@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -16,24 +16,12 @@ from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
 from ...model.structure import CamNames
 from ..curves.target import Target
-from ..statics.declared_cam import contour_of_cam, declared_cam
+from ..statics.declared_cam import declared_cam
 from ..statics.energy import closed_form
 from ..statics.equilibrium import ElasticLaw, elastic_law
-from ..statics.roller_contour import RollerContour
 from .design_point import DesignPoint, Stretched
 from .program import DesignVariable, Rows, scalar
-from .roller_shape import given_roller, rolled
-from .shape import (
-    INTERVALS,
-    FreeContour,
-    Shape,
-    Start,
-    StartSizes,
-    given,
-    parallel,
-    start_values,
-    through_centre,
-)
+from .shape import INTERVALS, FreeContour, Shape, Start, StartSizes, free_shape, given, start_values
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""
@@ -133,7 +121,7 @@ def design_problem(
     made = declared_cam(cam)
     sharp = law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
-    arm, stretch = _sizes(law, target if symbols is None else symbols.sized_for)
+    arm, stretch, profile = _sizes(law, target if symbols is None else symbols.sized_for)
     end = ca.SX(target.last_angle) if symbols is None else symbols.last_angle
     share, width = rounding if isinstance(rounding, tuple) else (rounding, None)
     if share > 0.0:
@@ -142,22 +130,15 @@ def design_problem(
     parameters = {
         v.name: scalars[v.name].value if v.name in scalars else ca.SX(v.start) for v in model.parameters
     }
-    anchor, roller = law.cam.anchor_distance, law.cam.roller
     contour: FreeContour | None = None
-    if roller is not None and contour_is_free:
-        base, radius = parameters[roller.base_radius], model.values[roller.radius]
-        contour, shape = rolled(target, end, arm=arm, base=base, radius=radius)
-    elif roller is not None:
-        declared = contour_of_cam(cam, last_angle=target.last_angle, points=INTERVALS + 1)
-        shape = given_roller(cast(RollerContour, declared))
-    elif not contour_is_free:
+    if not contour_is_free:
         shape = given(model, cam, target.last_angle, law.cam.drive)
-    elif made.through_centre and anchor is not None:
-        contour, shape = through_centre(parameters[anchor], target.last_angle, arm, end=end)
     else:
-        contour, shape = parallel(end, arm)
+        ends = (target.last_angle, end)
+        contour, shape = free_shape(made.through_centre, parameters, names=law.cam, ends=ends, arm=arm)
+    anchor = law.cam.anchor_distance
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
-    sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
+    sizes = StartSizes(arm, stretch, law.cam.pretension, largest, profile)
     called = law if width is None else sharp.without_knots(2.0 * stretch, width)
     everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
 
@@ -228,15 +209,21 @@ def _not_movable(name: str, model: FlatModel, movable: Sequence[str]) -> NlsErro
     )  # fmt: skip
 
 
-def _sizes(law: ElasticLaw, target: Target) -> tuple[float, float]:
-    """Return a typical lever arm and stretch: those of the closed form, or of a wheel where there is none."""
+def _sizes(law: ElasticLaw, target: Target) -> tuple[float, float, Array]:
+    """Return a typical lever arm and stretch, and the wanted torque at the nodes relative to the largest.
+
+    Those of the closed form, or of a wheel where there is none.
+    """
     elements = {v.name: v.start for v in law.parameters}[law.cam.elements]
+    nodes = np.linspace(0.0, 1.0, INTERVALS + 1)
     try:
         profile = closed_form(law, target, elements=elements, points=21)
     except InfeasibleError:
         # The rubber as it is cannot store the energy; what is free may change that.
-        return 0.01, 0.01 * target.last_angle
-    return float(np.clip(profile.lever_arms.max(), 1e-4, 0.2)), float(profile.extensions.max())
+        return 0.01, 0.01 * target.last_angle, nodes
+    wanted = np.interp(nodes * profile.angles[-1], profile.angles, profile.torques / target.largest)
+    arm = float(np.clip(profile.lever_arms.max(), 1e-4, 0.2))
+    return arm, float(profile.extensions.max()), wanted
 
 
 def _lifted(problem: DesignProblem) -> DesignProblem:

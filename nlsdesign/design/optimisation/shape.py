@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import PPoly
 
 from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
+from ...model.structure import CamNames
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
+from ..statics.roller_contour import RollerContour, roller_contour
 from .design_point import DesignPoint
-from .edges import CableEdge, Edge
+from .edges import CableEdge, Edge, RollerEdge
 from .limits import Bound
 from .program import DesignVariable, Rows, scaled
 
@@ -28,6 +31,10 @@ CONVEX = "ConvexContour"
 INTERVALS = 40
 """Intervals of the contour; the number moves the results by less than their last digit shown."""
 
+_STEEPEST = 200.0
+"""Largest slope of the lever arm of a roller, relative to the size of the lever arm."""
+_POINTS = 8
+"""Points of the contour under a roller in each interval."""
 _LARGEST_RADIUS = 0.5
 """Largest radius of curvature and first slope in m."""
 _LEAST_CLEARANCE = 0.02
@@ -130,6 +137,43 @@ class ContourVariables(FreeContour):
         )
 
 
+@dataclass(frozen=True, eq=False)
+class RollerVariables(FreeContour):
+    """The slope of the lever arm at each node, straight between them, in units of a typical lever arm."""
+
+    slopes: tuple[DesignVariable, ...]
+    radius: float  # of the roller in m
+    per_interval: float  # intervals in a radian
+
+    def all(self) -> list[DesignVariable]:
+        """Return them in the order of the vector."""
+        return list(self.slopes)
+
+    def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
+        """Return a lever arm that rises and falls as the torque does."""
+        slopes = np.gradient(sizes.profile) * start.contour_size * 2.0 * start.slope_share * self.per_interval
+        return {v.name: each for v, each in zip(self.slopes, slopes.tolist(), strict=True)}
+
+    def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
+        """Return that the element presses the roller on the cam."""
+        return [held("PressedRoller", "extension of the element", design.extensions, arm)]
+
+    def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
+        """Return the contour at a solution: a slope that is straight between nodes, integrated exactly."""
+        nodes, slopes = value(design.angles), value(design.lever_arm_slopes)
+        share = np.arange(_POINTS) / _POINTS
+        bearings = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * share).ravel(), nodes[-1])
+        law = PPoly(np.array([np.diff(slopes) / np.diff(nodes), slopes[:-1]]), nodes)
+        arms, way = law.antiderivative(), law.antiderivative(2)
+        rho = design.parameters[design.cam.roller.base_radius]  # type: ignore[union-attr]
+        return roller_contour(
+            bearings,
+            (way(bearings), arms(bearings), law(bearings)),
+            base_radius=float(value(rho)[0]),
+            roller_radius=self.radius,
+        )
+
+
 class _Support(NamedTuple):
     """Columns of p, p' and ∫ρ over the nodes; the unknowns that they are, with what ties these down."""
 
@@ -191,9 +235,93 @@ def _distance(p: Expression, slopes: Expression) -> Expression:
     return ca.sqrt(p**2 + slopes**2 + 1e-18)
 
 
+def rolled(
+    last_angle: float, arm: float, *, end: Expression, base: Expression, radius: float
+) -> tuple[FreeContour, Shape]:
+    """Return the way of a roller whose lever arm is zero at angle zero.
+
+    ``base``, ``radius``: base radius, and radius of the roller in m; ``arm``: a typical lever arm.
+    """
+    names = [f"lever_arm_slope[{i}]" for i in range(INTERVALS + 1)]
+    symbols = [ca.SX.sym(name) for name in names]
+    variables = tuple(
+        DesignVariable(name, symbol, arm * symbol, -_STEEPEST, _STEEPEST, 0.0)
+        for name, symbol in zip(names, symbols, strict=True)
+    )
+    slopes = [v.value for v in variables]
+    step, ways = end / INTERVALS, ca.SX.sym("way", 2, INTERVALS)
+    begin = (ca.SX(0), ca.SX(0))
+    states = [begin, *[(arm * ways[0, i], arm * ways[1, i]) for i in range(INTERVALS)]]
+    explicit, rows = [begin], []
+    for i, (left, right) in enumerate(itertools.pairwise(slopes)):
+        explicit.append(_next_way(explicit[-1], left, right, step))
+        there = _next_way(states[i], left, right, step)
+        rows += [(a - b) / arm for a, b in zip(there, states[i + 1], strict=True)]
+    arms, taken = (ca.vertcat(*column) for column in zip(*states, strict=True))
+    lifted = tuple(
+        DesignVariable(f"{name}[{i + 1}]", ways[k, i], arm * ways[k, i], -np.inf, np.inf, 0.0)
+        for i in range(INTERVALS)
+        for k, name in enumerate(("lever_arm", "way"))
+    )
+    values = ca.vertcat(*[each for state in explicit[1:] for each in state]) / arm
+    angles = step * ca.SX(np.arange(INTERVALS + 1))
+    edge = RollerEdge(angles, base + taken, arms, ca.vertcat(*slopes), radius)
+    clear = Rows((edge.centre_radii - 1.01 * radius) / arm, 0.0, ca.inf)
+    shape = _rolling(edge, taken, (Rows(ca.vertcat(*rows), 0.0, 0.0), clear), (lifted, values))
+    return RollerVariables((), variables, radius, INTERVALS / last_angle), shape
+
+
+def _rolling(
+    edge: RollerEdge,
+    taken: Expression,
+    rows: tuple[Rows, ...],
+    states: tuple[tuple[DesignVariable, ...], Expression],
+) -> Shape:
+    return Shape(
+        edge.bearings, edge.bearings, edge.lever_arms, edge.radii, edge.radii_of_curvature, taken,
+        edge.lever_arm_slopes, rows, True, *states, edge,
+    )  # fmt: skip
+
+
+def _next_way(
+    state: tuple[Expression, Expression], left: Expression, right: Expression, step: Expression
+) -> tuple[Expression, Expression]:
+    """Return h and x one interval further."""
+    arm, taken = state
+    return arm + step * (left + right) / 2, taken + step * arm + step**2 * (2 * left + right) / 6
+
+
+def free_shape(
+    both_sides: bool,
+    parameters: Mapping[str, Expression],
+    *,
+    names: CamNames,
+    ends: tuple[float, Expression],
+    arm: float,
+) -> tuple[FreeContour, Shape]:
+    """Return the shape of a cam whose contour is free, and its variables.
+
+    ``both_sides``: whether the cam works to both sides alike; ``ends``: the last angle, and the expression
+    that stands for it; ``arm``: a typical lever arm in m.
+    """
+    last_angle, end = ends
+    anchor, roller = names.anchor_distance, names.roller
+    if roller is not None:
+        base, radius = parameters[roller.base_radius], float(parameters[roller.radius])
+        return rolled(last_angle, arm, end=end, base=base, radius=radius)
+    if both_sides and anchor is not None:
+        return through_centre(parameters[anchor], last_angle, arm, end=end)
+    return parallel(end, arm)
+
+
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
     """Return the shape of a declared cam that stays as it is."""
     contour = contour_of_cam(cam, last_angle=last_angle, points=INTERVALS + 1)
+    if isinstance(contour, RollerContour):
+        arms, slopes = ca.SX(contour.lever_arms), ca.SX(contour.slopes)
+        centre = ca.SX(contour.centre_radii)
+        edge = RollerEdge(ca.SX(contour.bearings), centre, arms, slopes, contour.roller_radius)
+        return _rolling(edge, ca.SX(contour.taken_lengths), (), ((), ca.SX(0, 1)))
     if isinstance(cam, DesignedCam):
         # As the search saw it that designed the contour, without the change of sides of the fitted cam.
         extensions = contour.taken_lengths
@@ -291,6 +419,7 @@ class StartSizes(NamedTuple):
     stretch: float
     pretension: str
     largest_arm: float
+    profile: Array  # wanted torque at the nodes, relative to the largest
 
 
 def start_values(

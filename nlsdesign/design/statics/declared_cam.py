@@ -303,6 +303,19 @@ def one_sided(part: Any, last_angle: float) -> OneSidedCam:
     return OneSidedCam(lever_arm=arms, last_angle=end, elements=part.elements, cable=part.cable)
 
 
+def with_roller(part: Any, arm: float, last_angle: float) -> RollerCam:
+    """Return a cam with a roller to begin with: a bearing of 10 mm, and room for the pressure angle.
+
+    ``arm``: a typical lever arm in m; ``last_angle`` in rad; ``part``: whose elements it has.
+    """
+    roller = Quantity(5e-3, "m", "assumed: a ball bearing 623 of 10 mm outer diameter")
+    arms, base = Quantity((0.0, *[0.5 * arm] * 7), "m"), Quantity(2.0 * arm + roller.number, "m")
+    end = Quantity(last_angle, "rad")
+    return RollerCam(
+        lever_arm=arms, last_angle=end, base_radius=base, roller_radius=roller, elements=part.elements
+    )
+
+
 def with_contour(part: object, contour: Contour | None) -> object:
     """Return a part as what the design sees of it: with its contour where that was designed.
 
