@@ -317,21 +317,21 @@ def free_shape(
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
     """Return the shape of a declared cam that stays as it is."""
     contour = contour_of_cam(cam, last_angle=last_angle, points=INTERVALS + 1)
-    if isinstance(contour, RollerContour):
-        arms, slopes = ca.SX(contour.lever_arms), ca.SX(contour.slopes)
-        centre = ca.SX(contour.centre_radii)
-        edge = RollerEdge(ca.SX(contour.bearings), centre, arms, slopes, contour.roller_radius)
-        return _rolling(edge, ca.SX(contour.taken_lengths), (), ((), ca.SX(0, 1)))
-    if isinstance(cam, DesignedCam):
+    both = declared_cam(cam).through_centre
+    if isinstance(cam, DesignedCam) or isinstance(contour, RollerContour):
         # As the search saw it that designed the contour, without the change of sides of the fitted cam.
         extensions = contour.taken_lengths
     else:
         law = cam_function(model, spring)(contour.angles.reshape(1, -1), model.start(model.parameters))
         extensions = np.array(law[1]).ravel()
+    if isinstance(contour, RollerContour):
+        arms, slopes = ca.SX(contour.lever_arms), ca.SX(contour.slopes)
+        centre = ca.SX(contour.centre_radii)
+        edge = RollerEdge(ca.SX(contour.bearings), centre, arms, slopes, contour.roller_radius)
+        return _rolling(edge, ca.SX(extensions), (), ((), ca.SX(0, 1)))
     # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
     root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
     rho, phi, p = (ca.SX(c) for c in (contour.radii_of_curvature, contour.directions, contour.lever_arms))
-    both = declared_cam(cam).through_centre
     return Shape(
         phi, ca.SX(contour.angles), p, _distance(p, ca.SX(contour.slopes)), rho, ca.SX(extensions),
         ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), both, (), ca.SX(0, 1),
