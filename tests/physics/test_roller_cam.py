@@ -95,6 +95,12 @@ def test_the_work_put_in_is_stored_or_rubbed_away() -> None:
     assert rubbed[-1] > 0.02 * put_in.max()
 
 
+def test_only_a_guide_that_rubs_needs_the_rate() -> None:
+    spring = Spring(stiffness=STIFF)
+    assert through(RUBBING, k=spring).needs_rate
+    assert not through(SMOOTH, k=spring).needs_rate
+
+
 def test_without_a_guide_that_rubs_nothing_is_lost() -> None:
     model = drive(SMOOTH)
     lifted, let_down = (model.evaluate([], [0.7, speed])["s.torque"] for speed in (5.0, -5.0))

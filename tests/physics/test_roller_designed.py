@@ -109,6 +109,15 @@ def test_the_limits_that_follow_from_the_roller_hold(signs: CamDesign, hills: Ca
         assert kinds >= {"MaximumPressureAngle", "MinimumRadiusOfCurvature", "MinimumHollowRadius"}
 
 
+def test_the_optimiser_sees_the_edge_that_is_drawn(signs: CamDesign) -> None:
+    """Radii of curvature and distances from the axis at the nodes, there in symbols, here in numbers."""
+    seen, contour = signs.curves, signs.contour
+    at = np.searchsorted(contour.angles, seen.angles - 1e-9)
+    assert contour.angles[at] == pytest.approx(seen.angles, abs=1e-9)
+    assert 1.0 / seen.radii_of_curvature == pytest.approx(1.0 / contour.radii_of_curvature[at], rel=1e-6)
+    assert seen.radii == pytest.approx(contour.radii[at], rel=1e-9)
+
+
 def test_a_smaller_pressure_angle_takes_a_larger_cam() -> None:
     def radius(degrees: float) -> float:
         keep = [MaximumStrain(2.0), MaximumPressureAngle(math.radians(degrees))]

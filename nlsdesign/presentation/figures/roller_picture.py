@@ -40,14 +40,14 @@ def draw_roller(axes: Axes, design: CamDesign, contour: RollerContour, angle: fl
 
 
 def roller_picture(design: CamDesign, contour: RollerContour) -> Figure:
-    """Draw cam and roller side by side at angle zero and at the last angle."""
+    """Draw cam and roller above each other at angle zero and at the last angle."""
     last = float(contour.angles[-1])
     reach = MM * (float(contour.centre_radii.max()) + 2.6 * contour.roller_radius)
-    figure, axes = panels(1, 2, height=0.5 * WIDTH, sharey=True)
+    figure, axes = panels(2, 1, height=0.5 * WIDTH, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
         draw_roller(panel, design, contour, angle)
         panel.set(xlim=(-reach, reach), ylim=(-reach, reach))
-        panel.set_xlabel("distance from the axis in mm")
+    axes[1].set_xlabel("distance from the axis in mm")
     steepest = float(np.degrees(np.abs(contour.pressure_angles).max()))
     return described(
         figure,

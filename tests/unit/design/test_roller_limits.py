@@ -30,6 +30,7 @@ from nlsdesign.design import (
     tolerance_analysis,
     write_drawings,
 )
+from nlsdesign.design.statics.energy import energy_profile, unmakeable_parts
 from nlsdesign.design.statics.roller_contour import roller_contour
 from nlsdesign.foundation.errors import ArrangementError, InfeasibleError, NlsError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
@@ -118,6 +119,12 @@ def test_a_tolerance_is_refused_and_a_design_says_so_in_a_remark() -> None:
     )
     assert design.tolerance is None
     assert any(remark.startswith("no tolerance: ") for remark in design.remarks)
+
+
+def test_where_a_cable_would_lift_off_is_no_question_of_a_roller() -> None:
+    profile = energy_profile(actuator(SOFT, pretension=6e-3), target=hill())
+    with pytest.raises(ArrangementError, match="no cable that could lift off"):
+        unmakeable_parts(profile, CAM)
 
 
 def test_the_live_page_refuses_a_roller_with_the_next_step() -> None:
