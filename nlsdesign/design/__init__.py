@@ -34,6 +34,7 @@ from .drawing.machined_cam import (
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
 )
+from .drawing.machined_roller import MachinedRollerCam
 from .drawing.making import process_of as process_of
 from .jobs.job_file import DRAWS as DRAWS
 from .jobs.job_file import DesignJob, job_of, read_job
@@ -84,6 +85,7 @@ from .optimisation.limits import (
 )
 from .optimisation.pareto import ParetoFront, pareto
 from .optimisation.result import CamDesign, LimitState
+from .optimisation.roller_limits import MaximumPressureAngle, MinimumHollowRadius
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import GOALS as GOALS
 from .optimisation.solve import design_cam
@@ -92,6 +94,7 @@ from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_lever_arm
 from .statics.declared_cam import contour_of_cam
 from .statics.equilibrium import elastic_law, equilibrium_torque
+from .statics.roller_contour import RollerContour
 from .tolerance.causes import Cause, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
@@ -127,15 +130,18 @@ __all__ = [
     "LimitState",
     "MachinedCam",
     "MachinedOneSidedCam",
+    "MachinedRollerCam",
     "MachinedTwoSidedCam",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumLastingStrain",
+    "MaximumPressureAngle",
     "MaximumSpringIndex",
     "MaximumStrain",
     "MaximumStress",
     "MaximumTorqueError",
     "MaximumTravel",
+    "MinimumHollowRadius",
     "MinimumRadiusOfCurvature",
     "MinimumSpringIndex",
     "MotorAndGear",
@@ -153,6 +159,7 @@ __all__ = [
     "PretensionRange",
     "RelativeSpread",
     "RestLengthRange",
+    "RollerContour",
     "RubberStock",
     "SeparateModuli",
     "SmoothContour",

@@ -13,7 +13,7 @@ from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
 from ..design import MaximumStrain, MaximumStress, contour_of_cam
 from ..design.optimisation.defaults import BREAKS
-from ..design.parametric.cam_question import ChosenMachine, TargetPoint
+from ..design.parametric.cam_question import ChosenMachine, TargetPoint, under_cable
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque
 from ..foundation.arrays import Array
@@ -122,7 +122,7 @@ def _objection(deck: Deck) -> str:
         model = flatten(machine)
         if not any(spring.cams for spring in model.springs):
             return "no cam spring, whose curve is designed here"
-        declared_cam(machine[series_cam(model).name])
+        declared_cam(machine[under_cable(series_cam(model)).name])
     except NlsError as error:
         return error.rule
     return ""

@@ -456,7 +456,7 @@ def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedD
 def exported_drawing(stage: Callable[[str], None], design: ShownDesign, *, ending: str) -> ExportedDesign:
     """Return the drawing of the cam, without the edge where the cable is not declared."""
     kind, radius = declared_edge(design.machine, series_cam(flatten(design.machine)))
-    machined = None if radius is None else kind(cable_radius=radius)
+    machined = None if radius is None else kind(**{"cable_radius": radius})  # type: ignore[arg-type]
     centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
     note = "; ".join(filter(None, (design.note, centre)))
     with tempfile.TemporaryDirectory() as folder:

@@ -19,6 +19,7 @@ from ..components.mechanics.motor import ElectricMotor
 from ..components.transmission.cam import Cable, Cam
 from ..components.transmission.cam_drive import Through
 from ..components.transmission.capstan import CapstanFriction
+from ..components.transmission.roller_cam import RollerCam
 from .gear_train import trains
 from .readings import ReadingNames
 
@@ -139,6 +140,15 @@ class CableNames:
 
 
 @dataclass(frozen=True)
+class RollerNames:
+    """The numbers of a roller that runs on a cam, all parameters."""
+
+    radius: str
+    base_radius: str  # distance of its centre from the axis at angle zero
+    guide_friction: str | None  # coefficient of friction of its guide; None where it is not declared
+
+
+@dataclass(frozen=True)
 class CamNames:
     """The names around one cam and what stands behind it."""
 
@@ -169,6 +179,7 @@ class CamNames:
     # friction
     guides: tuple[tuple[str, ...], ...] = ()
     coils: tuple[CoilNames, ...] = ()  # the coils in it
+    roller: RollerNames | None = None  # the roller that runs on the cam; None for a cam with a cable
 
     @property
     def contour(self) -> str:
@@ -349,6 +360,10 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
     (own, behind), cam = part.behind, f"{path}.cam"
     element, inner, of_cam = f"{path}.{own}", behind.domain, part.cam.parameters()
     pieces = dict(walk(behind, element))
+    roller = None
+    if isinstance(part.cam, RollerCam):
+        friction = f"{cam}.guide_friction" if part.cam.needs_rate else None
+        roller = RollerNames(f"{cam}.roller_radius", f"{cam}.base_radius", friction)
     return CamNames(
         name=cam,
         drive=path,
@@ -378,6 +393,7 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
             if isinstance(p, CapstanFriction)
         ),
         coils=tuple(_coil(name, p) for name, p in pieces.items() if isinstance(p, Coil)),
+        roller=roller,
     )
 
 

@@ -16,7 +16,9 @@ from nlsdesign.components import (
     LossyGear,
     OneSidedCam,
     Part,
+    RollerCam,
     SampleAndHold,
+    SlidingGuide,
     Spring,
     Tachometer,
     TorqueSensor,
@@ -25,6 +27,8 @@ from nlsdesign.components import (
 )
 
 ROW = (0.009, 0.0105, 0.0128, 0.0147, 0.0158, 0.0161, 0.0155, 0.0142)
+ROLLED = (0.0, 0.0, 0.004, 0.006, 0.003, -0.002, -0.004, -0.001)
+GUIDE = SlidingGuide(guide_friction=0.15, guide_creep_speed=1e-3)
 CABLE = Cable(cable_diameter=1.2e-3, cable_breaking_force=989.0, cable_bend_ratio=10.0)
 WINDING = {
     "inertia": 1.4e-5,
@@ -49,6 +53,8 @@ EXAMPLES: tuple[Part, ...] = (
     OneSidedCam(lever_arm=ROW, last_angle=1.2, onset=0.02, cable=CABLE),
     AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035),
     AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035, cable=CABLE),
+    RollerCam(lever_arm=ROLLED, last_angle=1.2, base_radius=0.02, roller_radius=0.004),
+    RollerCam(lever_arm=ROLLED, last_angle=1.2, base_radius=0.02, roller_radius=0.004, guide=GUIDE),
     CapstanFriction(
         members=(("rubber", Spring(stiffness=2500.0)),), guide=Guide(friction=0.15, wrap_angle=1.57)
     ),

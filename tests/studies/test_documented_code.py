@@ -54,6 +54,7 @@ def test_some_documents_show_code() -> None:
     "how_to/co_simulate.md",
     "how_to/design_a_cam.md",
     "how_to/drawing_for_the_workshop.md",
+    "how_to/follow_with_a_roller.md",
     "how_to/judge_a_torque_loop.md",
     "how_to/own_board.md",
     "how_to/own_study.md",

@@ -56,6 +56,15 @@ class Cam(Part):
     )
     cable: Reading = read_as(NotDeclared, Cable, default=NotDeclared())
 
+    @property
+    def needs_rate(self) -> bool:
+        """False: by itself a cam loses nothing."""
+        return False
+
+    def raised(self, scope: Scope, arm: Expression, lift: tuple[Expression, Expression]) -> Expression:
+        """Return the factor on the force by what the cam loses; ``lift``: extension in m and its rate."""
+        return ca.SX(1)
+
     @abstractmethod
     def extension(self, scope: Scope, angle: Expression) -> Expression:
         """Return the extension in m at an angle in rad; zero at angle zero."""

@@ -63,8 +63,8 @@ class Through(Element):
 
     @property
     def needs_rate(self) -> bool:
-        """True if the element behind the cam needs the rate."""
-        return self.behind[1].needs_rate
+        """True if the element behind the cam, or what the cam loses, needs the rate."""
+        return self.behind[1].needs_rate or self.cam.needs_rate
 
     @property
     def restores(self) -> bool:
@@ -94,10 +94,15 @@ class Through(Element):
         inside = scope.child("cam")
         lever_arm = self.cam.lever_arm_at(inside, motion)
         inside.signal("lever_arm_now", lever_arm, "m", "lever arm at the present angle")
-        extension = scope.parameter("pretension") + self.cam.extension(inside, motion)
+        taken, speed = self.cam.extension(inside, motion), lever_arm * rate
         name, element = self.behind
-        force = observed_effort(element, scope.child(name), extension, lever_arm * rate)
-        return inside.parameter("elements") * lever_arm * force
+        force = observed_effort(element, scope.child(name), scope.parameter("pretension") + taken, speed)
+        return (
+            inside.parameter("elements")
+            * lever_arm
+            * self.cam.raised(inside, lever_arm, (taken, speed))
+            * force
+        )
 
 
 def through(cam: Cam, *, pretension: Quantity | float | None = None, **behind: Element) -> Through:

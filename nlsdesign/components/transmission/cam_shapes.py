@@ -19,7 +19,8 @@ _CHECKED = 1001
 """Directions at which a contour is checked against its anchor."""
 
 
-def _check_row(name: str, values: Quantity) -> None:
+def check_row(name: str, values: Quantity) -> None:
+    """Refuse fewer control values than a contour needs."""
     if len(values.values) < 5:
         raise ValueRangeError(
             f"{name} with {len(values.values)} control values", "a contour needs at least 5"
@@ -52,7 +53,7 @@ class OneSidedCam(Cam):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_row("lever_arm", self.lever_arm)
+        check_row("lever_arm", self.lever_arm)
 
     def _taken(self, scope: Scope, angle: Expression) -> tuple[Expression, Expression]:
         width = scope.parameter("onset")
@@ -63,12 +64,12 @@ class OneSidedCam(Cam):
         """Return δ(θ) = ∫₀^q H."""
         taken, _ = self._taken(scope, angle)
         end, row = scope.parameter("last_angle"), scope.row("lever_arm")
-        return _integral(row, end, taken)
+        return held_integral(row, end, taken)
 
     def lever_arm_at(self, scope: Scope, angle: Expression) -> Expression:
         """Return h(θ) = dδ/dθ."""
         taken, slope = self._taken(scope, angle)
-        return _value(scope.row("lever_arm"), scope.parameter("last_angle"), taken) * slope
+        return held_spline(scope.row("lever_arm"), scope.parameter("last_angle"), taken) * slope
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +115,7 @@ class AnchoredCam(Cam):
         from scipy.interpolate import BSpline  # a list of parts needs no SciPy
 
         super().__post_init__()
-        _check_row("support", self.support)
+        check_row("support", self.support)
         anchor, values = self.anchor_distance.number, np.array(self.support.values)
         last = self.last_direction.number
         step, at = last / (len(values) - 3), np.linspace(0.0, last, _CHECKED)
@@ -130,7 +131,7 @@ class AnchoredCam(Cam):
             )
 
     def _support(self, scope: Scope, direction: Expression) -> Expression:
-        return _value(scope.row("support"), scope.parameter("last_direction"), direction)
+        return held_spline(scope.row("support"), scope.parameter("last_direction"), direction)
 
     def _direction(self, scope: Scope, on_side: Expression) -> Expression:
         """Return φ of φ − asin(p(φ)/D) = q."""
@@ -147,7 +148,7 @@ class AnchoredCam(Cam):
         arm, anchor = self._support(scope, direction), scope.parameter("anchor_distance")
         # √(D² − p²) − D, without cancellation where the anchor is far.
         shortened = -arm * arm / (anchor + ca.sqrt(anchor * anchor - arm * arm))
-        return _integral(scope.row("support"), scope.parameter("last_direction"), direction) + shortened
+        return held_integral(scope.row("support"), scope.parameter("last_direction"), direction) + shortened
 
     def extension(self, scope: Scope, angle: Expression) -> Expression:
         """Return δ(θ) = P(φ) − P(φ₀) + √(D² − p²(φ)) − √(D² − p²(φ₀))."""
@@ -161,12 +162,12 @@ class AnchoredCam(Cam):
         return self._support(scope, self._direction(scope, on_side)) * slope
 
 
-def _value(row: list[Expression], end: Expression, at: Expression) -> Expression:
+def held_spline(row: list[Expression], end: Expression, at: Expression) -> Expression:
     """Return a spline on [0, end], held beyond."""
     return uniform_spline(row, 0.0, end / (len(row) - 3), ca.fmin(at, end))
 
 
-def _integral(row: list[Expression], end: Expression, at: Expression) -> Expression:
+def held_integral(row: list[Expression], end: Expression, at: Expression) -> Expression:
     """Return the integral from 0 of a spline on [0, end] that is held beyond."""
     within, step = ca.fmin(at, end), end / (len(row) - 3)
     run_out = uniform_spline(row, 0.0, step, within) * (at - within)

@@ -11,6 +11,7 @@ from typing import overload
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
 from ...foundation.arrays import Array, Mask
@@ -18,6 +19,9 @@ from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity, with_unit
 from ...foundation.symbolic import Expression
 from .numbers import in_si, plain
+
+EXACT = 1e-9
+"""Work given beyond what was taken up, relative to the largest work, that is but rounding."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,8 +121,8 @@ class Target(ABC):
 
     @property
     def largest(self) -> float:
-        """Largest torque in N·m."""
-        return float(np.max(self.torque(np.linspace(0.0, self.last_angle, 201))))
+        """Largest magnitude of the torque in N·m."""
+        return float(np.max(np.abs(self.torque(np.linspace(0.0, self.last_angle, 201)))))
 
     def band(self, angle: ArrayLike) -> tuple[Array, Array]:
         """Return the lower and upper edge of the tolerance band.
@@ -247,7 +251,8 @@ class TabulatedTorque(Target):
     angles
         Ascending from zero, in rad.
     torques
-        From zero, nowhere negative, in N·m.
+        From zero, in N·m. They may fall below zero where the spring has taken up enough work before; a cam
+        with a cable cannot follow there, one with a roller can.
     weights
         Weight of the error at each point, see :meth:`Target.weight_law`; straight between them. Empty for one
         everywhere.
@@ -257,7 +262,8 @@ class TabulatedTorque(Target):
     Raises
     ------
     ValueRangeError
-        If the points are out of order, the curve does not start at zero, or a weight is negative.
+        If the points are out of order, the curve does not start at zero or gives work that it has not taken
+        up, or a weight is negative.
     """
 
     angles: tuple[float, ...]
@@ -270,8 +276,15 @@ class TabulatedTorque(Target):
         object.__setattr__(self, "angles", tuple(float(item) for item in self.angles))
         object.__setattr__(self, "torques", tuple(float(item) for item in self.torques))
         points = table_of_curve("target table", "torque", self.angles, self.torques)
-        if points[1, 0] != 0.0 or np.any(points[1] < 0.0):
-            raise ValueRangeError("target table", "torques must start at zero and be nowhere negative")
+        if points[1, 0] != 0.0:
+            raise ValueRangeError("target table", "torques must start at zero")
+        work = cumulative_trapezoid(points[1], points[0])
+        given = np.flatnonzero(work < -EXACT * np.max(np.abs(work)))
+        if len(given):
+            raise ValueRangeError(
+                f"target table, row {given[0] + 2}", "gives more work than the spring has taken up before",
+                next_step="torque resists a positive angle: turn the sign of the torques, or of the angle",
+            )  # fmt: skip
         if self.slopes:
             object.__setattr__(self, "slopes", tuple(float(item) for item in self.slopes))
             table_of_curve("target table", "slope", self.angles, self.slopes)

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from ...foundation.arrays import Array
 from ...foundation.csv_tables import heads_with_units, read_csv
 from ...foundation.errors import MeasurementError, UnitError, ValueRangeError, nearest
 from ...foundation.quantity import parse_unit, same_dimension, typeset_unit
 from ...foundation.written_numbers import name_and_unit
-from .target import TabulatedStiffness, TabulatedTorque, Target, TorqueBand
+from .target import EXACT, TabulatedStiffness, TabulatedTorque, Target, TorqueBand
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +134,8 @@ def read_target(path: Path | str) -> Target:
     UnitError
         If a unit is missing or of another dimension.
     ValueRangeError
-        If the angles do not ascend from zero, or a torque, stiffness or weight is negative.
+        If the angles do not ascend from zero, a stiffness or weight is negative, or a torque gives more work
+        than it has taken up.
     """
     table = read_columns(path, _COLUMNS)
     kinds = [name for name in ("torque", "stiffness") if name in table.values]
@@ -145,7 +147,17 @@ def read_target(path: Path | str) -> Target:
             next_step="keep one of them" if kinds else "name it 'torque [N*m]', or read a band by read_band",
         )
     _ascending_from_zero(table)
-    _nowhere_negative(table, kinds[0])
+    work = cumulative_trapezoid(table.values[kinds[0]], table.values["angle"])
+    given = np.flatnonzero(work < -EXACT * np.max(np.abs(work)))
+    if kinds == ["stiffness"]:
+        _nowhere_negative(table, "stiffness")
+    elif len(given):
+        row = int(given[0]) + 1
+        raise ValueRangeError(
+            f"{table.cell(row, 'torque')} = {table.values['torque'][row]:g}",
+            "must be nowhere negative before the spring has taken up as much work",
+            next_step="torque resists a positive angle: turn the sign of the column, or of the angle",
+        )
     angles, values = tuple(table.values["angle"]), tuple(table.values[kinds[0]])
     if kinds == ["stiffness"]:
         if "weight" in table.values:
@@ -226,5 +238,5 @@ def _nowhere_negative(table: ReadColumns, name: str) -> None:
         row = int(np.argmax(negative))
         raise ValueRangeError(
             f"{table.cell(row, name)} = {table.values[name][row]:g}", "must be nowhere negative",
-            next_step="torque resists a positive angle: turn the sign of the column, or of the angle",
+            next_step="turn the sign of the column, or of the angle",
         )  # fmt: skip

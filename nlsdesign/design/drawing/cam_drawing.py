@@ -17,6 +17,7 @@ from ...foundation.errors import ValueRangeError, unknown_name
 from ...foundation.quantity import MM, Quantity
 from ...foundation.text_files import write_text
 from ..statics.contour import Contour, turn
+from ..statics.roller_contour import RollerContour
 from .arc_path import ArcPath
 from .cam_part import CamPart
 from .dxf_drawing import contour_dxf, part_dxf
@@ -145,7 +146,7 @@ def edge_csv(part: CamPart, *, note: str = "") -> str:
     head = [
         "# cam, machined edge; lengths in mm, axis at (0, 0), cable at angle zero along x",
         "# a row without a radius is a straight line; a positive radius turns to the left",
-        f"# cable radius {part.number('cable_radius') * MM:.6g} mm is taken off",
+        f"# {part.counterpart} radius {part.number(f'{part.counterpart}_radius') * MM:.6g} mm is taken off",
         f"# {note}",
         "outline,start_x_mm,start_y_mm,end_x_mm,end_y_mm,radius_mm,centre_x_mm,centre_y_mm",
     ]
@@ -169,10 +170,13 @@ def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
             np.hypot(*points.T),
         ]
     )
+    what = f"cable radius {cable_radius * MM:.6g} mm is taken off, "
+    what += f"anchor distance {contour.anchor_distance * MM:.6g} mm"
+    if isinstance(contour, RollerContour):
+        what = f"centre of a roller of radius {contour.roller_radius * MM:.6g} mm; radius of curvature: edge"
     head = [
         "# cam contour, lower right lip in the frame of the cam; lengths in mm, angles in deg",
-        f"# cable radius {cable_radius * MM:.6g} mm is taken off, "
-        f"anchor distance {contour.anchor_distance * MM:.6g} mm",
+        f"# {what}",
         f"# {note}",
         _COLUMNS,
     ]
@@ -189,11 +193,12 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
     ]
     # In the frame of the cam the cable turns the other way.
     cables = []
+    sides = (1.0, -1.0)[: len(halves)]
     for angle in (0.0, last, -last):
         line = contour.cable(angle)
         step = line[1] - line[0]
         end = line[0] + step * min(1.0, 8e-4 * reach / float(np.hypot(*step)))
-        cables += [turn(np.array([line[0], end]) * side, -angle) for side in (1.0, -1.0)]
+        cables += [turn(np.array([line[0], end]) * side, -angle) for side in sides]
     body = [
         *[f'<path d="{path_data(d)}" fill="#d8d8d8" stroke="#202020" stroke-width="0.15"/>' for d in halves],
         *[
@@ -207,6 +212,6 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
 
 def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
     """Return both halves as closed polylines on the layer ``CONTOUR``, in millimetres."""
-    taken = f"cable radius {cable_radius * MM:.6g} mm taken off" if cable_radius else "cable's centre line"
+    taken = f"cable radius {cable_radius * MM:.6g} mm taken off" if cable_radius else contour.drawn_line
     lines = [f"Cam contour, {taken}; millimetres, 1:1", "no edge to be cut: without channel and run-out"]
     return contour_dxf(contour.outlines(cable_radius=cable_radius), lines=[*lines, note] if note else lines)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,22 +40,40 @@ def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> Li
     Beyond the last angle the edge goes on as an arc with the last radius of curvature.
     """
     _check_curvature(contour, cable_radius)
-    phi = contour.directions
+    directions = contour.directions
     support = BPoly.from_derivatives(
-        phi,
+        directions,
         np.column_stack(
             [contour.lever_arms, contour.slopes, contour.radii_of_curvature - contour.lever_arms]
         ),
     )
-    path, deviation = _arcs(support, phi, cable_radius)
+
+    def over(first: float, last: float) -> tuple[ArcPath, float]:
+        start, end = (
+            (float(support(phi)) - cable_radius) * _normal(phi) + float(support(phi, 1)) * _tangent(phi)
+            for phi in (first, last)
+        )
+        path = biarc(start, end, first=_tangent(first), last=_tangent(last))
+        phi = np.linspace(first, last, _CHECKED)
+        normals = np.column_stack([np.sin(phi), np.cos(phi)])
+        tangents = normals[:, ::-1] * [1.0, -1.0]
+        curve = (support(phi) - cable_radius)[:, None] * normals + support(phi, 1)[:, None] * tangents
+        # On convex arcs the direction of the normal says which of the two a point belongs to.
+        turned = -4.0 * math.atan(float(path.bulges[0]))
+        arc = (phi > first + turned).astype(int)
+        distance = np.hypot(*(curve - path.centres[arc]).T) - np.abs(path.radii)[arc]
+        error = float(np.max(np.abs(distance)))
+        return path, error if np.all(path.bulges[:2] < 0.0) else math.inf
+
+    path, deviation = few_arcs(over, directions)
     last = _run_out_end(contour, over_travel)
     radius = float(contour.radii_of_curvature[-1])
-    centre = contour.points[-1] - radius * _normal(phi[-1])
-    run_out = clockwise_arc(centre, radius - cable_radius, first=float(phi[-1]), last=last)
+    centre = contour.points[-1] - radius * _normal(directions[-1])
+    run_out = clockwise_arc(centre, radius - cable_radius, first=float(directions[-1]), last=last)
     return LipEdge(
-        joined(path, run_out) if last > phi[-1] else path,
+        joined(path, run_out) if last > directions[-1] else path,
         deviation,
-        float(phi[0]),
+        float(directions[0]),
         last,
         float(centre @ _normal(last)) + radius - cable_radius,
     )
@@ -88,8 +106,11 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
         )
 
 
-def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, float]:
-    """Return as few biarcs as the accuracy allows, and their deviation."""
+def few_arcs(over: Callable[[float, float], tuple[ArcPath, float]], phi: Array) -> tuple[ArcPath, float]:
+    """Return as few biarcs as the accuracy allows, and their deviation.
+
+    ``over``: from the ends of a span to its biarc and the deviation of that; ``phi``: nodes along the edge.
+    """
     share = np.arange(_REFINE) / _REFINE
     grid = np.append((phi[:-1, None] + share * np.diff(phi)[:, None]).ravel(), phi[-1])
     pieces: list[ArcPath] = []
@@ -97,10 +118,10 @@ def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, flo
     while at < len(grid) - 1:
         # The longest span that is accurate: first by doubling, then by halves.
         good, bad, step = at + 1, len(grid), 2
-        piece, deviation = _biarc_over(support, grid[at], grid[good], cable_radius)
+        piece, deviation = over(grid[at], grid[good])
         while good + 1 < bad:
             tried = min(at + step, len(grid) - 1) if bad == len(grid) else (good + bad) // 2
-            candidate, error = _biarc_over(support, grid[at], grid[tried], cable_radius)
+            candidate, error = over(grid[at], grid[tried])
             if error <= ACCURACY:
                 good, piece, deviation = tried, candidate, error
             else:
@@ -109,24 +130,6 @@ def _arcs(support: BPoly, phi: Array, cable_radius: float) -> tuple[ArcPath, flo
         pieces.append(piece)
         worst, at = max(worst, deviation), good
     return joined(*pieces), worst
-
-
-def _biarc_over(support: BPoly, first: float, last: float, cable_radius: float) -> tuple[ArcPath, float]:
-    start, end = (
-        (float(support(phi)) - cable_radius) * _normal(phi) + float(support(phi, 1)) * _tangent(phi)
-        for phi in (first, last)
-    )
-    path = biarc(start, end, first=_tangent(first), last=_tangent(last))
-    phi = np.linspace(first, last, _CHECKED)
-    normals = np.column_stack([np.sin(phi), np.cos(phi)])
-    tangents = normals[:, ::-1] * [1.0, -1.0]
-    curve = (support(phi) - cable_radius)[:, None] * normals + support(phi, 1)[:, None] * tangents
-    # On convex arcs the direction of the normal says which of the two a point belongs to.
-    turned = -4.0 * math.atan(float(path.bulges[0]))
-    arc = (phi > first + turned).astype(int)
-    distance = np.hypot(*(curve - path.centres[arc]).T) - np.abs(path.radii)[arc]
-    error = float(np.max(np.abs(distance)))
-    return path, error if np.all(path.bulges[:2] < 0.0) else math.inf
 
 
 def _run_out_end(contour: Contour, over_travel: float) -> float:
@@ -154,15 +157,7 @@ def _run_out_end(contour: Contour, over_travel: float) -> float:
 
 def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[ArcPath, ArcPath]:
     """Return the lower and the upper half, each closed and clockwise."""
-    end = _end_circle(lip, numbers)
-    if lip.last_direction >= math.pi:
-        raise ValueRangeError(
-            "run-out", f"the lip ends at the direction {math.degrees(lip.last_direction):.4g}°, beyond 180°",
-            next_step="take a smaller over_travel",
-        )  # fmt: skip
-    across = (end[0] * [-1.0, 1.0], end[1])
-    back = _back([end, (np.zeros(2), numbers["body_radius"].number), across], lip.last_direction,
-                 2.0 * math.pi - lip.last_direction)  # fmt: skip
+    back = mirrored_back(lip, numbers)
     mouth, wall = lip.path.points[0], -numbers["channel_width"].number / 2.0
     relief = _relief(mouth, lip.first_direction, wall, numbers["tool_radius"].number)
     seat = [_seat(numbers["ferrule_seat"].number / 2.0, -wall)] if "ferrule_seat" in numbers else []
@@ -178,6 +173,19 @@ def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[A
         lip.path, back, lip.path.mirrored(), relief.mirrored(), *seat, relief, closed=True
     )  # fmt: skip
     return lower, lower.turned(math.pi)
+
+
+def mirrored_back(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:
+    """Return the back from the end of a lip to that of its mirror image: round ends, and the body."""
+    if lip.last_direction >= math.pi:
+        raise ValueRangeError(
+            "run-out", f"the lip ends at the direction {math.degrees(lip.last_direction):.4g}°, beyond 180°",
+            next_step="take a smaller over_travel",
+        )  # fmt: skip
+    end = _end_circle(lip, numbers)
+    across = (end[0] * [-1.0, 1.0], end[1])
+    back = [end, (np.zeros(2), numbers["body_radius"].number), across]
+    return _back(back, lip.last_direction, 2.0 * math.pi - lip.last_direction)
 
 
 def one_sided_outline(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:

@@ -45,6 +45,9 @@ class CamPart:
         Curve of the cable's centre line on the first lip, shape (n, 2).
     numbers
         Sizes by name, given and derived, with unit and source.
+    rollers
+        Roller at angle zero and at the last angle of either sense, in the frame of the cam; ``cables`` are
+        then the way of its centre and the line of the follower.
     """
 
     outlines: tuple[ArcPath, ...]
@@ -53,6 +56,12 @@ class CamPart:
     cables: tuple[ArcPath, ...]
     centre_line: Array
     numbers: Mapping[str, Quantity]
+    rollers: tuple[Hole, ...] = ()
+
+    @property
+    def counterpart(self) -> str:
+        """What runs on the edge: a cable or a roller."""
+        return "roller" if self.rollers else "cable"
 
     @cached_property
     def reach(self) -> float:

@@ -1,7 +1,7 @@
 """DXF of the year 2000 with units: closed edges of lines and arcs, holes, axis, cable and text on layers.
 
-Layers: ``EDGE`` and ``BASE`` are cut, ``HOLES`` drilled; ``CENTRE``, ``CABLE``, ``CONTOUR`` and ``TEXT`` are
-for reading. Files are the same for the same part: they hold no date.
+Layers: ``EDGE`` and ``BASE`` are cut, ``HOLES`` drilled; ``CENTRE``, ``CABLE``, ``PITCH`` (way of a roller),
+``ROLLER``, ``CONTOUR`` and ``TEXT`` are for reading. Files are the same for the same part: they hold no date.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ _LAYERS = {
     "CENTRE": (1, "CENTER"),
     "CABLE": (3, "CONTINUOUS"),
     "CONTOUR": (3, "CONTINUOUS"),
+    "PITCH": (3, "CENTER"),
+    "ROLLER": (6, "CONTINUOUS"),
     "TEXT": (8, "CONTINUOUS"),
 }
 _DASHES = (12.0, 8.0, -1.5, 1.0, -1.5)
@@ -48,13 +50,16 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
     for hole in part.holes:
         x, y = (_rounded(value) for value in hole.centre)
         space.add_circle((x, y), _rounded(hole.diameter / 2.0), dxfattribs={"layer": "HOLES"})
+    for roller in part.rollers:
+        x, y = (_rounded(value) for value in roller.centre)
+        space.add_circle((x, y), _rounded(roller.diameter / 2.0), dxfattribs={"layer": "ROLLER"})
     for cable in part.cables:
-        _add_path(document, cable, "CABLE")
+        _add_path(document, cable, "PITCH" if part.rollers else "CABLE")
     _add_axes(document, part.outermost)
-    size = {name: f"{MM * part.number(name):.4g} mm" for name in ("cable_radius", "thickness")}
+    radius, thickness = (f"{MM * part.number(n):.4g} mm" for n in (f"{part.counterpart}_radius", "thickness"))
     lines = [
         "Cam, machined edge; millimetres, 1:1",
-        f"for a cable of radius {size['cable_radius']}, plate {size['thickness']}",
+        f"for a {part.counterpart} of radius {radius}, plate {thickness}",
         f"arcs within {1e6 * part.number('edge_deviation'):.2g} um of the exact edge",
     ]
     if "groove_depth" in part.numbers:

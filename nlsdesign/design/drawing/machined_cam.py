@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,7 @@ _WALL = quantity(1.0, "mm", source="assumed: least wall that a workshop holds in
 _TOLERANCE = quantity(0.02, "mm", source="assumed: usual in fine milling and wire erosion")
 _RANGES = {
     "cable_radius": ("m", 1e-5, 0.01),
+    "roller_radius": ("m", 1e-4, 0.5),
     "channel_clearance": ("m", 0.0, 0.01),
     "thickness": ("m", 1e-4, 0.2),
     "groove_depth": ("m", 1e-4, 0.2),
@@ -143,26 +145,28 @@ class ClampScrew:
         _check(self)
 
 
+class DrawnCam(NamedTuple):
+    """What is drawn of one kind of cam: outlines, holes but those of the bolts, cables or ways, rollers."""
+
+    outlines: list[ArcPath]
+    holes: list[Hole]
+    cables: list[ArcPath]
+    rollers: tuple[Hole, ...] = ()
+
+
 @dataclass(frozen=True, kw_only=True)
 class MachinedCam(ABC):
-    """Sizes common to all cams; take :class:`MachinedTwoSidedCam` or :class:`MachinedOneSidedCam`.
+    """Sizes common to all cams; take one of the classes for a kind of cam, such as MachinedTwoSidedCam.
 
     Each number is a quantity, or bare in SI. What is left out is derived from the contour and the cable; the
     drawing lists every number with its source.
 
     Parameters
     ----------
-    cable_radius
-        Half the diameter of the cable: the edge lies deeper than the contour by it.
-    channel_clearance
-        By how much the channel is wider than the cable, between its mouths.
     thickness
         Of the plate.
-    groove_depth
-        Depth from the face of the plate to which the edges are milled; the rest is a round base plate that
-        carries the lips. Left out: the edges are cut through the plate.
     over_travel
-        Angle of the cam beyond the last one over which the cable still lies on a round edge.
+        Angle of the cam beyond the last one over which the edge goes on.
     corner_radius
         Of the ends of the lips.
     tool_radius
@@ -170,15 +174,13 @@ class MachinedCam(ABC):
     minimum_wall
         Least material between holes and edges.
     edge_tolerance
-        Profile tolerance of the edge under the cable, ± in m.
+        Profile tolerance of the edge, ± in m.
     body_radius
         The lips are backed by material to at least this distance from the axis.
     hub_bore
         Diameter of a bore on the axis.
     bolts
         Bolt holes.
-    cable_end
-        What holds the cable on the cam.
 
     Raises
     ------
@@ -188,10 +190,7 @@ class MachinedCam(ABC):
         If a unit measures something else.
     """
 
-    cable_radius: Quantity | float
-    channel_clearance: Quantity | float = _CLEARANCE
     thickness: Quantity | float | None = None
-    groove_depth: Quantity | float | None = None
     over_travel: Quantity | float = _OVER_TRAVEL
     corner_radius: Quantity | float = _CORNER
     tool_radius: Quantity | float | None = None
@@ -200,10 +199,14 @@ class MachinedCam(ABC):
     body_radius: Quantity | float | None = None
     hub_bore: Quantity | float | None = None
     bolts: BoltCircle | None = None
-    cable_end: FerruleSeat | ClampScrew | None = None
 
     def __post_init__(self) -> None:
         _check(self)
+
+    @property
+    def milled(self) -> bool:
+        """Whether the edges are milled into the plate, so that a base plate remains below them."""
+        return False
 
     def given(self) -> dict[str, Quantity]:
         """Return the numbers by name, with those derived that need no contour."""
@@ -218,18 +221,6 @@ class MachinedCam(ABC):
                 "bolt_circle": as_quantity(self.bolts.circle),
                 "bolt_hole": as_quantity(self.bolts.hole),
             }
-        if isinstance(self.cable_end, FerruleSeat):
-            numbers["ferrule_seat"] = as_quantity(self.cable_end.diameter)
-        if isinstance(self.cable_end, ClampScrew):
-            numbers["clamp_hole"] = as_quantity(self.cable_end.diameter)
-        radius = plain(self.cable_radius)
-        numbers.setdefault(
-            "tool_radius",
-            _derived(
-                min(5e-4, radius), "smaller of 0.5 mm and the cable radius, so that it passes the mouth"
-            ),
-        )
-        numbers.setdefault("thickness", self._thickness())
         return numbers
 
     def part(self, contour: Contour) -> CamPart:
@@ -248,48 +239,47 @@ class MachinedCam(ABC):
             If the contour, the cable, a hole or the plate does not fit; the message names it.
         """
         numbers = self.given()
-        lip = lip_edge(contour, numbers["cable_radius"].number, over_travel=numbers["over_travel"].number)
+        lip = self._edge(contour, numbers)
         numbers |= {
             "last_angle": quantity(math.degrees(contour.angles[-1]), "deg", source="contour"),
-            "sharpest_edge": _derived(
-                float(np.min(contour.radii_of_curvature)) - numbers["cable_radius"].number,
-                "smallest radius of curvature of the contour less the cable radius",
-            ),
-            "edge_deviation": _derived(lip.deviation, "largest distance of the arcs from the exact edge"),
+            "edge_deviation": derived_size(lip.deviation, "largest distance of the arcs from the exact edge"),
         }
-        if math.isfinite(contour.anchor_distance):
-            numbers["anchor_distance"] = quantity(1e3 * contour.anchor_distance, "mm", source="contour")
-        outlines, holes, cables = self._drawn(contour, lip, numbers)
+        outlines, holes, cables, rollers = self._drawn(contour, lip, numbers)
         if self.bolts is not None:
             holes += [
                 Hole(f"bolt hole {k}", c, plain(self.bolts.hole)) for k, c in enumerate(self.bolts.centres, 1)
             ]
         base = 0.0
-        if self.groove_depth is not None:
+        if self.milled:
             rims = [float(np.hypot(*outline.polygon().T).max()) for outline in outlines]
             rims += [math.hypot(*hole.centre) + hole.diameter / 2 for hole in holes]
             base = math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
-            numbers["base_radius"] = _derived(base, "lips, holes and the least wall around them")
-        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), contour.points, numbers)
-        numbers["reach"] = _derived(made.reach, "largest distance of an edge from the axis")
+            numbers["base_radius"] = derived_size(base, "lips, holes and the least wall around them")
+        line = contour.centre_line
+        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), line, numbers, rollers)
+        numbers["reach"] = derived_size(made.reach, "largest distance of an edge from the axis")
         check_machinable(made)
         return made
 
     @abstractmethod
-    def _drawn(
-        self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]
-    ) -> tuple[list[ArcPath], list[Hole], list[ArcPath]]:
-        """Return outlines, holes but those of the bolts, and cables; adds the numbers that it derives."""
+    def _edge(self, contour: Contour, numbers: dict[str, Quantity]) -> LipEdge:
+        """Return the edge; adds its sharpest radius and what else it derives."""
+
+    @abstractmethod
+    def _drawn(self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
+        """Return what is drawn; adds the numbers that it derives."""
 
     def _body_radius(self, limit: float, numbers: dict[str, Quantity]) -> None:
         """Add the body radius where it is not given: what holes need, else half of what fits."""
         needed = 0.0
-        if self.bolts is not None and self.groove_depth is None:
+        if self.bolts is not None and not self.milled:
             needed = (plain(self.bolts.circle) + plain(self.bolts.hole)) / 2 + plain(self.minimum_wall)
         if self.hub_bore is not None:
             needed = max(needed, plain(self.hub_bore) / 2 + plain(self.minimum_wall))
         size = max(0.0, min(limit, max(needed, limit / 2)))
-        numbers.setdefault("body_radius", _derived(size, "what the holes need, at least half of what fits"))
+        numbers.setdefault(
+            "body_radius", derived_size(size, "what the holes need, at least half of what fits")
+        )
         if numbers["body_radius"].number > limit + 1e-9:
             raise ValueRangeError(
                 f"body_radius {numbers['body_radius']}",
@@ -297,23 +287,80 @@ class MachinedCam(ABC):
                 next_step="take a smaller body_radius",
             )
 
+
+@dataclass(frozen=True, kw_only=True)
+class MachinedCableCam(MachinedCam):
+    """Sizes common to the cams that a cable lies on; other parameters are those of :class:`MachinedCam`.
+
+    Parameters
+    ----------
+    cable_radius
+        Half the diameter of the cable: the edge lies deeper than the contour by it.
+    channel_clearance
+        By how much the channel is wider than the cable, between its mouths.
+    groove_depth
+        Depth from the face of the plate to which the edges are milled; the rest is a round base plate that
+        carries the lips. Left out: the edges are cut through the plate.
+    cable_end
+        What holds the cable on the cam.
+    """
+
+    cable_radius: Quantity | float
+    channel_clearance: Quantity | float = _CLEARANCE
+    groove_depth: Quantity | float | None = None
+    cable_end: FerruleSeat | ClampScrew | None = None
+
+    @property
+    def milled(self) -> bool:
+        """Whether a groove is milled."""
+        return self.groove_depth is not None
+
+    def given(self) -> dict[str, Quantity]:
+        """Return the numbers by name, with those derived that need no contour."""
+        numbers = super().given()
+        if isinstance(self.cable_end, FerruleSeat):
+            numbers["ferrule_seat"] = as_quantity(self.cable_end.diameter)
+        if isinstance(self.cable_end, ClampScrew):
+            numbers["clamp_hole"] = as_quantity(self.cable_end.diameter)
+        radius = plain(self.cable_radius)
+        numbers.setdefault(
+            "tool_radius",
+            derived_size(
+                min(5e-4, radius), "smaller of 0.5 mm and the cable radius, so that it passes the mouth"
+            ),
+        )
+        numbers.setdefault("thickness", self._thickness())
+        return numbers
+
+    def _edge(self, contour: Contour, numbers: dict[str, Quantity]) -> LipEdge:
+        radius = numbers["cable_radius"].number
+        numbers["sharpest_edge"] = derived_size(
+            float(np.min(contour.radii_of_curvature)) - radius,
+            "smallest radius of curvature of the contour less the cable radius",
+        )
+        if math.isfinite(contour.anchor_distance):
+            numbers["anchor_distance"] = quantity(1e3 * contour.anchor_distance, "mm", source="contour")
+        return lip_edge(contour, radius, over_travel=numbers["over_travel"].number)
+
     def _thickness(self) -> Quantity:
         """Plate so thick that the cable stays on it: four diameters, with a groove as much again below."""
         if self.groove_depth is not None:
             wall = max(2e-3, plain(self.minimum_wall))
-            return _derived(plain(self.groove_depth) + wall, "groove and a base of 2 mm or the least wall")
-        return _derived(
+            return derived_size(
+                plain(self.groove_depth) + wall, "groove and a base of 2 mm or the least wall"
+            )
+        return derived_size(
             max(4e-3, math.ceil(8e3 * plain(self.cable_radius)) * 1e-3),
             "4 diameters of the cable, at least 4 mm",
         )
 
 
 @dataclass(frozen=True, kw_only=True)
-class MachinedTwoSidedCam(MachinedCam):
+class MachinedTwoSidedCam(MachinedCableCam):
     """Sizes of a cam whose cable runs through its centre, in a channel between two halves.
 
     At the mouths the channel is exactly as wide as the cable, so that the cable leaves it along the contour;
-    between them it is wider by the clearance. Parameters are those of :class:`MachinedCam`.
+    between them it is wider by the clearance. Parameters are those of :class:`MachinedCableCam`.
 
     Examples
     --------
@@ -322,9 +369,7 @@ class MachinedTwoSidedCam(MachinedCam):
     4.0
     """
 
-    def _drawn(
-        self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]
-    ) -> tuple[list[ArcPath], list[Hole], list[ArcPath]]:
+    def _drawn(self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
         radius, clearance = numbers["cable_radius"].number, numbers["channel_clearance"].number
         offset = float(contour.lever_arms[0])
         if abs(offset) > max(clearance / 2, 1e-6) or contour.slopes[0] <= 0.0:
@@ -344,9 +389,11 @@ class MachinedTwoSidedCam(MachinedCam):
                 f"{self.bolts.count} bolts", "do not hold two separate halves, each needs two",
                 next_step="take 4 or more, or a groove_depth so that the cam is one piece",
             )  # fmt: skip
-        numbers["channel_width"] = _derived(2 * radius + clearance, "cable diameter and clearance")
-        numbers["mouth_width"] = _derived(2 * (radius - offset), "cable diameter: the lips guide the cable")
-        numbers["channel_length"] = _derived(2 * float(contour.slopes[0]), "between the mouths")
+        numbers["channel_width"] = derived_size(2 * radius + clearance, "cable diameter and clearance")
+        numbers["mouth_width"] = derived_size(
+            2 * (radius - offset), "cable diameter: the lips guide the cable"
+        )
+        numbers["channel_length"] = derived_size(2 * float(contour.slopes[0]), "between the mouths")
         self._body_radius(lip.last_support, numbers)
         outlines = list(two_sided_outlines(lip, numbers))
         holes = []
@@ -362,18 +409,16 @@ class MachinedTwoSidedCam(MachinedCam):
         half = _cable(contour, float(contour.angles[-1]), beyond)
         turned = np.vstack([-half[::-1], half])
         end = min(1.3 * float(contour.radii.max()), contour.anchor_distance)
-        return outlines, holes, [
-            ArcPath(points, np.zeros(len(points)))
-            for points in (np.array([[-end, 0.0], [end, 0.0]]), turned, turned * [1.0, -1.0])
-        ]  # fmt: skip
+        lines = (np.array([[-end, 0.0], [end, 0.0]]), turned, turned * [1.0, -1.0])
+        return DrawnCam(outlines, holes, [ArcPath(points, np.zeros(len(points))) for points in lines])
 
 
 @dataclass(frozen=True, kw_only=True)
-class MachinedOneSidedCam(MachinedCam):
+class MachinedOneSidedCam(MachinedCableCam):
     """Sizes of a cam that takes up its cable on one side.
 
     Before the contour a straight lead-in carries the cable from its end. Other parameters are those of
-    :class:`MachinedCam`.
+    :class:`MachinedCableCam`.
 
     Parameters
     ----------
@@ -391,13 +436,13 @@ class MachinedOneSidedCam(MachinedCam):
         room = end + 2.0 * plain(self.minimum_wall) if end else 0.0
         numbers.setdefault(
             "lead_in",
-            _derived(8.0 * plain(self.cable_radius) + room, "4 diameters of the cable, and room for its end"),
+            derived_size(
+                8.0 * plain(self.cable_radius) + room, "4 diameters of the cable, and room for its end"
+            ),
         )
         return numbers
 
-    def _drawn(
-        self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]
-    ) -> tuple[list[ArcPath], list[Hole], list[ArcPath]]:
+    def _drawn(self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
         radius, wall = numbers["cable_radius"].number, plain(self.minimum_wall)
         self._body_radius(float(np.min(contour.lever_arms)) - radius, numbers)
         outline = one_sided_outline(lip, numbers)
@@ -420,7 +465,7 @@ class MachinedOneSidedCam(MachinedCam):
             np.vstack([start, _cable(contour, angle, beyond)])
             for angle in (float(contour.angles[0]), float(contour.angles[-1]))
         ]
-        return [outline], holes, [ArcPath(points, np.zeros(len(points))) for points in cables]
+        return DrawnCam([outline], holes, [ArcPath(points, np.zeros(len(points))) for points in cables])
 
 
 def _cable(contour: Contour, angle: float, beyond: float) -> Array:
@@ -438,5 +483,6 @@ def as_quantity(given: Quantity | float, unit: str = "m") -> Quantity:
     return given if isinstance(given, Quantity) else Quantity(given, unit)
 
 
-def _derived(value: float, how: str) -> Quantity:
+def derived_size(value: float, how: str) -> Quantity:
+    """Return a size that follows from others, in mm."""
     return quantity(round(1e3 * value, 9), "mm", source=f"derived: {how}")

@@ -13,7 +13,9 @@ _TEXT = 2.2
 
 def part_svg(part: CamPart, *, note: str = "") -> str:
     """Return a cam as it is made, at scale 1:1, its cable at angle zero and at both ends of the contour."""
-    reach = 1.12 * MM * max(part.outermost, *(float(np.abs(cable.points).max()) for cable in part.cables))
+    sizes = [float(np.abs(cable.points).max()) for cable in part.cables]
+    sizes += [float(np.abs(each.centre).max()) + each.diameter / 2.0 for each in part.rollers]
+    reach = 1.12 * MM * max(part.outermost, *sizes)
     body = []
     if part.base_radius:
         body.append(
@@ -30,13 +32,16 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
             else 'fill="white" stroke="#202020" stroke-width="0.12"'
         )
         body.append(_circle(hole.centre[0], hole.centre[1], hole.diameter / 2.0, look))
+    look = 'fill="none" stroke="#b03020" stroke-width="0.12"'
+    body += [_circle(each.centre[0], each.centre[1], each.diameter / 2.0, look) for each in part.rollers]
     body += [
         f'<path class="cable" d="{path_data(cable)}" stroke="#b03020" stroke-width="0.1"/>'
         for cable in part.cables
     ]
     body.append('<path d="M -1.5 0 H 1.5 M 0 -1.5 V 1.5" stroke="#202020" stroke-width="0.08"/>')
     text = (
-        f"Machined edge for a cable of radius {MM * part.number('cable_radius'):.4g} mm, "
+        f"Machined edge for a {part.counterpart} of radius "
+        f"{MM * part.number(f'{part.counterpart}_radius'):.4g} mm, "
         f"plate {MM * part.number('thickness'):.4g} mm; mm, 1:1"
     )
     return page(reach, body, lines=[text, note])

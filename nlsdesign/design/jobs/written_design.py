@@ -18,6 +18,7 @@ from ..curves.numbers import in_unit
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
+from ..drawing.machined_roller import MachinedRollerCam
 from ..drawing.making import Mounting
 from ..optimisation.result import CamDesign
 from ..statics.declared_cam import declared_cam
@@ -32,13 +33,14 @@ def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam
     """
     kind, radius = declared_edge(design.actuator, design.cam)
     sizes: dict[str, object] = {} if job is None else dict(job.drawing)
-    if "cable_radius" not in sizes:
+    inside = "cable_radius" if design.cam.roller is None else "roller_radius"
+    if inside not in sizes:
         if radius is None:
             raise DeckError(
                 design.cam.name, "declares no cable, so the machined edge is not known",
                 next_step='declare cable_diameter, or write [drawing] cable_radius = "0.5 mm"',
             )  # fmt: skip
-        sizes["cable_radius"] = radius
+        sizes[inside] = radius
     if job is None:
         return kind(**sizes)  # type: ignore[arg-type]
     result: MachinedCam = built(job.deck, kind, sizes, job.deck.place("drawing"))
@@ -46,7 +48,9 @@ def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam
 
 
 def declared_edge(actuator: Assembly, cam: CamNames) -> tuple[type[MachinedCam], Quantity | None]:
-    """Return the kind of part that a cam is, and half of its cable, where that is declared."""
+    """Return the kind of part that a cam is, and the radius of its roller or cable, where declared."""
+    if cam.roller is not None:
+        return MachinedRollerCam, actuator.quantities()[cam.roller.radius]
     two_sided = declared_cam(actuator[cam.name]).through_centre
     radius = None
     if cam.cable is not None:

@@ -18,6 +18,7 @@ from .limits import (
     MaximumStress,
     MinimumRadiusOfCurvature,
 )
+from .roller_limits import MaximumPressureAngle, MinimumHollowRadius
 
 CABLE_FACTOR = 5.0
 """Breaking force over largest tension: the working coefficient of ropes in Directive 2006/42/EC, annex I,
@@ -31,6 +32,10 @@ LASTING_STRAIN = 1.0
 """Half of the extension of about 200 % beyond which the stress of natural rubber without filler relaxes at a
 sharply higher rate, for crystals grow (Gent, Relaxation processes in vulcanized rubber III, Rubber Chem.
 Technol. 36, 1963, 697). Assumed: the half, and that other rubbers bear as much for good."""
+PRESSURE_ANGLE = math.radians(30.0)
+"""Largest pressure angle of a follower that slides (Norton 2009, ch. 7)."""
+WIDER = 1.25
+"""Radius of a hollow over that of the roller in it. Assumed: below, they nearly fit and touch on an arc."""
 COIL_SAFETY = 1.5
 """Assumed: safety of a coil against fatigue. At it the largest shear stress is below 0.45 of the tensile
 strength, up to which coils do not set, whatever the least stress is."""
@@ -68,6 +73,11 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
         radius = values[cam.cable.diameter] * values[cam.cable.bend_ratio] / 2.0
         yield MinimumRadiusOfCurvature(radius)
         yield MaximumCableTension(values[cam.cable.breaking_force] / CABLE_FACTOR)
+    if cam.roller is not None:
+        yield MaximumPressureAngle(PRESSURE_ANGLE)
+        # The roller's centre turns on twice the radius of the roller at least: Norton 2009, ch. 7.
+        yield MinimumRadiusOfCurvature(values[cam.roller.radius])
+        yield MinimumHollowRadius(WIDER * values[cam.roller.radius])
     strengths = [values[p.tensile_strength] for p in cam.specimens if p.tensile_strength is not None]
     if strengths:
         yield MaximumStress(min(strengths), safety_factor=STRESS_FACTOR)

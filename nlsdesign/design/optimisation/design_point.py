@@ -16,6 +16,7 @@ from ...model import FlatModel
 from ...model.structure import CamNames
 from ..curves.target import Target
 from ..statics.equilibrium import ElasticLaw, RelaxingLaw, relaxing_law
+from .edges import Edge
 
 
 def anchor_of(cam: CamNames) -> str:
@@ -60,6 +61,7 @@ class DesignPoint:
     radii_of_curvature: Expression
     radii: Expression
     directions: Expression  # φ, the direction of the cable seen from the cam
+    edge: Edge  # the edge of the cam, under a cable or a roller
     # extensions, forces, stiffnesses: e₀ + δ, F and dF/de of one element
     extensions: Expression
     forces: Expression

@@ -17,6 +17,7 @@ from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ..curves.target import Target
 from ..statics.equilibrium import elastic_law, has_corners, with_smooth_cables
+from .defaults import safe_limits, with_defaults
 from .goals import Goal
 from .limits import Bound, Limit, MinimumRadiusOfCurvature
 from .problem import DesignProblem, contour_names, design_problem, movable_numbers
@@ -30,7 +31,6 @@ _FINER = 0.1
 """By what the rounding is narrowed where the sharp law does not keep what the rounded one promised."""
 _NO_INFLUENCE = 1e-12
 """Change of any goal or limit, each relative to its scale, per change of a number by its own size."""
-CONVEX = "ConvexContour"
 ANCHOR = "AnchorClearance"
 """Name of what the rows with words hold: the cam stays clear of the anchor of its cable."""
 
@@ -64,7 +64,10 @@ class Question:
         """Return the same question for another machine; the contour of its cam is not known."""
         model = flatten(with_smooth_cables(machine))
         names = series_cam(model, self.drive)
-        return replace(self, machine=machine, model=model, cam=machine[names.name])
+        defaults = self.settings.defaults
+        others = safe_limits(model, names.drive) if defaults is None else defaults
+        keep = with_defaults(self.keep, others)
+        return replace(self, machine=machine, model=model, cam=machine[names.name], keep=keep)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -100,16 +103,11 @@ class Search:
 
         Where a least radius of curvature above zero is kept, convexity is no limit of its own.
         """
-        problem, design = self.problem, self.problem.design
+        problem = self.problem
         if problem.contour is None:
             return ()
-        arm, bounds = problem.sizes.arm, []
-        if not any(b.limit == MinimumRadiusOfCurvature.__name__ and b.value > 0.0 for b in self.bounds):
-            bounds.append(_held(CONVEX, "radius of curvature", design.radii_of_curvature, arm))
-        if design.cam.anchor_distance is None or not design.through_centre:
-            bounds.append(_held("PullingCable", "lever arm", design.lever_arms, arm))
-        else:
-            bounds.append(_held("PullingCable", "first slope", problem.contour.first_slope.value, arm))
+        curved = any(b.limit == MinimumRadiusOfCurvature.__name__ and b.value > 0.0 for b in self.bounds)
+        bounds = problem.contour.held(problem.design, problem.sizes.arm, curved=curved)
         for each in problem.structure:
             if each.words:
                 upper = bool(np.isfinite(each.upper))
@@ -170,10 +168,6 @@ class Search:
                 next_step="leave it out, or ask for a goal or limit that depends on it; what may change: "
                 + ", ".join(others),
             )
-
-
-def _held(limit: str, of: str, expression: Expression, scale: float) -> Bound:
-    return Bound(limit, of, ca.SX(expression), 0.0, False, "mm", scale)
 
 
 def spans_of(angles: Array, where: Mask) -> str:

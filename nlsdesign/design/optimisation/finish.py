@@ -17,7 +17,7 @@ from ...foundation.quantity import Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.origin import derived
 from ..curves.target import Target
-from ..statics.contour import Contour, contour_from_curvature
+from ..statics.contour import Contour
 from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam
 from ..statics.equilibrium import cam_function, torque_function, with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
@@ -29,7 +29,9 @@ from .problem import DesignProblem
 from .program import Solution
 from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
+from .roller_limits import side_forces
 from .several_starts import same_design
+from .shape import INTERVALS
 from .size_ranges import size_ranges
 
 _ACTIVE = 1e-3
@@ -159,7 +161,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
     tolerance, remarks = _tolerance(solved)
     cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
     sentences = []
-    if "MaximumCableTension" not in kinds:
+    if cam.roller is None and "MaximumCableTension" not in kinds:
         sentences.append(
             f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
         )
@@ -169,6 +171,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         )
     if cam.coils and "GoodmanSafety" not in kinds:
         sentences.append("wire and strength of the coil are not declared: nothing limits what the wire bears")
+    sentences += side_forces(design, lambda each: problem.evaluate(each, best.point))
     sentences += [f"{at}.{text}" for at, part in solved.changed.walk() for text in part.remarks()]
     return CamDesign(
         target=design.target,
@@ -250,6 +253,12 @@ def _made_otherwise(solved: SolvedSearch) -> str:
     cam, largest = solved.search.problem.law.cam.name, solved.search.problem.design.target.largest
     widths = [name for name in (f"{cam}.onset", f"{cam}.changeover") if name in solved.actuator.quantities()]
     share, pretension = 100.0 * solved.predicted_rms / largest, solved.search.problem.law.cam.pretension
+    if solved.search.problem.law.cam.roller is not None:
+        step = math.degrees(solved.search.problem.design.target.last_angle) / INTERVALS
+        return (
+            f"at its {INTERVALS} nodes the way of the roller leaves {share:.2g} %; between them the curve "
+            f"bends more than it can: spread its jumps over {step:.2g}° or more"
+        )
     freed = "" if pretension in solved.free or solved.lost_travel <= 0.0 else f", free {pretension}"
     return (
         f"the contour itself leaves {share:.2g} %; the rest is the cam, which sets in over an angle: "
@@ -276,7 +285,7 @@ def _beyond_defaults(solved: SolvedSearch) -> Iterator[str]:
         for bound in limit.bounds(problem.design):
             state = limit_state(problem, bound, solved.best.point)
             excess = (state.value - state.bound) * (1.0 if state.upper else -1.0)
-            if excess > _ACTIVE * bound.scale:
+            if excess > _ACTIVE * (bound.scale if bound.offset is None else abs(state.bound)):
                 yield f"beyond what the declared cable and rubber allow: {state}"
 
 
@@ -345,20 +354,10 @@ def _designed(old: Quantity, value: float, source: str) -> Quantity:
 
 
 def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
-    design = problem.design
     if problem.contour is None:
         return contour_of_cam(cam), None
-    anchor = design.cam.anchor_distance
-    contour = contour_from_curvature(
-        problem.evaluate(design.directions, best.point),
-        problem.evaluate(design.radii_of_curvature, best.point),
-        first_slope=float(problem.evaluate(problem.contour.first_slope.value, best.point)[0]),
-        first_lever_arm=float(problem.evaluate(design.lever_arms[0], best.point)[0]),
-        anchor_distance=(
-            np.inf if anchor is None else float(problem.evaluate(design.parameters[anchor], best.point)[0])
-        ),
-    )
-    given = None if anchor is None else contour.anchor_distance
+    contour = problem.contour.made(problem.design, lambda each: problem.evaluate(each, best.point))
+    given = None if problem.design.cam.anchor_distance is None else contour.anchor_distance
     fit = cam_from_profile(
         contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES, anchor_distance=given
     )
@@ -370,11 +369,12 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
+    read, end = bound.read(value), bound.read(bound.value)
     angles = problem.evaluate(problem.design.angles, point)
     where = ""
     if active and len(values) == len(angles):
         where = spans_of(angles, np.abs(values - bound.value) <= _ACTIVE * bound.scale)
-    return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active, where)
+    return LimitState(bound.limit, bound.of, read, end, bound.at_most, bound.unit, active, where)
 
 
 _ANGLES = 801

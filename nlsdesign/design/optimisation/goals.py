@@ -16,8 +16,6 @@ from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint
 from .steady_cycle import steady_cycle
 
-_LENGTH = 0.01
-"""Typical radius of curvature in m; it only scales the roughness."""
 _FLOOR = 1e-6
 """Rms error relative to the largest torque that keeps the root smooth where the error vanishes."""
 
@@ -103,11 +101,8 @@ class SmoothContour(Goal):
     weight: float = 1e-5
 
     def cost(self, design: DesignPoint) -> Expression:
-        """Return weight · mean((dρ/dφ)²) / (10 mm/rad)²."""
-        rho, phi = design.radii_of_curvature, design.directions
-        changes, steps = rho[1:] - rho[:-1], phi[1:] - phi[:-1]
-        span = phi[-1] - phi[0]
-        return self.weight * ca.sum1(changes**2 / steps) / span / _LENGTH**2
+        """Return weight · mean((dρ/dφ)²) / (10 mm/rad)², under a roller that of d²h/dθ² and a base radius."""
+        return self.weight * design.edge.roughness
 
 
 @dataclass(frozen=True)
@@ -213,14 +208,7 @@ class LeastMass(Goal):
 
     def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the mass."""
-        # The area of the sectors below the contour, with p and ρ linear between nodes.
-        p, rho, phi = design.lever_arms, design.radii_of_curvature, design.directions
-        steps = phi[1:] - phi[:-1]
-        middle = (p[1:] + p[:-1]) * (rho[1:] + rho[:-1])
-        products = (p[1:] * rho[1:] + p[:-1] * rho[:-1] + middle) / 6.0
-        halves = 2.0 if design.through_centre else 1.0
-        area = halves * ca.dot(products, steps) / 2.0
-        plates = plain(self.plate_density) * plain(self.plate_thickness) * area
+        plates = plain(self.plate_density) * plain(self.plate_thickness) * design.edge.sector
         return GoalMeasure("mass", plain(self.rubber_density) * design.rubber_volume + plates, "g")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import casadi as ca
@@ -14,7 +14,9 @@ from ...foundation.quantity import Quantity, same_dimension, typeset_unit
 from ...foundation.symbolic import Expression
 from ..curves.numbers import in_si, in_unit, plain
 from ..curves.target import TorqueBand
+from ..statics.roller_contour import STRAIGHT
 from .design_point import DesignPoint, anchor_of
+from .edges import EdgeRow
 from .goals import Goal
 
 
@@ -29,13 +31,23 @@ class Bound:
     upper: bool
     unit: str
     scale: float
+    offset: float | None = None  # see EdgeRow: what is read is a radius, what is held a curvature
+
+    def read(self, value: float) -> float:
+        """Return what a value of the expression means to a designer, in SI."""
+        return value if self.offset is None else 1.0 / max(value, 1.0 / STRAIGHT) + self.offset
+
+    @property
+    def at_most(self) -> bool:
+        """Whether what is read is the largest that is allowed, or the least."""
+        return self.upper == (self.offset is None)
 
     def shown(self, value: float) -> str:
-        """Return a number in the unit of the limit as text."""
-        return in_unit(value, self.unit)
+        """Return a value of the expression in the unit of the limit as text."""
+        return in_unit(self.read(value), self.unit)
 
     def __str__(self) -> str:
-        return f"{self.limit}: {self.of} {'<=' if self.upper else '>='} {self.shown(self.value)}"
+        return f"{self.limit}: {self.of} {'<=' if self.at_most else '>='} {self.shown(self.value)}"
 
 
 @dataclass(frozen=True)
@@ -137,10 +149,21 @@ class Limit(ABC):
         size = abs(value) or 1.0 if scale is None else scale
         return Bound(type(self).__name__, of, ca.SX(expression), value, upper, unit, size)
 
+    def along(self, row: EdgeRow) -> Bound:
+        """Return what must hold along an edge.
+
+        Parameters
+        ----------
+        row
+            Of the edge.
+        """
+        bound = self.bound(row.of, row.expression, row.value, upper=row.upper, unit="mm")
+        return replace(bound, offset=row.offset)
+
 
 @dataclass(frozen=True)
 class MinimumRadiusOfCurvature(Limit):
-    """ρ ≥ radius everywhere: what a tool can cut and a cable can bend around.
+    """ρ ≥ radius everywhere: what a tool can cut and a cable can bend around; under a roller where convex.
 
     Parameters
     ----------
@@ -159,9 +182,7 @@ class MinimumRadiusOfCurvature(Limit):
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the contour."""
-        yield self.bound(
-            "radius of curvature", design.radii_of_curvature, plain(self.radius), upper=False, unit="mm"
-        )
+        yield self.along(design.edge.least_radius(plain(self.radius)))
 
 
 @dataclass(frozen=True)

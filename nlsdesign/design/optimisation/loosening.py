@@ -65,8 +65,11 @@ class Give:
         return ratio <= _MOST_RAISED if self.bound.upper else ratio >= 1.0 / _MOST_RAISED
 
     def __str__(self) -> str:
-        amount, end = self.bound.shown(self.amount), self.bound.shown(_outwards(self.moved, self.bound.upper))
-        return f"{self.bound} would have to give by {amount} (to {end})"
+        bound = self.bound
+        moved = bound.read(self.moved)
+        amount = in_unit(abs(moved - bound.read(bound.value)), bound.unit)
+        end = in_unit(_outwards(moved, bound.at_most), bound.unit)
+        return f"{bound} would have to give by {amount} (to {end})"
 
 
 @dataclass(frozen=True)

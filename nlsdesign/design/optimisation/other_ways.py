@@ -10,7 +10,7 @@ import numpy as np
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.errors import NlsError
-from ..statics.declared_cam import declared_cam, one_sided
+from ..statics.declared_cam import declared_cam, one_sided, with_roller
 from .design_search import Search, row_of, spans_of
 from .limits import MaximumCableTension, MinimumRadiusOfCurvature
 from .loosening import Freed, Loosened
@@ -69,6 +69,10 @@ def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
         other = one_sided(part, search.question.target.last_angle)
         words = "a one-sided cam (OneSidedCam), which pulls to one side only"
         yield words, machine.with_part(cam.name, other)
+    if search.problem.contour is not None and cam.roller is None:
+        words = "a cam with a roller follower (RollerCam), whose edge may be hollow"
+        rolling = with_roller(part, search.problem.sizes.arm, search.question.target.last_angle)
+        yield words, machine.with_part(cam.name, rolling)
     # Elements share the torque as areas do, but only they share the force of the cable.
     if any(bound.limit == MaximumCableTension.__name__ for bound in search.bounds):
         count = 2 * round(search.question.model.values[cam.elements])
@@ -88,8 +92,8 @@ class Hollow:
         besides = "" if self.freed is None else f" ({self.freed} besides)"
         return (
             f"ConvexContour: the contour would have to be hollow {self.spans}, with radii of curvature "
-            f"down to {1e3 * self.deepest:.3g} mm{besides}; a taut cable lifts off there, so this curve "
-            "takes a cam with a follower or a rolling pair, which are not designed here"
+            f"down to {1e3 * self.deepest:.3g} mm{besides}; a taut cable lifts off there; the roller of a "
+            "follower (RollerCam) does not, nor does a rolling pair, which is not designed here"
         )
 
 
@@ -99,7 +103,7 @@ def hollow_contour(loose: Loosened) -> Hollow | None:
     All limits are kept but those on its curvature, with what is free, or else with all sizes freed.
     """
     problem = loose.open.problem
-    if problem.contour is None:
+    if problem.contour is None or not problem.contour.radii_of_curvature:
         return None
     names = [v.name for v in problem.variables]
     radii = [names.index(v.name) for v in problem.contour.radii_of_curvature]
@@ -130,7 +134,7 @@ def tried_otherwise(loose: Loosened, search: Search, free: Sequence[str]) -> lis
         f"{one}: it keeps all limits and leaves {percent(one.error, largest)}"
         for one in other_springs(search, free)
     ]
-    hollow = None if ways else hollow_contour(loose)
-    ways += [] if hollow is None else [str(hollow)]
+    hollow = hollow_contour(loose)
+    ways = [*([] if hollow is None else [str(hollow)]), *ways]
     sizes = f"all sizes free ({', '.join(loose.candidates)})" if loose.candidates else "no size left to free"
     return ways or [f"nothing that was tried keeps them: {sizes}, another kind of cam, a hollow contour"]

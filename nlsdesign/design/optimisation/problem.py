@@ -21,7 +21,7 @@ from ..statics.energy import closed_form
 from ..statics.equilibrium import ElasticLaw, elastic_law
 from .design_point import DesignPoint, Stretched
 from .program import DesignVariable, Rows, scalar
-from .shape import ContourVariables, Shape, Start, StartSizes, given, parallel, start_values, through_centre
+from .shape import INTERVALS, FreeContour, Shape, Start, StartSizes, free_shape, given, start_values
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""
@@ -50,7 +50,7 @@ class DesignProblem:
     design: DesignPoint  # the design in symbols
     structure: tuple[Rows, ...]  # rows that hold for any cam; no limit of the designer
     scalars: tuple[DesignVariable, ...]  # the single numbers that are free
-    contour: ContourVariables | None  # the variables of the contour; None where it is given
+    contour: FreeContour | None  # the variables of the contour; None where it is given
     sizes: StartSizes  # what starts are relative to
     # states: scaled values of the unknowns that the structure ties to the contour; they follow its variables
     states: Expression
@@ -121,7 +121,7 @@ def design_problem(
     made = declared_cam(cam)
     sharp = law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
-    arm, stretch = _sizes(law, target if symbols is None else symbols.sized_for)
+    arm, stretch, profile = _sizes(law, target if symbols is None else symbols.sized_for)
     end = ca.SX(target.last_angle) if symbols is None else symbols.last_angle
     share, width = rounding if isinstance(rounding, tuple) else (rounding, None)
     if share > 0.0:
@@ -130,15 +130,15 @@ def design_problem(
     parameters = {
         v.name: scalars[v.name].value if v.name in scalars else ca.SX(v.start) for v in model.parameters
     }
-    anchor, contour = law.cam.anchor_distance, None
+    contour: FreeContour | None = None
     if not contour_is_free:
         shape = given(model, cam, target.last_angle, law.cam.drive)
-    elif made.through_centre and anchor is not None:
-        contour, shape = through_centre(parameters[anchor], target.last_angle, arm, end=end)
     else:
-        contour, shape = parallel(end, arm)
+        ends = (target.last_angle, end)
+        contour, shape = free_shape(made.through_centre, parameters, names=law.cam, ends=ends, arm=arm)
+    anchor = law.cam.anchor_distance
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
-    sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
+    sizes = StartSizes(arm, stretch, law.cam.pretension, largest, profile)
     called = law if width is None else sharp.without_knots(2.0 * stretch, width)
     everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
 
@@ -168,7 +168,8 @@ def contour_names(cam: CamNames) -> tuple[str, str]:
 def movable_numbers(model: FlatModel, cam: CamNames) -> dict[str, Variable]:
     """Return the single numbers that a design may change, by name."""
     ratios = [body.motor.gear_ratio for body in model.bodies if body.motor is not None]
-    names = [*cam.numbers, cam.anchor_distance, *ratios]
+    base = [] if cam.roller is None else [cam.roller.base_radius]
+    names = [*cam.numbers, cam.anchor_distance, *base, *ratios]
     return {name: model.variable(name) for name in names if name is not None}
 
 
@@ -193,7 +194,9 @@ def _split(model: FlatModel, free: Sequence[str], cam: CamNames) -> tuple[bool, 
             "the anchor shapes the contour, so it can only be free together with it",
             next_step=f"free '{contours[0]}' too",
         )
-    return contour_is_free, [v for name, v in movable.items() if name in free]
+    # The base radius of a cam with a roller is chosen with its contour.
+    base = [cam.roller.base_radius] if cam.roller is not None and contour_is_free else []
+    return contour_is_free, [v for name, v in movable.items() if name in (*free, *base)]
 
 
 def _not_movable(name: str, model: FlatModel, movable: Sequence[str]) -> NlsError:
@@ -206,15 +209,21 @@ def _not_movable(name: str, model: FlatModel, movable: Sequence[str]) -> NlsErro
     )  # fmt: skip
 
 
-def _sizes(law: ElasticLaw, target: Target) -> tuple[float, float]:
-    """Return a typical lever arm and stretch: those of the closed form, or of a wheel where there is none."""
+def _sizes(law: ElasticLaw, target: Target) -> tuple[float, float, Array]:
+    """Return a typical lever arm and stretch, and the wanted torque at the nodes relative to the largest.
+
+    Those of the closed form, or of a wheel where there is none.
+    """
     elements = {v.name: v.start for v in law.parameters}[law.cam.elements]
+    nodes = np.linspace(0.0, 1.0, INTERVALS + 1)
     try:
         profile = closed_form(law, target, elements=elements, points=21)
     except InfeasibleError:
         # The rubber as it is cannot store the energy; what is free may change that.
-        return 0.01, 0.01 * target.last_angle
-    return float(np.clip(profile.lever_arms[-1], 1e-4, 0.2)), float(profile.extensions[-1])
+        return 0.01, 0.01 * target.last_angle, nodes
+    wanted = np.interp(nodes * profile.angles[-1], profile.angles, profile.torques / target.largest)
+    arm = float(np.clip(profile.lever_arms.max(), 1e-4, 0.2))
+    return arm, float(profile.extensions.max()), wanted
 
 
 def _lifted(problem: DesignProblem) -> DesignProblem:
@@ -264,7 +273,8 @@ def _design(
         lever_arms=shape.lever_arms,
         lever_arm_slopes=shape.lever_arm_slopes,
         radii_of_curvature=shape.radii_of_curvature,
-        radii=ca.sqrt(shape.lever_arms**2 + shape.slopes**2 + 1e-18),
+        radii=shape.radii,
+        edge=shape.edge,
         extensions=stretched,
         forces=forces,
         stiffnesses=ca.vertcat(*[column.stiffness for column in columns]),

@@ -35,7 +35,10 @@ class Remedies:
         sentences = [f"{freed}: {percent(freed.error, largest)}" for freed in self.enough]
         for give, also in self.gives:
             sentences.append(f"{give}" + ("" if also is None else f", and {also}"))
-        sentences += [f"{one}: {percent(one.error, largest)}" for one in self.others if one.error <= allowed]
+        others = [f"{one}: {percent(one.error, largest)}" for one in self.others if one.error <= allowed]
+        if others and self.hollow is not None:
+            sentences.append(str(self.hollow))
+        sentences += others
         if sentences:
             return sentences
         tried = []
@@ -71,8 +74,7 @@ def find_remedies(
     if enough or gives:
         return Remedies(enough, tuple(better), gives, everything)
     others = other_springs(search, free)
-    hollow = None if any(one.error <= allowed for one in others) else hollow_contour(loose)
-    return Remedies((), tuple(better), (), everything, others, hollow)
+    return Remedies((), tuple(better), (), everything, others, hollow_contour(loose))
 
 
 def _nothing(give: Give) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.data_frames import Axis, data_frame
-from ...foundation.quantity import Quantity, parse_unit
+from ...foundation.quantity import MM, Quantity, parse_unit
 from ...foundation.written_numbers import prefixed, without_power
 from ...model.structure import CamNames
 from ..curves.numbers import in_unit
@@ -331,6 +331,9 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     target, check, curves = design.target, design.check, design.curves
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"
+    pulled = "cable" if design.cam.roller is None else "element"
+    arms = design.contour.lever_arms
+    least = float(arms.min())
     fit = f", contour held to {1e6 * design.fit_error:.2g} µm" if design.fit_error > 0.0 else ""
     rows = [("verdict", _MET if design.miss is None else str(design.miss))]
     if design.miss is not None:
@@ -349,7 +352,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         for name, value in design.changes
     ]
     rows += [
-        ("cable force", f"{curves.forces[0]:.4g} to {curves.forces.max():.4g} N in each cable"),
+        (f"{pulled} force", f"{curves.forces[0]:.4g} to {curves.forces.max():.4g} N in each {pulled}"),
         *((f"strain of {path}", f"up to {100 * row.max():.4g} %") for path, row in curves.strains.items()),
         *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
         ("energy from angle zero", f"{curves.energy:.4g} J, without that of the pretension"),
@@ -360,7 +363,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         ),
         ("radius of curvature", _curvature(design)),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
-        ("lever arm", f"up to {1e3 * design.contour.lever_arms.max():.4g} mm"),
+        ("lever arm", f"{f'{MM * least:.4g}' if least < 0.0 else 'up'} to {MM * arms.max():.4g} mm"),
         (
             "sizes that cost nothing",
             "; ".join(str(each) for each in design.size_ranges if each.wide) or "none",
@@ -384,7 +387,11 @@ _EDGE = 1e-3
 
 def _curvature(design: CamDesign) -> str:
     """Return the range of the radius of curvature; where it is zero the contour is an edge, as of a bar."""
-    curves = design.curves
+    curves, made = design.curves, design.contour.radii_of_curvature
+    hollow = curves.radii_of_curvature < 0.0
+    if hollow.any():
+        narrowest, where = MM * float(-made[made < 0.0].max()), spans_of(curves.angles, hollow)
+        return f"from {MM * made[made > 0.0].min():.3g} mm, hollow {where} with at least {narrowest:.3g} mm"
     edge = curves.radii_of_curvature <= _EDGE * curves.lever_arms.max()
     if not edge.any():
         rho = design.contour.radii_of_curvature

@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import PPoly
 
+from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
+from ...model.structure import CamNames
+from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
+from ..statics.roller_contour import RollerContour, roller_contour
+from .design_point import DesignPoint
+from .edges import CableEdge, Edge, RollerEdge
+from .limits import Bound
 from .program import DesignVariable, Rows, scaled
+
+CONVEX = "ConvexContour"
+"""Name of what holds a contour under a cable: it is nowhere hollow."""
 
 INTERVALS = 40
 """Intervals of the contour; the number moves the results by less than their last digit shown."""
 
+_STEEPEST = 200.0
+"""Largest slope of the lever arm of a roller, relative to the size of the lever arm."""
+_POINTS = 8
+"""Points of the contour under a roller in each interval."""
 _LARGEST_RADIUS = 0.5
 """Largest radius of curvature and first slope in m."""
 _LEAST_CLEARANCE = 0.02
@@ -36,7 +53,7 @@ class Shape(NamedTuple):
     directions: Expression
     angles: Expression
     lever_arms: Expression
-    slopes: Expression
+    radii: Expression
     radii_of_curvature: Expression
     extensions: Expression
     lever_arm_slopes: Expression
@@ -44,22 +61,117 @@ class Shape(NamedTuple):
     through_centre: bool
     states: tuple[DesignVariable, ...]
     state_values: Expression
+    edge: Edge
 
 
-class ContourVariables(NamedTuple):
-    """The variables that shape a contour; the last is the last direction, or the first lever arm.
+@dataclass(frozen=True, eq=False)
+class FreeContour(ABC):
+    """The variables that shape the contour of one kind of cam, and what follows from them."""
+
+    # radii_of_curvature: those that must not be negative, or the contour is hollow; none where it may be
+    radii_of_curvature: tuple[DesignVariable, ...]
+
+    @abstractmethod
+    def all(self) -> list[DesignVariable]:
+        """Return them in the order of the vector."""
+
+    @abstractmethod
+    def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
+        """Return their scaled values at a start by name."""
+
+    @abstractmethod
+    def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
+        """Return what holds them besides the limits; ``curved``: whether a limit keeps the edge convex."""
+
+    @abstractmethod
+    def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
+        """Return the contour at a solution, at which ``value`` gives numbers for expressions."""
+
+
+def held(limit: str, of: str, expression: Expression, scale: float) -> Bound:
+    """Return what must not be negative."""
+    return Bound(limit, of, ca.SX(expression), 0.0, False, "mm", scale)
+
+
+@dataclass(frozen=True, eq=False)
+class ContourVariables(FreeContour):
+    """The variables of a contour under a cable; the last is the last direction, or the first lever arm.
 
     Where the cable passes through the centre the first lever arm is zero and the last direction follows from
     the anchor; where it stays parallel the last direction is the last angle and the first lever arm is free.
     """
 
-    radii_of_curvature: tuple[DesignVariable, ...]
     first_slope: DesignVariable
     last: DesignVariable
 
     def all(self) -> list[DesignVariable]:
         """Return them in the order of the vector."""
         return [*self.radii_of_curvature, self.first_slope, self.last]
+
+    def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
+        """Return their scaled values at a start by name."""
+        values = {v.name: v.start for v in self.all()}
+        # No start may reach to the anchor.
+        size = min(start.contour_size, sizes.largest_arm / sizes.arm)
+        slope = size * start.slope_share
+        values |= {radius.name: size - 0.5 * slope for radius in self.radii_of_curvature}
+        values[self.first_slope.name] = slope
+        return values
+
+    def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
+        """Return that the contour is convex and the cable pulls."""
+        bounds = [] if curved else [held(CONVEX, "radius of curvature", design.radii_of_curvature, arm)]
+        if design.cam.anchor_distance is None or not design.through_centre:
+            return [*bounds, held("PullingCable", "lever arm", design.lever_arms, arm)]
+        return [*bounds, held("PullingCable", "first slope", self.first_slope.value, arm)]
+
+    def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
+        """Return the contour at a solution."""
+        anchor = design.cam.anchor_distance
+        return contour_from_curvature(
+            value(design.directions),
+            value(design.radii_of_curvature),
+            first_slope=float(value(self.first_slope.value)[0]),
+            first_lever_arm=float(value(design.lever_arms[0])[0]),
+            anchor_distance=np.inf if anchor is None else float(value(design.parameters[anchor])[0]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RollerVariables(FreeContour):
+    """The slope of the lever arm at each node, straight between them, in units of a typical lever arm."""
+
+    slopes: tuple[DesignVariable, ...]
+    radius: float  # of the roller in m
+    per_interval: float  # intervals in a radian
+
+    def all(self) -> list[DesignVariable]:
+        """Return them in the order of the vector."""
+        return list(self.slopes)
+
+    def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
+        """Return a lever arm that rises and falls as the torque does."""
+        slopes = np.gradient(sizes.profile) * start.contour_size * 2.0 * start.slope_share * self.per_interval
+        return {v.name: each for v, each in zip(self.slopes, slopes.tolist(), strict=True)}
+
+    def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
+        """Return that the element presses the roller on the cam."""
+        return [held("PressedRoller", "extension of the element", design.extensions, arm)]
+
+    def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
+        """Return the contour at a solution: a slope that is straight between nodes, integrated exactly."""
+        nodes, slopes = value(design.angles), value(design.lever_arm_slopes)
+        share = np.arange(_POINTS) / _POINTS
+        bearings = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * share).ravel(), nodes[-1])
+        law = PPoly(np.array([np.diff(slopes) / np.diff(nodes), slopes[:-1]]), nodes)
+        arms, way = law.antiderivative(), law.antiderivative(2)
+        rho = design.parameters[design.cam.roller.base_radius]  # type: ignore[union-attr]
+        return roller_contour(
+            bearings,
+            (way(bearings), arms(bearings), law(bearings)),
+            base_radius=float(value(rho)[0]),
+            roller_radius=self.radius,
+        )
 
 
 class _Support(NamedTuple):
@@ -99,8 +211,8 @@ def through_centre(
     )
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     return variables, Shape(
-        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows, True,
-        support.states, support.state_values,
+        directions, angles, p, _distance(p, slope), rho, extensions, slope * root / (root - slope),
+        rows, True, support.states, support.state_values, CableEdge(directions, p, rho, 2),
     )  # fmt: skip
 
 
@@ -114,27 +226,116 @@ def parallel(last_angle: Expression, size: float) -> tuple[ContourVariables, Sha
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     rows = (support.rows, Rows(p / size, 0.0, ca.inf))
     return variables, Shape(
-        directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False,
-        support.states, support.state_values,
+        directions, directions, p, _distance(p, slopes), rho, arcs - (slopes - slopes[0]), slopes,
+        rows, False, support.states, support.state_values, CableEdge(directions, p, rho, 1),
     )  # fmt: skip
+
+
+def _distance(p: Expression, slopes: Expression) -> Expression:
+    return ca.sqrt(p**2 + slopes**2 + 1e-18)
+
+
+def rolled(
+    last_angle: float, arm: float, *, end: Expression, base: Expression, radius: float
+) -> tuple[FreeContour, Shape]:
+    """Return the way of a roller whose lever arm is zero at angle zero.
+
+    ``base``, ``radius``: base radius, and radius of the roller in m; ``arm``: a typical lever arm.
+    """
+    names = [f"lever_arm_slope[{i}]" for i in range(INTERVALS + 1)]
+    symbols = [ca.SX.sym(name) for name in names]
+    variables = tuple(
+        DesignVariable(name, symbol, arm * symbol, -_STEEPEST, _STEEPEST, 0.0)
+        for name, symbol in zip(names, symbols, strict=True)
+    )
+    slopes = [v.value for v in variables]
+    step, ways = end / INTERVALS, ca.SX.sym("way", 2, INTERVALS)
+    begin = (ca.SX(0), ca.SX(0))
+    states = [begin, *[(arm * ways[0, i], arm * ways[1, i]) for i in range(INTERVALS)]]
+    explicit, rows = [begin], []
+    for i, (left, right) in enumerate(itertools.pairwise(slopes)):
+        explicit.append(_next_way(explicit[-1], left, right, step))
+        there = _next_way(states[i], left, right, step)
+        rows += [(a - b) / arm for a, b in zip(there, states[i + 1], strict=True)]
+    arms, taken = (ca.vertcat(*column) for column in zip(*states, strict=True))
+    lifted = tuple(
+        DesignVariable(f"{name}[{i + 1}]", ways[k, i], arm * ways[k, i], -np.inf, np.inf, 0.0)
+        for i in range(INTERVALS)
+        for k, name in enumerate(("lever_arm", "way"))
+    )
+    values = ca.vertcat(*[each for state in explicit[1:] for each in state]) / arm
+    angles = step * ca.SX(np.arange(INTERVALS + 1))
+    edge = RollerEdge(angles, base + taken, arms, ca.vertcat(*slopes), radius)
+    clear = Rows((edge.centre_radii - 1.01 * radius) / arm, 0.0, ca.inf)
+    shape = _rolling(edge, taken, (Rows(ca.vertcat(*rows), 0.0, 0.0), clear), (lifted, values))
+    return RollerVariables((), variables, radius, INTERVALS / last_angle), shape
+
+
+def _rolling(
+    edge: RollerEdge,
+    taken: Expression,
+    rows: tuple[Rows, ...],
+    states: tuple[tuple[DesignVariable, ...], Expression],
+) -> Shape:
+    return Shape(
+        edge.bearings, edge.bearings, edge.lever_arms, edge.radii, edge.radii_of_curvature, taken,
+        edge.lever_arm_slopes, rows, True, *states, edge,
+    )  # fmt: skip
+
+
+def _next_way(
+    state: tuple[Expression, Expression], left: Expression, right: Expression, step: Expression
+) -> tuple[Expression, Expression]:
+    """Return h and x one interval further."""
+    arm, taken = state
+    return arm + step * (left + right) / 2, taken + step * arm + step**2 * (2 * left + right) / 6
+
+
+def free_shape(
+    both_sides: bool,
+    parameters: Mapping[str, Expression],
+    *,
+    names: CamNames,
+    ends: tuple[float, Expression],
+    arm: float,
+) -> tuple[FreeContour, Shape]:
+    """Return the shape of a cam whose contour is free, and its variables.
+
+    ``both_sides``: whether the cam works to both sides alike; ``ends``: the last angle, and the expression
+    that stands for it; ``arm``: a typical lever arm in m.
+    """
+    last_angle, end = ends
+    anchor, roller = names.anchor_distance, names.roller
+    if roller is not None:
+        base, radius = parameters[roller.base_radius], float(parameters[roller.radius])
+        return rolled(last_angle, arm, end=end, base=base, radius=radius)
+    if both_sides and anchor is not None:
+        return through_centre(parameters[anchor], last_angle, arm, end=end)
+    return parallel(end, arm)
 
 
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
     """Return the shape of a declared cam that stays as it is."""
     contour = contour_of_cam(cam, last_angle=last_angle, points=INTERVALS + 1)
-    if isinstance(cam, DesignedCam):
+    both = declared_cam(cam).through_centre
+    if isinstance(cam, DesignedCam) or isinstance(contour, RollerContour):
         # As the search saw it that designed the contour, without the change of sides of the fitted cam.
         extensions = contour.taken_lengths
     else:
         law = cam_function(model, spring)(contour.angles.reshape(1, -1), model.start(model.parameters))
         extensions = np.array(law[1]).ravel()
+    if isinstance(contour, RollerContour):
+        arms, slopes = ca.SX(contour.lever_arms), ca.SX(contour.slopes)
+        centre = ca.SX(contour.centre_radii)
+        edge = RollerEdge(ca.SX(contour.bearings), centre, arms, slopes, contour.roller_radius)
+        return _rolling(edge, ca.SX(extensions), (), ((), ca.SX(0, 1)))
     # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
     root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
+    rho, phi, p = (ca.SX(c) for c in (contour.radii_of_curvature, contour.directions, contour.lever_arms))
     return Shape(
-        ca.SX(contour.directions), ca.SX(contour.angles), ca.SX(contour.lever_arms), ca.SX(contour.slopes),
-        ca.SX(contour.radii_of_curvature), ca.SX(extensions),
-        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), declared_cam(cam).through_centre,
-        (), ca.SX(0, 1),
+        phi, ca.SX(contour.angles), p, _distance(p, ca.SX(contour.slopes)), rho, ca.SX(extensions),
+        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), both, (), ca.SX(0, 1),
+        CableEdge(phi, p, rho, 2 if both else 1),
     )  # fmt: skip
 
 
@@ -218,13 +419,14 @@ class StartSizes(NamedTuple):
     stretch: float
     pretension: str
     largest_arm: float
+    profile: Array  # wanted torque at the nodes, relative to the largest
 
 
 def start_values(
     start: Start,
     *,
     scalars: Sequence[DesignVariable],
-    contour: ContourVariables | None,
+    contour: FreeContour | None,
     sizes: StartSizes,
 ) -> dict[str, float]:
     """Return the scaled values of the variables at a start by name."""
@@ -236,12 +438,4 @@ def start_values(
         elif variable.name in start.factors:
             now = float(ca.evalf(ca.substitute(variable.value, variable.symbol, variable.start)))
             values[variable.name] = scaled(variable, start.factors[variable.name] * now)
-    if contour is None:
-        return values
-    values |= {v.name: v.start for v in contour.all()}
-    # No start may reach to the anchor.
-    size = min(start.contour_size, sizes.largest_arm / sizes.arm)
-    slope = size * start.slope_share
-    values |= {radius.name: size - 0.5 * slope for radius in contour.radii_of_curvature}
-    values[contour.first_slope.name] = slope
-    return values
+    return values if contour is None else values | contour.at(start, sizes)

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from ...components.assembly.named_parts import Assembly
-from ...foundation.errors import unknown_name
+from ...foundation.errors import ArrangementError, unknown_name
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ...model.structure import CamNames
@@ -50,6 +50,16 @@ class LimitNumber(NamedTuple):
     by_default: bool
 
 
+def under_cable(cam: CamNames) -> CamNames:
+    """Return the names around a cam, or refuse one on which a roller runs."""
+    if cam.roller is not None:
+        raise ArrangementError(
+            f"cam '{cam.name}'", "has a roller, which the live page does not design yet",
+            next_step="design it with design_cam, or with the command design",
+        )  # fmt: skip
+    return cam
+
+
 @dataclass(frozen=True, eq=False)
 class ChosenMachine:
     """An actuator with the chosen rubber; questions about it share what follows from its structure."""
@@ -65,8 +75,8 @@ class ChosenMachine:
 
     @cached_property
     def cam(self) -> CamNames:
-        """Names around its cam."""
-        return series_cam(self.model)
+        """Names around its cam, which has a cable."""
+        return under_cable(series_cam(self.model))
 
     @property
     def cam_part(self) -> object:

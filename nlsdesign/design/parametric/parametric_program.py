@@ -25,7 +25,7 @@ from ..curves.target import TabulatedTorque, Target
 from ..optimisation.limits import Bound, limit_kinds
 from ..optimisation.problem import SymbolicTarget, design_problem
 from ..optimisation.program import PROVED_INFEASIBLE, DesignVariable, VariableScale, scale_of, scaled
-from ..optimisation.shape import start_values, starts
+from ..optimisation.shape import ContourVariables, start_values, starts
 from ..optimisation.solve import GOALS
 from ..statics.equilibrium import elastic_law, has_corners
 from .cam_question import CamQuestion
@@ -117,6 +117,8 @@ class ProgramRows:
             rounding=ROUNDING if knots else 0.0,
             symbols=SymbolicTarget(question.target, self.target.end),
         )
+        # Machines whose cam has a roller are refused by the question.
+        self.contour = cast(ContourVariables | None, self.problem.contour)
         design = self.problem.design
         kept: list[Bound] = []
         watched: list[Bound] = []
@@ -313,7 +315,7 @@ class ProgramOutputs:
     def _columns(self) -> tuple[tuple[str, ...], ca.Function]:
         """Names, and the function of unknowns and numbers of the target that gives their values."""
         problem, target = self._rows.problem, self._rows.target
-        design, contour = problem.design, problem.contour
+        design, contour = problem.design, self._rows.contour
         wanted = [target.torque_law(design.angles[i]) for i in range(design.angles.shape[0])]
         columns = {
             "angle": design.angles, "direction": design.directions, "lever_arm": design.lever_arms,

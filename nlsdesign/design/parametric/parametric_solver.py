@@ -261,14 +261,14 @@ def _unlimited(question: CamQuestion) -> str:
 def values_of_design(program: ParametricProgram, design: CamDesign) -> dict[str, float]:
     """Return the variables of a finished design in SI by name."""
     values = {name: given.number for name, given in design.changes if len(given.values) == 1}
-    problem, contour = program.rows.problem, design.contour
-    if problem.contour is None:
+    shape, contour = program.rows.contour, design.contour
+    if shape is None:
         return values
     for radius, value in zip(
-        problem.contour.radii_of_curvature, contour.radii_of_curvature[::_PER_INTERVAL], strict=True
+        shape.radii_of_curvature, contour.radii_of_curvature[::_PER_INTERVAL], strict=True
     ):
         values[radius.name] = float(value)
-    values[problem.contour.first_slope.name] = float(contour.slopes[0])
-    last = problem.contour.last.name
+    values[shape.first_slope.name] = float(contour.slopes[0])
+    last = shape.last.name
     values[last] = float(contour.directions[-1] if last == "last_direction" else contour.lever_arms[0])
     return values

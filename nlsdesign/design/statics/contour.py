@@ -61,6 +61,16 @@ class Contour:
             [self.lever_arms * sine + self.slopes * cosine, self.lever_arms * cosine - self.slopes * sine]
         )
 
+    @property
+    def centre_line(self) -> Array:
+        """Centre line of what lies on the cam, shape (n, 2): of the cable these points."""
+        return self.points
+
+    @property
+    def drawn_line(self) -> str:
+        """What is drawn of it where no part is made."""
+        return "cable's centre line"
+
     @cached_property
     def radii(self) -> Array:
         """Distance of the points from the centre."""
@@ -152,7 +162,7 @@ class Contour:
             anchor = np.array([10.0 * self.radii.max(), side * touched[1]])
         return np.array([touched * [1.0, side], anchor])
 
-    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Array, Array]:
+    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Array, ...]:
         """Return the two halves of the cam as closed polygons in the resting frame: lower, upper.
 
         Between the ends of its two lips each half is closed by a straight line; so is the channel of the

@@ -9,14 +9,16 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicHermiteSpline, make_interp_spline
+from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from ...components.transmission.cam import Cam, TwoSidedCam
 from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
+from ...components.transmission.roller_cam import RollerCam
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity, significant
 from .contour import Contour, contour_from_lever_arm
+from .roller_contour import RollerContour, roller_contour
 
 Made = TypeVar("Made", bound=Cam)
 
@@ -93,14 +95,7 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
 
     def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, fitted through the law of this kind."""
-        # The control values are fitted to h(θ) through the law of the cam, which changes sides over the
-        # angle w, so that the change costs nothing where h starts at zero. A jump is rounded over w.
-        width = self.part.changeover.number
-        dense, wanted = _dense(angles, lever_arms, count)
-        root = np.hypot(dense, width)
-        basis = spline_basis(dense**2 / (root + width), angles[-1], count) * (dense / root)[:, None]
-        values = _solved(basis, wanted, dense >= (10.0 * width if _jumps(wanted) else 0.0))
-        error = _largest(basis @ values - wanted, dense > 20.0 * width)
+        values, error = _two_sides(self.part.changeover.number, angles, lever_arms, count)
         cam = TwoSidedCam(
             lever_arm=_row(self.part.lever_arm, values),
             last_angle=self.part.last_angle.with_value(float(angles[-1]), _SOURCE),
@@ -110,6 +105,51 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
             cable=self.part.cable,
         )
         return CamFit(cam, error)
+
+
+def _two_sides(width: float, angles: Array, lever_arms: Array, count: int) -> tuple[Array, float]:
+    """Return control values of a cam that changes sides over an angle, and the largest error of its arm."""
+    # They are fitted to h(θ) through the law of the cam, so that the change costs nothing where h starts at
+    # zero. A jump is rounded over the width.
+    dense, wanted = _dense(angles, lever_arms, count)
+    root = np.hypot(dense, width)
+    basis = spline_basis(dense**2 / (root + width), angles[-1], count) * (dense / root)[:, None]
+    values = _solved(basis, wanted, dense >= (10.0 * width if _jumps(wanted) else 0.0))
+    error = _largest(basis @ values - wanted, dense > 20.0 * width)
+    return values, error
+
+
+@dataclass(frozen=True)
+class _Roller(DeclaredCam[RollerCam]):
+    @property
+    def through_centre(self) -> bool:
+        """True: both sides are alike, and the lever arm is zero between them."""
+        return True
+
+    @property
+    def anchor_distance(self) -> float:
+        """Infinite: there is no cable."""
+        return math.inf
+
+    def contour(self, last_angle: float | None, points: int) -> RollerContour:
+        """Return the edge; with its change of sides, which a roller follows too."""
+        part, width = self.part, self.part.changeover.number
+        end, row = part.last_angle.number, np.array(part.lever_arm.values)
+        angles = np.linspace(0.0, _end(end, last_angle), points)
+        root = np.hypot(angles, width)
+        q, slope = angles**2 / (root + width), angles / root
+        spline = BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
+        taken, arm = spline.antiderivative(), spline(q)
+        way = (taken(q) - taken(0.0), arm * slope, spline(q, 1) * slope**2 + arm * width**2 / root**3)
+        return roller_contour(
+            angles, way, base_radius=part.base_radius.number, roller_radius=part.roller_radius.number
+        )
+
+    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
+        """Return a cam with that lever arm, fitted through the law of this kind."""
+        values, error = _two_sides(self.part.changeover.number, angles, lever_arms, count)
+        end = self.part.last_angle.with_value(float(angles[-1]), _SOURCE)
+        return CamFit(replace(self.part, lever_arm=_row(self.part.lever_arm, values), last_angle=end), error)
 
 
 @dataclass(frozen=True)
@@ -249,9 +289,11 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
         return _OneSided(part)
     if isinstance(part, AnchoredCam):
         return _Anchored(part)
+    if isinstance(part, RollerCam):
+        return _Roller(part)
     raise ArrangementError(
         f"a {type(part).__name__}", "has no contour",
-        next_step="give the spring of the deck a cam of type TwoSidedCam, OneSidedCam or AnchoredCam",
+        next_step="give its spring a TwoSidedCam, OneSidedCam, AnchoredCam or RollerCam",
     )  # fmt: skip
 
 
@@ -261,12 +303,28 @@ def one_sided(part: Any, last_angle: float) -> OneSidedCam:
     return OneSidedCam(lever_arm=arms, last_angle=end, elements=part.elements, cable=part.cable)
 
 
+def with_roller(part: Any, arm: float, last_angle: float) -> RollerCam:
+    """Return a cam with a roller to begin with: a bearing of 10 mm, and room for the pressure angle.
+
+    ``arm``: a typical lever arm in m; ``last_angle`` in rad; ``part``: whose elements it has.
+    """
+    roller = Quantity(5e-3, "m", "assumed: a ball bearing 623 of 10 mm outer diameter")
+    arms, base = Quantity((0.0, *[0.5 * arm] * 7), "m"), Quantity(2.0 * arm + roller.number, "m")
+    end = Quantity(last_angle, "rad")
+    return RollerCam(
+        lever_arm=arms, last_angle=end, base_radius=base, roller_radius=roller, elements=part.elements
+    )
+
+
 def with_contour(part: object, contour: Contour | None) -> object:
     """Return a part as what the design sees of it: with its contour where that was designed.
 
     ``contour``: that it was fitted to; ``None`` where that is not known.
     """
-    return DesignedCam(part, contour) if contour is not None and isinstance(part, Cam) else part
+    # A roller follows the ripples of the fitted cam as well, so that is what it is judged by.
+    if contour is None or not isinstance(part, Cam) or isinstance(part, RollerCam):
+        return part
+    return DesignedCam(part, contour)
 
 
 def contour_of_cam(cam: object, *, last_angle: float | None = None, points: int = 241) -> Contour:

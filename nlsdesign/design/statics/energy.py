@@ -20,7 +20,7 @@ from scipy.interpolate import make_interp_spline
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array, Mask
-from ...foundation.errors import InfeasibleError, ValueRangeError
+from ...foundation.errors import ArrangementError, InfeasibleError, ValueRangeError
 from ...foundation.quantity import Quantity
 from ...model import flatten
 from ..curves.numbers import in_si
@@ -114,7 +114,7 @@ def _work(law: ElasticLaw, start: Array, end: Array) -> Array:
 
 def _stretched(law: ElasticLaw, energies: Array, pretension: float) -> Array:
     """Return the extensions beyond the pretension at which one element has taken up the given energies."""
-    grid, stored = _stored(law, float(energies[-1]), pretension)
+    grid, stored = _stored(law, float(np.max(energies)), pretension)
     cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
     low, high = grid[cell], grid[cell + 1]
     rest = energies - stored[cell]
@@ -182,6 +182,11 @@ def unmakeable_parts(
     """
     made, radius = declared_cam(cam), in_si("minimum_radius", minimum_radius, "m", maximum=0.5)
     anchor = made.anchor_distance
+    if made.through_centre and np.isinf(anchor):
+        raise ArrangementError(
+            "cam with a roller", "has no cable that could lift off, so its contour may be hollow",
+            next_step="design it with design_cam, which names an undercut and too steep a contour",
+        )  # fmt: skip
     theta, arm = profile.angles, profile.lever_arms
     result: list[UnmakeablePart] = []
     if made.through_centre and arm[0] > _JUMP * np.max(arm):

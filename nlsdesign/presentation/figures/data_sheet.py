@@ -84,7 +84,10 @@ def _numbers(design: CamDesign) -> list[tuple[str, ...]]:
         ("stiffness at the last angle", f"{three_digits(float(stiffness[-1]))} N·m/rad"),
         ("work stored from 0° to there", prefixed(float(curves.energy), "J")),
         ("with exact numbers, rms", f"{prefixed(design.rms, 'N*m')} ({share:.2g} %)"),
-        ("largest force of a cable", f"{three_digits(float(np.max(curves.forces)))} N"),
+        (
+            f"largest force of {'a cable' if design.cam.roller is None else 'an element'}",
+            f"{three_digits(float(np.max(curves.forces)))} N",
+        ),
         ("volume of all rubber", f"{three_digits(1e6 * design.rubber_volume)} cm³"),
     ]
     if design.tolerance is not None and design.tolerance.causes:
@@ -102,7 +105,10 @@ def _sizes(design: CamDesign) -> list[tuple[str, ...]]:
     """Return largest radius, anchor, and the numbers of the deck that the design has set."""
     contour = design.contour
     rows: list[tuple[str, ...]] = [
-        ("largest radius of the cable's centre", f"{MM * float(contour.radii.max()):.4g} mm")
+        (
+            f"largest radius of the {contour.drawn_line.removesuffix(' line')}",
+            f"{MM * float(contour.radii.max()):.4g} mm",
+        )
     ]
     if np.isfinite(contour.anchor_distance):
         rows.append(("axis to cable anchor", f"{MM * contour.anchor_distance:.4g} mm"))

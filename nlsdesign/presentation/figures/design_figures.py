@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 
 from ...design import CamDesign, Contour, LimitState, MotorCycle, ParetoFront, TaskCurve, ToleranceResult
 from ...design.statics.contour import turn
+from ...design.statics.roller_contour import RollerContour
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, parse_unit, typeset_number, typeset_unit, with_unit
 from ...foundation.written_numbers import shared_prefix
+from .roller_picture import draw_roller, roller_picture
 from .style import (
     AFTER,
     BEFORE,
@@ -40,6 +42,8 @@ from .style import (
 @styled
 def design_picture(design: CamDesign) -> Figure:
     """Draw cam, cable and rubber to scale, at angle zero and at the last angle, with dimensions."""
+    if isinstance(design.contour, RollerContour):
+        return roller_picture(design, design.contour)
     last = float(design.contour.angles[-1])
     reach = float(design.contour.radii.max())
     piece = _piece(design)
@@ -112,6 +116,9 @@ def _words(state: LimitState) -> str:
 def draw_mechanism(axes: Axes, design: CamDesign, angle: float) -> None:
     """Draw cam, cable and rubber at an angle in rad into axes, to scale, in mm."""
     contour = design.contour
+    if isinstance(contour, RollerContour):
+        draw_roller(axes, design, contour, angle)
+        return
     parallel = not np.isfinite(contour.anchor_distance)
     halves = list(contour.outlines())
     if parallel:  # only the lip is designed; the body behind it is closed over the centre

@@ -30,10 +30,14 @@ _AXIS = (0, (10, 2, 1.5, 2))
 """Dashes of an axis."""
 _SCALES = (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05)
 _MOST_ROWS = 16
+_CORNERS = np.array([[-1.0, -1.0], [1.0, 1.0]])
 _NOTE = 96
 """Letters in a line of the notes."""
 _SIZES = (
     ("cable_radius", "Cable radius"),
+    ("roller_radius", "Roller radius"),
+    ("pitch_radius", "Axis to roller at 0°"),
+    ("narrowest_hollow", "Narrowest hollow"),
     ("thickness", "Plate thickness"),
     ("groove_depth", "Depth of the edges"),
     ("base_radius", "Base radius"),
@@ -155,7 +159,8 @@ class _View:
         self.part = part
         self.outlines = [outline.polygon(2e-6) for outline in part.outlines]
         rim = part.base_radius * np.array([[-1.0, -1.0], [1.0, 1.0]])
-        every = np.vstack([*self.outlines, rim] if part.base_radius else self.outlines)
+        around = [each.centre + each.diameter / 2 * rim for each in part.rollers for rim in _CORNERS]
+        every = np.vstack([*self.outlines, *([rim] if part.base_radius else []), *around])
         self.low, self.high = every.min(axis=0), every.max(axis=0)
         left, lower, right, upper = _VIEW
         room = np.array([right - left, upper - lower])
@@ -187,6 +192,9 @@ def _main_view(page: Sheet, view: _View) -> None:
         reach = view.scale * MM * hole.diameter / 2 + 1.2
         for step in (np.array([reach, 0.0]), np.array([0.0, reach])):
             page.line(centre - step, centre + step, color=MUTED.light, width=0.3)
+    for roller in part.rollers:
+        size = view.scale * MM * roller.diameter / 2
+        _circle(page, view.at(roller.centre), size, linewidth=THIN, edgecolor=VERMILLION.light)
     for cable in part.cables:
         page.line(*view.at(_clipped(cable.points, 1.06 * part.outermost)), color=VERMILLION.light, width=THIN)
     low, high = view.at(view.low) - 4.0, view.at(view.high) + 4.0
@@ -331,19 +339,24 @@ def _mouth_detail(page: Sheet, part: CamPart) -> None:
 def _notes(page: Sheet, part: CamPart, title: TitleBlock, torque: float) -> None:
     tolerance = MM * part.number("edge_tolerance")
     lines = [
-        f"1  Edge under the cable: lines and arcs of {title.file}, profile ± {tolerance:.3g} mm over the",
+        f"1  Edge under the {part.counterpart}: lines and arcs of {title.file}, "
+        f"profile ± {tolerance:.3g} mm over the",
         "    contact and the run-out; no burr, break the flanks 0.1 mm.",
-        "2  The drawn edge is that for the cable stated; another cable needs another edge.",
+        f"2  The drawn edge is that for the {part.counterpart} stated; another one needs another edge.",
     ]
     if "mouth_width" in part.numbers:
         lines.append(
             f"3  Mouths of the channel: + {tolerance:.3g} / 0 mm, edges opposite each other within that."
         )
+    elif part.rollers:
+        lines.append("3  No roller runs on the back, between the ends of the edge.")
     else:
         lines.append("3  The lead-in is straight and tangent to the edge at angle zero.")
     lines += [
         f"4  Holes: places as in {title.file}, ± 0.05 mm; else ISO 2768-1 m (both assumed).",
-        "5  Coloured: centre line of the cable at zero and at the last angle.",
+        "5  Coloured: "
+        + ("way of the roller, roller" if part.rollers else "centre line of the cable")
+        + " at zero and at the last angle.",
         *textwrap.wrap(f"6  Process: {process_of(part)}.", _NOTE, subsequent_indent="    "),
     ]
     if "bolt_count" not in part.numbers:
@@ -360,7 +373,7 @@ def _column(
     top, right = _HEIGHT - _BORDER, _WIDTH - _BORDER
     width = right - _COLUMN
     if rows:
-        head = ("angle in °", "torque in N·m", "arm in mm", "cable in N")
+        head = ("angle in °", "torque in N·m", "arm in mm", f"{'spring' if part.rollers else 'cable'} in N")
         cells = [
             (
                 f"{math.degrees(r.angle):.1f}",
@@ -382,7 +395,7 @@ def _column(
         ("Deck", title.deck),
         ("Design", title.fingerprint),
         ("Material", title.material),
-        ("Cable", f"Ø{_length(2 * part.number('cable_radius'))} mm"),
+        (part.counterpart.title(), f"Ø{_length(2 * part.number(f'{part.counterpart}_radius'))} mm"),
         ("Scale, sheet", f"{scale_text(scale)}, A4, mm"),
     ]
     row, low = 5.2, _BORDER

@@ -139,3 +139,20 @@ def test_a_band_between_two_curves() -> None:
 def test_what_is_refused(make: Callable[[], object], error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         make()
+
+
+def test_a_torque_may_fall_below_zero_where_work_was_taken_up_before() -> None:
+    curve = TabulatedTorque(angles=(0.0, 0.5, 1.0, 1.4), torques=(0.0, 2.0, 0.0, -1.5))
+    assert curve.largest == pytest.approx(2.0, rel=1e-3)
+    assert float(curve.torque(1.4)) == pytest.approx(-1.5)
+    deep = TabulatedTorque(angles=(0.0, 0.5, 1.0, 1.2), torques=(0.0, 2.0, 0.0, -3.0))
+    assert deep.largest == pytest.approx(3.0), "the largest magnitude"
+
+
+@pytest.mark.parametrize(
+    ("torques", "row"),
+    [((0.0, -1.0, 2.0, 3.0), 2), ((0.0, 1.0, -1.0, -3.0), 4), ((0.0, -1e-6, -2.0, 1.0), 2)],
+)
+def test_a_torque_that_gives_more_work_than_it_took_is_refused(torques: tuple[float, ...], row: int) -> None:
+    with pytest.raises(ValueRangeError, match=rf"row {row}: gives more work than the spring has taken up"):
+        TabulatedTorque(angles=(0.0, 0.5, 1.0, 1.5), torques=torques)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
-from nlsdesign.components import Assembly, LinearElastic, OneSidedCam
+from nlsdesign.components import Assembly, LinearElastic, OneSidedCam, RollerCam
 from nlsdesign.design import (
     CamDesign,
     DesignSettings,
@@ -86,9 +86,14 @@ def test_another_cam_is_named_where_it_was_tried() -> None:
     missed = design_cam(machine, target=target, free=RUBBER, keep=keep, settings=WHOLE)
     assert missed.miss is not None
     assert missed.miss.remedies is not None
-    (one,) = missed.miss.remedies.others
-    assert any("with a one-sided cam (OneSidedCam)" in each for each in missed.miss.advice)
+    one, rolling = missed.miss.remedies.others
     assert isinstance(one.machine["spring.cam"], OneSidedCam)
+    assert isinstance(rolling.machine["spring.cam"], RollerCam)
+    # The roller is enough, so it alone is advised; the one-sided cam was tried.
+    assert rolling.error < 0.01 * target.largest < one.error
+    assert [each for each in missed.miss.advice if "take a" in each] == [
+        f"{rolling}: {100.0 * rolling.error / target.largest:.2g} % of the largest torque"
+    ]
     hasty = DesignSettings(look_for_size_ranges=False, look_for_remedies=False, draws=0, starts=4)
     then = design_cam(one.machine, target=target, free=RUBBER, keep=keep, settings=hasty)
     assert then.predicted_rms == pytest.approx(one.error, rel=0.01)
