@@ -45,18 +45,20 @@ SUFFIXES = (".svg", ".png", ".pdf")
 _VARIABLES = {tone.light: f"var(--{tone.name})" for tone in TONES}
 
 
-_ON_NOTHING = re.compile(r'(<g id="patch_1">\s*<path d="(M 0 [^L]*)(?:L[^L]*){3})L [^z]*(z\s*" style="fill: )none')
+_ON_NOTHING = re.compile(
+    r'(<g id="patch_1">\s*<path d="M 0 [^L]*(?:L[^L]*){3})L [^z]*(z\s*" style="fill: )none'
+)
 """The background of a figure: an outline without a face goes back to its first corner before it is closed."""
 _drawn: WeakKeyDictionary[Figure, str] = WeakKeyDictionary()
 
 
 def svg_text(figure: Figure) -> str:
     """Return a figure as a file of its own: light colours on white."""
-    return _ON_NOTHING.sub(r"\1\3#ffffff", _svg_on_nothing(figure), count=1)
+    return _ON_NOTHING.sub(r"\1\2#ffffff", _svg_on_nothing(figure), count=1)
 
 
 def _svg_on_nothing(figure: Figure) -> str:
-    """Return what matplotlib draws, with identifiers numbered in their order; once, until the figure changes."""
+    """Return what matplotlib draws, with numbered identifiers; once, until the figure changes."""
     if figure.stale or figure not in _drawn:
         stream = io.StringIO()
         metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}
