@@ -115,10 +115,10 @@ def main(out: Path, fast: bool = False) -> Results:
     tasks = {name: walking_task(name, body_mass=BODY_MASS).scaled(SHARE) for name in ("ankle", "knee", "hip")}
     joints = {name: joint_of(name, task, drive, COARSE if fast else RATIOS) for name, task in tasks.items()}
     ankle = joints["ankle"]
-    power = curve_for_task(
-        tasks["ankle"], drive.geared(ankle.ratio), TaskProblem(goal=LeastPeakPower(), pieces=24)
-    )
-    design = designed_ankle(ankle.curve.target, 200 if fast else 1000)
+    problem = TaskProblem(goal=LeastPeakPower(), pieces=8 if fast else 24)
+    power = curve_for_task(tasks["ankle"], drive.geared(ankle.ratio), problem)
+    usual = DesignSettings(draws=1000, look_for_size_ranges=False)
+    design = designed_ankle(ankle.curve.target, replace(usual, starts=4, draws=100) if fast else usual)
     motor = motor_cycle(tasks["ankle"], drive.geared(ankle.ratio), spring=curve_of(design))
     write(out, joints.values(), power, AnkleSpring(design, motor))
     return Results(
@@ -146,7 +146,7 @@ class AnkleSpring:
     motor: MotorCycle
 
 
-def designed_ankle(target: Target, draws: int) -> CamDesign:
+def designed_ankle(target: Target, settings: DesignSettings) -> CamDesign:
     """Return cam and rubber for the curve of the ankle, on the published actuator's arrangement.
 
     The corners of its rubber's law are rounded: a corner is a jump of the stiffness, which the motor would
@@ -157,7 +157,6 @@ def designed_ankle(target: Target, draws: int) -> CamDesign:
     stiff = actuator.element(law)
     assert isinstance(stiff, StrainStiffening)
     actuator = actuator.with_part(law, replace(stiff, contact=Rounded(width=CORNERS)))
-    settings = DesignSettings(draws=draws, look_for_size_ranges=False)
     return nls.design_cam(actuator, target=target, free=FREE, keep=KEEP, settings=settings)
 
 

@@ -24,7 +24,13 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.components.core.element import MATERIAL, Scope
 from nlsdesign.components.core.part import parameter
 from nlsdesign.components.core.springs import Elastic
-from nlsdesign.design import ExponentialTorque, MaximumCamRadius, MaximumStrain, MinimumRadiusOfCurvature
+from nlsdesign.design import (
+    DesignSettings,
+    ExponentialTorque,
+    MaximumCamRadius,
+    MaximumStrain,
+    MinimumRadiusOfCurvature,
+)
 from nlsdesign.foundation.quantity import Quantity, degrees, quantity
 from nlsdesign.foundation.symbolic import Expression
 
@@ -36,6 +42,9 @@ TARGET = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0)
 """Schepelmann, Geberth and Geyer, ICRA 2014."""
 
 KEEP = [MinimumRadiusOfCurvature(1e-3), MaximumCamRadius(20e-3), MaximumStrain(1.0)]
+
+ALONE = DesignSettings(starts=4, look_for_size_ranges=False, draws=0)
+"""The contour and nothing else: no spring as made, no range of a size; a few starts find the same optimum."""
 
 
 @dataclass(frozen=True, kw_only=True)

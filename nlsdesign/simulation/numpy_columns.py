@@ -40,7 +40,7 @@ _FUNCTIONS: Mapping[int, Callable[..., Any]] = {
 
 
 def _as_number(condition: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda *operands: condition(*operands) * 1.0
+    return lambda *operands: condition(*operands).astype(float)
 
 
 ON_COLUMNS: Mapping[int, Callable[..., Any]] = {

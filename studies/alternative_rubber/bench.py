@@ -231,7 +231,10 @@ class Bench:
             "plant.load.angle": moved * np.sin(turn * time),
             "plant.load.speed": moved * turn * np.cos(turn * time),
         }
-        shares = np.array([flat_relaxation(r.rubber.loss_tangent, branches=BRANCHES).shares for r in runs])
+        # Hundreds of runs share a few rubbers.
+        tangents = {run.rubber.loss_tangent for run in runs}
+        branches = {t: flat_relaxation(t, branches=BRANCHES).shares for t in tangents}
+        shares = np.array([branches[run.rubber.loss_tangent] for run in runs])
         names = [f"plant.spring.rubber.relaxing.shares[{i + 1}]" for i in range(BRANCHES)]
         parameters = dict(zip(names, shares.T, strict=True))
         area = self.actuator.quantities()["spring.rubber.area"].number

@@ -18,7 +18,7 @@ from nlsdesign.components.core.springs import Elastic
 from nlsdesign.design import design_cam
 from nlsdesign.design.statics.energy import energy_profile
 from nlsdesign.foundation.symbolic import Expression
-from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, NeoHooke, actuator
+from tests.cam_cases import ALONE, CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, NeoHooke, actuator
 
 # Average tensile curve of PMC-770, ICRA 2014, Fig. 3: stretch, force in N of an element of 1 cm² and 12.5 mm.
 TENSILE = np.array(
@@ -103,7 +103,7 @@ def test_closed_form_with_the_measured_curve() -> None:
     ids=["contour", "and pretension", "and rubber"],
 )
 def test_joint_design(free: list[str], least: float, most: float) -> None:
-    found = design_cam(actuator(CONCAVE), target=TARGET, free=free, keep=KEEP)
+    found = design_cam(actuator(CONCAVE), target=TARGET, free=free, keep=KEEP, settings=ALONE)
     assert least <= found.rms <= most
     assert found.rms == pytest.approx(found.predicted_rms, rel=5e-3, abs=1e-5)
     assert found.contour.radii_of_curvature.min() >= 1e-3 - 1e-9
@@ -120,7 +120,8 @@ def test_an_earlier_design_with_this_rubber_is_confirmed() -> None:
         "spring.rubber.rest_length": 12.6e-3,
         "spring.pretension": 5.97e-3,
     }
-    found = design_cam(actuator(CONCAVE).with_values(rubber), target=TARGET, free=CONTOUR, keep=KEEP)
+    machine = actuator(CONCAVE).with_values(rubber)
+    found = design_cam(machine, target=TARGET, free=CONTOUR, keep=KEEP, settings=ALONE)
     assert found.rms < 5e-5
     # Radii of curvature are second derivatives: the torque hardly feels a tenth of them.
     assert found.contour.radii_of_curvature.min() == pytest.approx(2.6e-3, rel=0.1)

@@ -8,7 +8,7 @@ import pytest
 from nlsdesign.design import CamDesign, design_cam
 from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.design.statics.energy import energy_profile
-from tests.cam_cases import CONCAVE, CONTOUR, CONVEX, KEEP, PRETENSION, TARGET, actuator
+from tests.cam_cases import ALONE, CONCAVE, CONTOUR, CONVEX, KEEP, PRETENSION, TARGET, actuator
 
 
 def rms_of(nodes: np.ndarray, radii: np.ndarray, first: float, pretension: float) -> float:
@@ -31,7 +31,7 @@ def unknowns(design: CamDesign) -> tuple[np.ndarray, np.ndarray, float]:
 @pytest.mark.long_cases("and pretension")
 @pytest.mark.parametrize("free", [CONTOUR, PRETENSION], ids=["contour", "and pretension"])
 def test_no_cam_nearby_is_better(free: list[str]) -> None:
-    design = design_cam(actuator(CONCAVE), target=TARGET, free=free, keep=KEEP)
+    design = design_cam(actuator(CONCAVE), target=TARGET, free=free, keep=KEEP, settings=ALONE)
     nodes, radii, first = unknowns(design)
     pretension = design.actuator.quantities()["spring.pretension"].number
     best = rms_of(nodes, radii, first, pretension)
@@ -62,7 +62,7 @@ def _strain(nodes: np.ndarray, radii: np.ndarray, first: float, pretension: floa
 def test_where_no_limit_binds_the_optimum_is_the_closed_form() -> None:
     """Energy equality has one cam for given rubber and pretension; the optimiser must find that one."""
     machine = actuator(CONVEX, pretension=8e-3)
-    design = design_cam(machine, target=TARGET, free=CONTOUR, keep=[])
+    design = design_cam(machine, target=TARGET, free=CONTOUR, keep=[], settings=ALONE)
     assert design.rms < 1e-4
     profile = energy_profile(machine, target=TARGET)
     arms = np.interp(profile.angles, design.contour.angles, design.contour.lever_arms)
@@ -73,7 +73,7 @@ def test_where_no_limit_binds_the_optimum_is_the_closed_form() -> None:
 
 def test_every_contour_is_convex_by_construction() -> None:
     """Without any limit, for a rubber that asks for a hollow contour."""
-    design = design_cam(actuator(CONCAVE), target=TARGET, free=CONTOUR, keep=[])
+    design = design_cam(actuator(CONCAVE), target=TARGET, free=CONTOUR, keep=[], settings=ALONE)
     assert design.contour.radii_of_curvature.min() >= -1e-12
     edges = np.diff(design.contour.points, axis=0)
     turning = edges[:-1, 0] * edges[1:, 1] - edges[:-1, 1] * edges[1:, 0]

@@ -8,7 +8,7 @@ import pytest
 from nlsdesign.components import OneSidedCam
 from nlsdesign.design import contour_of_cam, design_cam
 from nlsdesign.design.statics.energy import CamProfile, energy_profile, unmakeable_parts
-from tests.cam_cases import CONCAVE, CONTOUR, CONVEX, KEEP, RUBBER, TARGET, actuator
+from tests.cam_cases import ALONE, CONCAVE, CONTOUR, CONVEX, KEEP, RUBBER, TARGET, actuator
 
 ANGLES = np.linspace(0.0, 1.2, 601)
 
@@ -61,7 +61,7 @@ def test_a_lever_arm_beyond_the_anchor_is_named() -> None:
 
 def test_what_was_designed_can_be_made() -> None:
     """The optimiser keeps ρ ≥ 1 mm; the lever arm alone must show that."""
-    design = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=KEEP)
+    design = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=KEEP, settings=ALONE)
     contour = contour_of_cam(design.actuator["spring.cam"], points=601)
     nothing = np.zeros_like(contour.angles)
     made = CamProfile(contour.angles, nothing, contour.lever_arms, nothing, nothing, 2.0, 0.0)

@@ -30,7 +30,7 @@ KEEP = (
     MinimumRadiusOfCurvature(1e-3), MaximumStrain(1.0), PretensionRange(0.0, 8e-3),
     AreaRange(20e-6, 300e-6), RestLengthRange(8e-3, 40e-3), MaximumTorqueError(0.05),
 )  # fmt: skip
-QUICK = DesignSettings(starts=3, look_for_size_ranges=False)
+QUICK = DesignSettings(starts=3, look_for_size_ranges=False, draws=0)
 
 
 FLOOR = 6e-6

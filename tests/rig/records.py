@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -131,16 +132,22 @@ def make_records(
     ValueError
         If an effect is unknown or its strength negative.
     """
-    built, hidden = truth(actuator, effects, seed)
-    servo, sensors = Servo.for_actuator(actuator), conditions.sensors(actuator.sensors)
-    wanted = commands(_stream(seed, _COMMAND))
+    _, hidden = truth(actuator, effects, seed)
+    sensors, strengths = conditions.sensors(actuator.sensors), tuple(effects.items())
     made = {}
     for number, name in enumerate(RECORDS):
         if name in only:
             draw = _stream(seed, _NOISE, number) if noise else None
-            table = measure(simulate(built, hidden, servo, wanted[name]), sensors, hidden, draw)
+            table = measure(_history(actuator, strengths, seed, name), sensors, hidden, draw)
             made[name] = conditions.disturbed(table, sensors, _stream(seed, _CONDITIONS, number))
     return made
+
+
+@lru_cache(maxsize=24)
+def _history(actuator: Actuator, effects: tuple[tuple[str, float], ...], seed: int, name: str) -> History:
+    """True signals behind one record of a set; tests of one machine ask for the same several times."""
+    wanted = commands(_stream(seed, _COMMAND))[name]
+    return simulate(*truth(actuator, dict(effects), seed), Servo.for_actuator(actuator), wanted)
 
 
 def make_record(

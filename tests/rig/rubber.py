@@ -84,7 +84,9 @@ def pull_of(rubber: Rubber, hidden: Hidden, step: float, warmer: int = 0) -> Pul
 
     def pull(asked: float) -> tuple[float, float]:
         nonlocal x, m1, m2, shift, soft
-        y = max(asked - slack, 0.0) if buckles else asked - slack
+        y = asked - slack
+        if buckles and y < 0.0:
+            y = 0.0
         force = -1.0
         if rigid:  # the usual case: the rubber follows the cam, in line because function calls cost time
             place = (y - shift) * per_grid + origin

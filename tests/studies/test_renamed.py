@@ -246,8 +246,8 @@ def test_diagnose_and_report(benches: tuple[Path, Assembly, Renamed], tmp_path: 
     assert [[effect.name for effect in verdict.effects] for verdict in verdicts] == [["coulomb_friction"]] * 2
     for number, verdict in enumerate(verdicts):
         write_verdict(verdict, tmp_path / f"verdict{number}")
-        report = write_report(tmp_path / f"report{number}.html", *verdict_sections(verdict), title="rig")
-        assert report.stat().st_size > 10_000
+    report = write_report(tmp_path / "report.html", *verdict_sections(verdicts[1]), title="rig")
+    assert report.stat().st_size > 10_000
     one, other = (
         (tmp_path / f"verdict{number}" / "verdict.json").read_text(encoding="utf-8") for number in (0, 1)
     )

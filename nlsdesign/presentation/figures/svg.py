@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import matplotlib as mpl
 import numpy as np
@@ -44,20 +45,33 @@ SUFFIXES = (".svg", ".png", ".pdf")
 _VARIABLES = {tone.light: f"var(--{tone.name})" for tone in TONES}
 
 
+_ON_NOTHING = re.compile(
+    r'(<g id="patch_1">\s*<path d="M 0 [^L]*(?:L[^L]*){3})L [^z]*(z\s*" style="fill: )none'
+)
+"""The background of a figure: an outline without a face goes back to its first corner before it is closed."""
+_drawn: WeakKeyDictionary[Figure, str] = WeakKeyDictionary()
+
+
 def svg_text(figure: Figure) -> str:
     """Return a figure as a file of its own: light colours on white."""
-    with mpl.rc_context({**STYLE, "savefig.facecolor": "white"}), _any_letters():
-        return _saved(figure, {"Date": None, "Creator": None, "Description": alternative_text(figure)})
+    return _ON_NOTHING.sub(r"\1\2#ffffff", _svg_on_nothing(figure), count=1)
 
 
-def _saved(figure: Figure, metadata: dict[str, str | None]) -> str:
-    """Return what matplotlib writes, with identifiers that are numbered in their order."""
-    stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata=metadata)
-    numbers: dict[str, int] = {}
-    return _HASHED.sub(
-        lambda match: f"{match[1] or match[2]}{numbers.setdefault(match[0], len(numbers))}", stream.getvalue()
-    )
+def _svg_on_nothing(figure: Figure) -> str:
+    """Return what matplotlib draws, with numbered identifiers; once, until the figure changes."""
+    if figure.stale or figure not in _drawn:
+        stream = io.StringIO()
+        metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}
+        with mpl.rc_context(STYLE), _any_letters():
+            figure.savefig(stream, format="svg", metadata=metadata)
+        numbers: dict[str, int] = {}
+        _drawn[figure] = _HASHED.sub(
+            lambda match: f"{match[1] or match[2]}{numbers.setdefault(match[0], len(numbers))}",
+            stream.getvalue(),
+        )
+        # Saving changes colours and layout and puts them back, which matplotlib takes for a change.
+        figure.stale = False
+    return _drawn[figure]
 
 
 def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
@@ -75,8 +89,7 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
     alternative
         Alternative text; by default the one attached to the figure.
     """
-    with mpl.rc_context(STYLE), _any_letters():
-        root = ET.fromstring(_saved(figure, {"Date": None}))
+    root = ET.fromstring(_svg_on_nothing(figure))
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):

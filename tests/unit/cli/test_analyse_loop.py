@@ -25,7 +25,9 @@ from nlsdesign.feedback.control.evaluation.whole_evaluation import stretches
 from nlsdesign.feedback.control.laws.known_drive import only_side
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
+from tests.command_line import two_machines
 
+__all__ = ["two_machines"]
 FINGER = str(Path(__file__).parents[3] / "models" / "templates" / "one-sided-finger.toml")
 
 
@@ -48,7 +50,7 @@ def run(out: Path, *options: str) -> tuple[int, dict]:
     return result.exit_code, json.loads(result.stdout)
 
 
-@pytest.mark.usefixtures("five_frequencies")
+@pytest.mark.usefixtures("five_frequencies", "two_machines")
 def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp_path: Path) -> None:
     options = ("--deck", "austin2015_figure_consistent", "--proportional", "70 rad/s/N/m",
                "--amplitude", "2.8 N*m")  # fmt: skip

@@ -10,10 +10,10 @@ from nlsdesign.components import declare, write_deck
 from nlsdesign.foundation.deck import load_deck
 from tests.blocks import BETTER
 from tests.calibrated import LINEAR, recorded
-from tests.command_line import Run, files_in, run
+from tests.command_line import Run, files_in, run, two_machines
 from tests.rig.calibration_bench import Machine
 
-__all__ = ["run"]
+__all__ = ["run", "two_machines"]
 DECK = "austin2015_figure_consistent"
 
 
@@ -74,6 +74,7 @@ def test_a_description_has_the_symbols_of_the_program(run: Run, code: str, tmp_p
     assert (status, "is no ELF file" in err) == (2, True)
 
 
+@pytest.mark.usefixtures("two_machines")
 def test_a_calibration_writes_the_block_of_its_deck(run: Run, tmp_path) -> None:
     usual = ("--deck", LINEAR, "--what", "controller", "--out", "code")
     assert run("export", "c", *usual, "--block")[0] == 0

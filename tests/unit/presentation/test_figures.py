@@ -432,6 +432,24 @@ def test_figures_are_written_as_files_of_their_own(tmp_path: Path) -> None:
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == ["gap.png", "gap.svg", "shares.svg"]
 
 
+def test_a_figure_is_drawn_once_for_its_file_and_for_pages_until_it_changes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    saved: list[object] = []
+    save = figures.Figure.savefig
+    monkeypatch.setattr(figures.Figure, "savefig", lambda *a, **k: (saved.append(a), save(*a, **k)))
+    figure = samples.FIGURES["gap_bars"]()
+    on_page, on_white = figures.inline_svg(figure, "k"), svg_text(figure)
+    assert (figures.inline_svg(figure, "k"), len(saved)) == (on_page, 1)
+    # The background is the first path.
+    fills = [re.findall(r'<path[^>]*style="fill: ([^;"]*)', text)[0] for text in (on_white, on_page)]
+    assert fills == ["#ffffff", "none"]
+    figure.axes[0].set_title("another title")
+    assert "another title" in figures.inline_svg(figure, "k")
+    assert "another title" in svg_text(figure)
+    assert len(saved) == 2
+
+
 def test_an_unknown_format_and_a_folder_that_is_a_file_are_named(tmp_path: Path) -> None:
     pictures = {"gap": drawn("gap_bars")}
     with pytest.raises(ExportError, match=r"did you mean '\.svg'"):
