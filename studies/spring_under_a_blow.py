@@ -84,7 +84,7 @@ def peak_torques(actuator: Assembly, energies: Array) -> Array:
     """Return the largest torque of the spring in N·m behind blows of these energies in J, shape (n,)."""
     model = nls.flatten(actuator, outputs=["spring.torque"])
     time = np.linspace(0.0, DURATION, SAMPLES)
-    speeds = np.sqrt(2.0 * energies / STRIKING.value)
+    speeds = np.sqrt(2.0 * energies / STRIKING.number)
     runs = [nls.simulate(model, time, start={"load.speed": float(speed)}) for speed in speeds]
     return np.array([float(np.abs(run["spring.torque"]).max()) for run in runs])
 
@@ -95,7 +95,7 @@ def energy_within(actuator: Assembly, angle: float) -> float:
     time = np.linspace(0.0, DURATION, SAMPLES)
 
     def largest(energy: float) -> float:
-        speed = float(np.sqrt(2.0 * energy / STRIKING.value))
+        speed = float(np.sqrt(2.0 * energy / STRIKING.number))
         return float(np.abs(nls.simulate(model, time, start={"load.speed": speed})["load.angle"]).max())
 
     low, high = 0.01, 4.0
@@ -130,7 +130,7 @@ def _write(
             case.capitalize(),
             figure,
             caption="The largest torque of the spring, which the teeth of the gear bear.",
-            assumed=f"A body of {STRIKING.value:g} kg·m² strikes at once and stays with the output.",
+            assumed=f"A body of {STRIKING.number:g} kg·m² strikes at once and stays with the output.",
         )
         for case, figure in pictures.items()
     ]

@@ -99,12 +99,13 @@ class Bench:
         self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
         self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
         self._scales = {block.name: block.effort_per_drive for block in blocks}
+        self._as_measured, self._floors_as_measured = self.records, dict(self.floors)
         if noise is None:
-            coloured = with_colour_of_inputs(self.noise, self.records, self._seen(blocks, self.floors))
+            coloured = with_colour_of_inputs(self.noise, self.records, self._seen(blocks))
             if coloured is not self.noise:
                 self.noise = coloured
                 self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
-        self._as_measured, self._floors_as_measured = self.records, dict(self.floors)
+                self._floors_as_measured = dict(self.floors)
         if sampling is None:
             self.records = self.inferred(blocks)
         if self.records is not self._as_measured:
@@ -150,11 +151,11 @@ class Bench:
         ``blocks``: of the declared model, or of a better one with the same names. ``missing``: what they may
         lack, see :mod:`.inferred_sampling`.
         """
-        seen = self._seen(blocks, self._floors_as_measured)
-        return with_inferred_sampling(self._as_measured, seen, missing)
+        return with_inferred_sampling(self._as_measured, self._seen(blocks), missing)
 
-    def _seen(self, blocks: Sequence[Block], floors: Mapping[tuple[str, str], BlockNoise]) -> list[SeenBlock]:
+    def _seen(self, blocks: Sequence[Block]) -> list[SeenBlock]:
         """Return how blocks with the names of the declared ones read the records."""
+        floors = self._floors_as_measured
         return [
             SeenBlock(
                 block.scaled_to(self._scales[block.name]),

@@ -22,7 +22,7 @@ Source: Söderström and Stoica 1989, chapter 11 (tests of whiteness and of inde
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -65,14 +65,12 @@ def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[SeenB
     for signal in dict.fromkeys(d.signal for d in drives if d.signal not in {*moving, *targets}):
         if noise.rounded[signal] or noise.parts.get(signal):
             continue
-        read = _Signal(signal, noise)
-        above = {r.name: read.above_motion(r, counts) for r in records.deciding}
-        shown = {name: bands for name, bands in above.items() if bands}
+        read = _Signal(signal, noise, tuple(records.deciding))
+        shown = read.shown_above_motion(counts)
         for each in seen if shown else ():
-            colours = read.colours(each, records.deciding, shown)
+            colours = read.colours(each, shown)
             if colours:
-                lengths = [r.step * len(r.trace) for r in records.deciding if r.name in colours]
-                noise = noise.with_colours(signal, colours, lengths)
+                noise = noise.with_colours(signal, colours, read.lengths(colours))
                 break
     return noise
 
@@ -87,10 +85,20 @@ class _Rows(NamedTuple):
 
 
 class _Signal(NamedTuple):
-    """A signal whose colour is looked for, with all noise as it is without that."""
+    """A signal whose colour is looked for in records, with all noise as it is without that."""
 
     name: str
     noise: Noise
+    records: tuple[Record, ...]
+
+    def shown_above_motion(self, counts: Mapping[str, float]) -> dict[str, list[Band]]:
+        """Return the bands above all motion of each record in which they show a colour."""
+        above = {record.name: self.above_motion(record, counts) for record in self.records}
+        return {name: bands for name, bands in above.items() if bands}
+
+    def lengths(self, names: Collection[str]) -> list[float]:
+        """Return how long these records are, in s."""
+        return [record.step * len(record.trace) for record in self.records if record.name in names]
 
     def above_motion(self, record: Record, counts: Mapping[str, float]) -> list[Band]:
         """Return the bands of the signal above all motion; none where they look white, or may be real."""
@@ -115,12 +123,10 @@ class _Signal(NamedTuple):
         plain, *others = (fitted_at(time, above, record.step).deviance for time in (0.0, *_times(record)))
         return above if min(others) < plain - _SEEN else []
 
-    def colours(
-        self, seen: SeenBlock, records: Sequence[Record], shown: Mapping[str, list[Band]]
-    ) -> dict[str, Colour]:
+    def colours(self, seen: SeenBlock, shown: Mapping[str, list[Band]]) -> dict[str, Colour]:
         """Return the colour of the signal in each record that shows it; none where one contradicts."""
         block, filters, floors = seen
-        chosen = [record for record in records if record.name in floors]
+        chosen = [record for record in self.records if record.name in floors]
         shares = {record.name: self.share(seen, record) for record in chosen}
         if not shares or float(np.mean(list(shares.values()))) < _OWN:
             return {}
