@@ -15,7 +15,7 @@ from nlsdesign.bench.discrepancy.effects.effect import Candidate
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.identification.equation_error import block_noise
 from nlsdesign.bench.identification.equation_error.evidence import Bench
-from nlsdesign.bench.identification.equation_error.inferred_sampling import no_terms
+from nlsdesign.bench.identification.equation_error.inferred_sampling import no_terms, plain_terms
 from nlsdesign.components import Fixed
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
@@ -99,7 +99,8 @@ def test_a_lag_is_not_what_inputs_are_read_beside() -> None:
     asked = list[str]()
 
     class Case(_Case):
-        def _read_beside(self, hypothesis: Hypothesis) -> _Case | None:
+        def _read_beside(self, hypothesis: Hypothesis, lacks: object) -> _Case | None:
+            assert lacks is plain_terms
             asked.append(hypothesis.newest.effect)
             return self
 
