@@ -39,7 +39,8 @@ class Unknown:
         Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for
         a number that only shapes the effect, such as a time constant or an order.
     beyond
-        Size below which something plainer explains the number, which is then a bound too; empty for none.
+        Size below which something plainer explains the number, which is then a bound too; empty for none. A
+        number of either sign keeps the sign of its start then.
     above
         Name of a number of the edited assembly of which it is at least three times as much: a speed at which
         friction falls lies above the width of its sign. Empty where there is none.

@@ -26,7 +26,7 @@ from ....components.core.domain import Domain
 from ....foundation.quantity import Quantity
 from .effect import Edit, Effect, Form, Places, Unknown, free_name, number
 from .places import domain_of, turning_bodies, turns_per_turn
-from .sizes import LONGEST, QUICKEST, SHIFT
+from .sizes import LONGEST, MIDDLE, QUICKEST, SHIFT
 
 _CELLS = (ForceSensor, TorqueSensor)
 """What reads an effort: load cells and torque transducers have the same faults."""
@@ -108,7 +108,10 @@ def _delay(assembly: Assembly, name: str) -> Iterator[Edit]:
 def _clock(assembly: Assembly, name: str) -> Iterator[Edit]:
     clock = ClockDrift(of=assembly.sensors()[name].of, rate=number(0.0, "1"))
     edited, fault = _with_fault(assembly, name, "clock", clock)
-    unknown = Unknown(f"{fault}.rate", (-0.1, 0.1), -2.0, 2.0, f"{QUICKEST} / {LONGEST}")
+    # Up to half a sample a channel may be late anyway, and a drift of as much on average imitates that.
+    unknown = Unknown(
+        f"{fault}.rate", (-0.1, 0.1), -2.0, 2.0, f"{QUICKEST} / {LONGEST}", beyond=f"{SHIFT} / {MIDDLE}"
+    )
     yield Edit(edited, (unknown,), {"explains_lag": True})
 
 

@@ -9,6 +9,8 @@ QUICKEST = "quickest motion"
 """Time in s in which the quickest measured motion changes by its own size: 1/ω of a sine."""
 LONGEST = "longest record"
 """Duration in s."""
+MIDDLE = "middle of the longest record"
+"""Time in s from its beginning: what grows with time is there as large as it is on average."""
 SHIFT = "shift of channels"
 """Time in s by which two channels may be shifted against each other: half a sample of each."""
 

@@ -30,7 +30,7 @@ from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ..block_prediction import shown_values
 from ..effects.places import efforts_of_ties
-from ..effects.sizes import LONGEST, QUICKEST, SHIFT, Sizes, efforts_on, span_of
+from ..effects.sizes import LONGEST, MIDDLE, QUICKEST, SHIFT, Sizes, efforts_on, span_of
 from ..selection.comparison import Comparison, Judged
 from ..selection.hypothesis import Hypothesis
 from ..tearing import blocks_of
@@ -131,6 +131,7 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
     """
     model = flatten(actuator)
     sizes = {LONGEST: max(float(r.trace.time[-1] - r.trace.time[0]) for r in records.records)}
+    sizes[MIDDLE] = 0.5 * sizes[LONGEST]
     sizes[SHIFT] = records.shift
     quickest: dict[str, float] = {}
     ends: dict[str, list[float]] = {}

@@ -152,16 +152,21 @@ class HypothesisFit:
             return declared_parameter(variable, start)
         scale = self._scale(unknown)
         low, high = unknown.lower * scale, unknown.upper * scale
-        low = max(low, self._sizes.get(unknown.beyond, 0.0)) if unknown.beyond else low
+        begin = variable.start if start is None else start
+        least = self._sizes.get(unknown.beyond, 0.0) if unknown.beyond else 0.0
+        if unknown.beyond and begin < 0.0:  # a number of either sign keeps that of its start
+            high = min(high, -least)
+        elif unknown.beyond:
+            low = max(low, least)
         if unknown.above:
             low = max(low, _ABOVE * variables[unknown.above].start)
-        begin = variable.start if start is None else start
+        begin = min(max(begin, low), high)
         log = unknown.lower > 0.0
         return Parameter(
             variable.name,
             variable.unit,
-            max(begin, low),
-            max(begin, low),
+            begin,
+            begin,
             float("inf"),
             max(low, variable.minimum),
             min(high, variable.maximum),

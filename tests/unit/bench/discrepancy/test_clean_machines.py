@@ -113,3 +113,10 @@ def test_a_lag_is_not_what_inputs_are_read_beside() -> None:
     assert (case.is_read_otherwise_beside(friction), case.is_read_otherwise_beside(lag)) == (True, False)
     assert not replace(case, settled=True).is_read_otherwise_beside(friction), "once is enough"
     assert asked == ["friction"]
+
+
+def test_a_drift_that_imitates_half_a_sample_is_no_name(tmp_path: Path) -> None:
+    """Behind coarse counts the hold of a current is not told; 0.26 ms in a second imitate half a sample."""
+    write_kind_case(tmp_path, "rack_carriage", ("spring_damping",), 1.0, 1198, condition="coarse")
+    verdict = diagnose(*opened(tmp_path), catalogue=(effects.spring_damping, effects.clock_drift))
+    assert [each.name for each in verdict.effects] == ["spring_damping"]
