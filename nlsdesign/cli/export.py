@@ -45,7 +45,11 @@ def export() -> None:
 def _writes(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for."""
     name = "torque_loop" if given["what"] == BOTH else given["what"]
-    further = (".hpp", "_example_posix.c", "_example_cortex_m.c", ".mk") if given["examples"] else ()
+    further = (
+        (".hpp", "_supervisor.h", "_example_posix.c", "_example_cortex_m.c", ".mk")
+        if given["examples"]
+        else ()
+    )
     build = ["CMakeLists.txt"] if further else []
     blocks = [f"{name}_block.json"] if given["with_block"] else []
     packed = [f"{name}_library/library.json"] if given["package"] else []

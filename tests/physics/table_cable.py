@@ -13,6 +13,7 @@ from nlsdesign.components import (
     Gear,
     LossyGear,
     OneSidedCam,
+    RollerCam,
     SampleAndHold,
     Tachometer,
     TorqueSensor,
@@ -109,6 +110,11 @@ ROWS: tuple[Row, ...] = (
         AnchoredCam, "ψ = −(θ + asin(h/D))", ("flat model", "contour drawn by the design room"),
         "test_cam_shapes.py::"
         "test_the_contour_that_the_design_draws_for_an_anchor_gives_back_its_lever_arm",
+    ),
+    Row(
+        RollerCam, "N·F·dx/dθ = moment of the force at the contact",
+        ("law", "balance of the follower and the cam at their point of contact"),
+        "test_roller_cam.py::test_the_torque_balances_the_follower_at_its_point_of_contact",
     ),
     Row(
         CapstanFriction, "loop area k·E²·sinh(µφ)", ("simulation", "closed form"),

@@ -49,6 +49,8 @@ _ON_NOTHING = re.compile(
     r'(<g id="patch_1">\s*<path d="M 0 [^L]*(?:L[^L]*){3})L [^z]*(z\s*" style="fill: )none'
 )
 """The background of a figure: an outline without a face goes back to its first corner before it is closed."""
+_NO_XML = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+"""Control characters, as a name of somebody's may hold: no file of XML may."""
 _drawn: WeakKeyDictionary[Figure, str] = WeakKeyDictionary()
 
 
@@ -61,7 +63,7 @@ def _svg_on_nothing(figure: Figure) -> str:
     """Return what matplotlib draws, with numbered identifiers; once, until the figure changes."""
     if figure.stale or figure not in _drawn:
         stream = io.StringIO()
-        metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}
+        metadata = {"Date": None, "Creator": None, "Description": _NO_XML.sub(" ", alternative_text(figure))}
         with mpl.rc_context(STYLE), _any_letters():
             figure.savefig(stream, format="svg", metadata=metadata)
         numbers: dict[str, int] = {}

@@ -130,11 +130,17 @@ def test_the_list_says_once_why_some_decks_are_not_opened(tab: Tab) -> None:
         "[...document.querySelectorAll('#gallery option')].map((each) => each.textContent)"
     )
     assert names == set(options[1:])
-    closed = {card.name for card in gallery_cards() if card.reason}
-    assert len(closed) >= 8
+    closed = {
+        reason: {card.name for card in gallery_cards() if card.reason == reason}
+        for reason in (
+            "no cam spring, whose curve is designed here",
+            "has a roller, which the live page does not design yet",
+        )
+    }
+    assert sum(map(len, closed.values())) == sum(bool(card.reason) for card in gallery_cards()) >= 8
     groups = tab.evaluate(
         "[...document.querySelectorAll('#gallery optgroup')].map((each) => "
         "[each.label, [...each.children].filter((one) => one.disabled).map((one) => one.value)])"
     )
-    (reason,) = [(label, set(disabled)) for label, disabled in groups if disabled]
-    assert reason == ("cannot be opened: no cam spring, whose curve is designed here", closed)
+    said = [(label, set(disabled)) for label, disabled in groups if disabled]
+    assert sorted(said) == sorted((f"cannot be opened: {reason}", names) for reason, names in closed.items())

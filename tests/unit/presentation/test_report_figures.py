@@ -96,7 +96,14 @@ def test_the_four_meanings_have_four_colours_in_both_themes() -> None:
 
 def test_colours_are_taken_by_their_meaning() -> None:
     by_hue = {"BLUE", "VERMILLION", "GREEN", "ORANGE"}
-    mechanism = {"style", "cam_frames", "cam_motion", "design_figures", "workshop_drawing"}
+    mechanism = {
+        "style",
+        "cam_frames",
+        "cam_motion",
+        "design_figures",
+        "roller_picture",
+        "workshop_drawing",
+    }
     for path in (ROOT / "nlsdesign" / "presentation" / "figures").glob("*.py"):
         names = {
             each.id
