@@ -149,7 +149,7 @@ def _connected(path: Path) -> socket.socket:
         link.settimeout(_SECONDS)
         try:
             link.connect(str(path))
-        except OSError:
+        except OSError:  # the emulator makes its socket a moment after it has started
             link.close()
             if time.monotonic() > end:
                 raise

@@ -23,6 +23,7 @@ from fmpy.fmi2 import FMU2Slave
 
 import nlsdesign as nls
 from benchmarks._emulated_board import Cells, EmulatedBoard
+from benchmarks.targets import replaced
 from nlsdesign.export import CORTEX_M4F, CORTEX_M7, CSource, Processor, export_c, export_fmu, write_examples
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import run_compiler
@@ -368,13 +369,9 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0, help="of the comparison")
     parser.add_argument("--faulty", type=int, default=100_000, help="samples with faults")
     given = parser.parse_args()
-    *found, holds = tables(given.seconds, given.faulty)
+    same, faults, holds = tables(given.seconds, given.faulty)
     if not given.check:
-        page = PAGE.read_text(encoding="utf8")
-        for mark, lines in zip(("same", "faults"), found, strict=True):
-            begin, end = f"<!-- begin: {mark} -->", f"<!-- end: {mark} -->"
-            before, after = page.partition(begin)[0], page.partition(end)[2]
-            page = "\n".join([before + begin, *lines, end + after])
+        page = replaced(PAGE.read_text(encoding="utf8"), {"same": same, "faults": faults})
         PAGE.write_text(page, encoding="utf8")
     return int(not holds)
 

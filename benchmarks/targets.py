@@ -176,7 +176,7 @@ def replaced(page: str, tables: dict[str, list[str]]) -> str:
         before, _, rest = page.partition(begin)
         _, found, after = rest.partition(end)
         if not found:
-            raise SystemExit(f"{PAGE}: the marks of '{name}' are missing")
+            raise SystemExit(f"the marks of '{name}' are missing in the page")
         page = f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{after}"
     return page
 

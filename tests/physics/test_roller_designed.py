@@ -84,6 +84,7 @@ def test_the_published_hills_are_met_exactly(hills: CamDesign) -> None:
     assert np.sqrt(np.mean(errors**2)) < 0.005 * 0.07
     assert hills.met
     assert hills.rms < 0.005 * HILLS.largest
+    assert "TabulatedTorque, up to 89.8 deg, at most 0.07 N·m" in str(hills), "the hill is at 30 deg"
     # By energy: what 2 coils take up is the area below the curve.
     stretched = hills.curves.extensions
     stored = 1186.0 * (stretched[-1] ** 2 - stretched[0] ** 2)

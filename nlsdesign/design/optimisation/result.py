@@ -346,7 +346,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
             f"{prefixed(largest)} at most",
         ),
     ]
-    rows += [("target", f"{type(target).__name__}, {target.largest:.4g} N·m at {end}")]
+    rows += [("target", f"{type(target).__name__}, up to {end}, at most {target.largest:.4g} N·m")]
     rows += [
         (name, str(value) if len(value.values) <= 4 else f"<{len(value.values)} control values>")
         for name, value in design.changes
