@@ -30,6 +30,7 @@ from .duty_and_directions import (
     effects_of,
     operating_points,
     push,
+    root_of,
     spring_inertia,
 )
 
@@ -135,7 +136,7 @@ def changes_of(
     Shapes (5, ξ) and (2, ξ).
     """
     known = prior.only([name for name in prior.names if name in form.model.values])
-    root = known.root if np.any(known.deviations) else np.zeros((len(known.names), 0))
+    root = root_of(known.covariance) if np.any(known.deviations) else np.zeros((len(known.names), 0))
     factors, parts, missed = np.zeros((OFFSET, root.shape[1])), np.zeros((2, root.shape[1])), 0.0
     before = 0.0
     for k in range(root.shape[1]):

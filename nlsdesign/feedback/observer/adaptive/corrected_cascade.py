@@ -196,12 +196,26 @@ def design_corrected_observer(
     ConvergenceError
         If the table does not keep its error bound.
     """
-    settings = settings or AdaptiveSettings()
-    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
-    rounding = encoder_quantum(model, measured) / math.sqrt(12.0)
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
+    return corrected(
+        model, cascade, settings=settings or AdaptiveSettings(), grid=grid, estimate=estimate, measured=measured
+    )
+
+
+def corrected(
+    model: FlatModel,
+    cascade: ObserverDesign,
+    *,
+    settings: AdaptiveSettings,
+    grid: Grid | None,
+    estimate: str | None,
+    measured: str | None,
+) -> CorrectedDesign:
+    """Return a cascade that was designed for a model, corrected by the factors of its balance."""
+    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
+    rounding = encoder_quantum(model, measured) / math.sqrt(12.0)
     over = grid or whole_contour(model)
     form, _ = minimal_form(
         model, estimate=estimate, angle=measured, angles=np.linspace(over.lower, over.upper, 65)

@@ -249,7 +249,7 @@ def uncertain_directions(
     known = prior.only([name for name in prior.names if name in form.model.values])
     count = 0
     if np.any(known.deviations):
-        root = _root_of(known.covariance)
+        root = root_of(known.covariance)
         features, own = _features(form, operating_points(form, duty), known, root)
         left, singular, right = np.linalg.svd(features, full_matrices=False)
         count = min(int(np.sum(singular > resolution)), most)
@@ -273,7 +273,8 @@ def uncertain_directions(
     )
 
 
-def _root_of(covariance: Array) -> Array:
+def root_of(covariance: Array) -> Array:
+    """Return R with R·Rᵀ = covariance and a column for each direction that is uncertain, shape (numbers, ξ)."""
     if np.array_equal(covariance, np.diag(np.diag(covariance))):
         # Independent numbers keep their own directions.
         return np.diag(np.sqrt(np.diag(covariance)))

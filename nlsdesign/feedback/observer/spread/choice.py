@@ -23,7 +23,7 @@ from ....simulation.sampled_batch import PLANT, run_batch
 from ...analysis.kalman import NoiseAssumptions, declared_deviation
 from ...analysis.rest_points import rest_points
 from ..adaptive.adaptive_observer import SPREAD, AdaptiveDesign, design_adaptive_observer, encoder_quantum
-from ..adaptive.corrected_cascade import PREFIX, CorrectedDesign, design_corrected_observer
+from ..adaptive.corrected_cascade import PREFIX, CorrectedDesign, corrected, design_corrected_observer
 from ..adaptive.duty_and_directions import AdaptiveSettings
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from ..certificates.certificate import Certificate
@@ -110,18 +110,18 @@ def choose_observer(
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     unit = typeset_unit(model.variable(estimate).unit)
     try:
-        corrected = design_corrected_observer(
-            model, estimate=estimate, measured=measured, sample_time=sample_time, settings=settings, grid=grid
+        learning = corrected(
+            model, cascade, settings=settings, grid=grid, estimate=estimate, measured=measured
         )
-        learned = expected_error(model, corrected, settings)
+        learned = expected_error(model, learning, settings)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
         return ObserverOfChoice(cascade, f"cascade, for it cannot be corrected: {error}", ())
-    alone = corrected.balance.before
+    alone = learning.balance.before
     sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
     both = f"expected over the spread {sizes} of the cascade"
     if learned < alone:
-        return ObserverOfChoice(corrected, f"corrected: {both}", (alone, learned))
+        return ObserverOfChoice(learning, f"corrected: {both}", (alone, learned))
     return ObserverOfChoice(cascade, f"cascade: the corrected one has {both}", (alone, learned))
 
 
