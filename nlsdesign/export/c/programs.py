@@ -97,6 +97,13 @@ def selftest_source(c: CWriter) -> str:
     return c.filled("controller_selftest.c", values)
 
 
+_OF_THE_CLASS = (
+    *("step", "restart", "set_parameters", "status", "outputs", "sample_time"),
+    *("inputs_type", "outputs_type", "parameters_type", "state_", "outputs_", "clock_", "status_"),
+)
+"""Members of the C++ class around a step."""
+
+
 def write_examples(source: CSource) -> list[Path]:
     """Write a C++ class, two main programs and build files beside the files of a step.
 
@@ -123,6 +130,8 @@ def write_examples(source: CSource) -> list[Path]:
     values = {
         "name": name,
         "NAME": name.upper(),
+        # No member of a C++ class may have the name of the class.
+        "class": f"{name}_object" if name in _OF_THE_CLASS else name,
         "real": source.real,
         "title": f"/* {comment(source.model.description)} */",
         "read": [

@@ -6,7 +6,7 @@
 
 #include "@name@.h"
 
-class @name@ {
+class @class@ {
 public:
     using inputs_type = @name@_inputs;
     using outputs_type = @name@_outputs;
@@ -14,8 +14,8 @@ public:
 
     static constexpr @real@ sample_time = @NAME@_SAMPLE_TIME;
 
-    @name@() noexcept { status_ = @name@_init(&state_, nullptr); }
-    explicit @name@(const parameters_type &parameters) noexcept { status_ = @name@_init(&state_, &parameters); }
+    @class@() noexcept { status_ = @name@_init(&state_, nullptr); }
+    explicit @class@(const parameters_type &parameters) noexcept { status_ = @name@_init(&state_, &parameters); }
 
     // Begins anew with the next usable readings.
     void restart() noexcept

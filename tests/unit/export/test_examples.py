@@ -88,6 +88,18 @@ def test_the_class_knows_late_and_repeated_samples(source: CSource, tmp_path) ->
     assert subprocess.run([tmp_path / "main"], timeout=60).returncode == 0
 
 
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
+@pytest.mark.parametrize("name", ["step", "status", "outputs_"])
+def test_a_class_has_another_name_than_its_members(tmp_path, name: str) -> None:
+    made = export_c(observer(), tmp_path, name=name)
+    write_examples(made)
+    (tmp_path / "main.cpp").write_text(
+        f'#include "{name}.hpp"\nint main() {{ return {name}_object{{}}.status() == 0; }}\n'
+    )
+    build = ["g++", "-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{tmp_path}"]
+    subprocess.run([*build, tmp_path / "main.cpp"], check=True, timeout=120)
+
+
 def test_ten_faulty_samples_more_than_good_ones_cut_and_six_derate(supervisor) -> None:
     lost = INPUT_HELD | index_bit(0)
     assert [supervisor.share(lost) for _ in range(5)] == [1.0] * 5
