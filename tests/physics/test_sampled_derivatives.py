@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,10 @@ from tests.fmu_unit import Refused, Unit, opened
 from tests.hand_built import observer
 
 
+NAMES = ("table by hand", "observer", "controller", "both")
+
+
+@cache
 def models() -> dict[str, FlatModel]:
     plant = flatten(declare(load_deck("austin2015_as_printed")))
     watching, steering = design_observer(plant, gain=CascadeGain()), torque_controller(plant)
@@ -29,7 +34,6 @@ def models() -> dict[str, FlatModel]:
     }
 
 
-MODELS = models()
 
 
 def moved(model: FlatModel, unit: Unit, count: int) -> dict[str, float]:
@@ -63,12 +67,12 @@ QUICK = {("both", "3.0"), ("table by hand", "2.0")}
     ("name", "version"),
     [
         pytest.param(name, version, marks=() if (name, version) in QUICK else pytest.mark.slow)
-        for name in MODELS
+        for name in NAMES
         for version in ("2.0", "3.0")
     ],
 )
 def test_derivatives_of_the_last_sample_are_those_of_the_equations(name, version, tmp_path):
-    model = MODELS[name]
+    model = models()[name]
     knowns = [v.name for v in (*model.states, *model.inputs, *model.parameters)]
     taken = {v.name for v in (*model.states, *model.inputs)}
     unknowns = [n for n in dict.fromkeys(v.name for v in (*model.outputs, *model.signals)) if n not in taken]
@@ -96,7 +100,7 @@ def test_derivatives_of_the_last_sample_are_those_of_the_equations(name, version
 
 
 def test_the_slope_over_an_input_is_that_which_the_fmu_itself_shows(tmp_path):
-    model = MODELS["table by hand"]
+    model = models()["table by hand"]
     with opened(export_fmu(model, tmp_path / "x.fmu")) as unit:
         unit.begin().run()
         inputs = moved(model, unit, 40)
@@ -115,7 +119,7 @@ def test_the_slope_over_an_input_is_that_which_the_fmu_itself_shows(tmp_path):
 
 
 def test_there_is_no_derivative_of_a_sample_that_was_not_taken_as_it_was(tmp_path):
-    model = MODELS["table by hand"]
+    model = models()["table by hand"]
     asked = (["spring.torque"], ["motor.angle"], [1.0])
     with opened(export_fmu(model, tmp_path / "x.fmu")) as unit:
         unit.begin().run()

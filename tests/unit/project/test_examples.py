@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import doctest
 import importlib
-import pkgutil
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -14,11 +14,13 @@ import nlsdesign
 
 
 def modules() -> Iterator[str]:
+    """Modules whose text has an example."""
     for package in (nlsdesign, models):
-        yield package.__name__
-        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            if not found.name.endswith("__main__"):
-                yield found.name
+        root = Path(package.__path__[0])
+        for path in sorted(root.rglob("*.py")):
+            if path.name != "__main__.py" and ">>>" in path.read_text(encoding="utf-8"):
+                parts = path.relative_to(root.parent).with_suffix("").parts
+                yield ".".join(parts[:-1] if path.name == "__init__.py" else parts)
 
 
 def examples() -> Iterator[doctest.DocTest]:
