@@ -18,7 +18,6 @@ from nlsdesign.model.flat import FlatModel
 from tests.fmu_unit import Refused, Unit, opened
 from tests.hand_built import observer
 
-
 NAMES = ("table by hand", "observer", "controller", "both")
 
 
@@ -32,8 +31,6 @@ def models() -> dict[str, FlatModel]:
         "controller": steering,
         "both": joined(watching, steering),
     }
-
-
 
 
 def moved(model: FlatModel, unit: Unit, count: int) -> dict[str, float]:
