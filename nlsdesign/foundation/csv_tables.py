@@ -164,7 +164,13 @@ class _Layout:
             heads, at = cells, at + 1
         open_ended = len(heads) > 1 and not heads[-1]
         heads = heads[:-1] if open_ended else heads
-        _check_heads(file.name, heads)
+        for place, head in enumerate(heads):
+            if head in heads[:place]:
+                raise MeasurementError(
+                    f"{file.name}: columns {heads.index(head) + 1} and {place + 1}",
+                    f"have the same head '{head}'" if head else "have no head",
+                    next_step="give each column a head of its own",
+                )
         units: dict[str, str] = {}
         if at < len(lines):
             below = _cells(file.name, lines[at], separator)
@@ -213,16 +219,6 @@ def _is_unit(cell: str) -> bool:
     except UnitError:
         return False
     return not _is_number(cell)
-
-
-def _check_heads(file: str, heads: Sequence[str]) -> None:
-    for place, head in enumerate(heads):
-        if head in heads[:place]:
-            raise MeasurementError(
-                f"{file}: columns {heads.index(head) + 1} and {place + 1}",
-                f"have the same head '{head}'" if head else "have no head",
-                next_step="give each column a head of its own",
-            )
 
 
 def _uneven(layout: _Layout, row: int, cells: int) -> MeasurementError:
