@@ -12,8 +12,6 @@ from ...foundation.quantity import three_digits, typeset_unit, with_unit
 from ...sweeps import SweepColumn, SweepTable
 from ...sweeps.answer_statistics import AnswerSurface, BoundedQuantile, answer_quantiles, answer_surface
 from ...sweeps.preferences import NearIsBetter, RankedPoints
-from ...sweeps.sensitivity import AnswerSensitivity
-from ..figures import Figure
 from ..figures.sweep_figures import (
     MOST_COORDINATES,
     MOST_PANELS,
@@ -337,10 +335,34 @@ def sensitivity_sections(content: PageContent) -> list[Section]:
     sections: list[Section] = []
     if shown:
         remarks = dict.fromkeys(remark for each in shown.values() for remark in each.remarks)
+        errors = [
+            error for each in shown.values() for i in each.indices for error in (i.first_error, i.total_error)
+        ]
+        have_intervals = any(np.isfinite(error) and error > 0.0 for error in errors)
+        shares = {
+            name: [
+                VarianceShare(i.axis, i.first, i.first_error, i.total, i.total_error) for i in each.indices
+            ]
+            for name, each in shown.items()
+        }
+        leading = "; ".join(f"{name}: {each.indices[0].axis}" for name, each in shown.items())
+        shares_figure = sensitivity_bars(
+            {name: rows[:_MOST_SHARES] for name, rows in shares.items()},
+            words=f"Shares of the variance of the answers by axis. Largest, {leading}.",
+        )
+        groups: dict[tuple[str, int], list[str]] = {}
+        for name, each in shown.items():
+            groups.setdefault((each.method, each.points), []).append(name)
+        sentences = [
+            f"{listed_names(names)}: {method}, from {points} points."
+            for (method, points), names in groups.items()
+        ]
+        if any(len(each.indices) > _MOST_SHARES for each in shown.values()):
+            sentences.append(f"The {_MOST_SHARES} largest of each are drawn.")
         sections.append(
             FigureSection(
-                "What causes the differences", _shares_figure(shown), caption=_methods(shown),
-                means=_SHARES + (_STROKES if _have_intervals(shown) else ""),
+                "What causes the differences", shares_figure, caption=" ".join(sentences),
+                means=_SHARES + (_STROKES if have_intervals else ""),
                 assumed=" ".join(["Axes are independent.", *(f"{r[0].upper()}{r[1:]}." for r in remarks)]),
             )
         )  # fmt: skip
@@ -348,38 +370,6 @@ def sensitivity_sections(content: PageContent) -> list[Section]:
         caption = "Answers for which no share of the variance is given, and why."
         sections.append(TableSection("No sensitivity", ("answer", "reason"), refused, caption=caption))
     return sections
-
-
-def _have_intervals(shown: dict[str, AnswerSensitivity]) -> bool:
-    errors = [
-        error for each in shown.values() for i in each.indices for error in (i.first_error, i.total_error)
-    ]
-    return any(np.isfinite(error) and error > 0.0 for error in errors)
-
-
-def _methods(shown: dict[str, AnswerSensitivity]) -> str:
-    groups: dict[tuple[str, int], list[str]] = {}
-    for name, each in shown.items():
-        groups.setdefault((each.method, each.points), []).append(name)
-    sentences = [
-        f"{listed_names(names)}: {method}, from {points} points."
-        for (method, points), names in groups.items()
-    ]
-    if any(len(each.indices) > _MOST_SHARES for each in shown.values()):
-        sentences.append(f"The {_MOST_SHARES} largest of each are drawn.")
-    return " ".join(sentences)
-
-
-def _shares_figure(shown: dict[str, AnswerSensitivity]) -> Figure:
-    shares = {
-        name: [VarianceShare(i.axis, i.first, i.first_error, i.total, i.total_error) for i in each.indices]
-        for name, each in shown.items()
-    }
-    leading = "; ".join(f"{name}: {each.indices[0].axis}" for name, each in shown.items())
-    return sensitivity_bars(
-        {name: rows[:_MOST_SHARES] for name, rows in shares.items()},
-        words=f"Shares of the variance of the answers by axis. Largest, {leading}.",
-    )
 
 
 MOST_SURFACES = 4
