@@ -82,7 +82,19 @@ def closed_form(
         raise ValueRangeError(f"points = {points}", "a profile needs at least three angles")
     angles = np.linspace(0.0, target.last_angle, points)
     torques = target.torque(angles)
-    extensions = _stretched(law, target.energy(angles) / elements, pretension)
+    energies = target.energy(angles) / elements
+    grid, stored = _stored(law, float(np.max(energies)), pretension)
+    cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
+    low, high = grid[cell], grid[cell + 1]
+    rest = energies - stored[cell]
+    extensions = low + (high - low) * rest / (stored[cell + 1] - stored[cell])
+    for _ in range(40):
+        missing = rest - _work(law, pretension + low, pretension + extensions)
+        force = law.force(pretension + extensions)
+        step = np.divide(missing, force, out=np.zeros_like(missing), where=force > 0.0)
+        extensions = np.clip(extensions + step, low, high)
+        if np.all(np.abs(step) <= 1e-15 * grid[-1]):
+            break
     forces = law.force(pretension + extensions)
     lever_arms = np.empty(points)
     lever_arms[0] = _first_lever_arm(law, target, elements, pretension)
@@ -110,23 +122,6 @@ def _work(law: ElasticLaw, start: Array, end: Array) -> Array:
     places = start[..., None] + half * (1.0 + _GAUSS)
     result: Array = (law.force(places) * _WEIGHTS * half).sum(axis=-1)
     return result
-
-
-def _stretched(law: ElasticLaw, energies: Array, pretension: float) -> Array:
-    """Return the extensions beyond the pretension at which one element has taken up the given energies."""
-    grid, stored = _stored(law, float(np.max(energies)), pretension)
-    cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
-    low, high = grid[cell], grid[cell + 1]
-    rest = energies - stored[cell]
-    extensions = low + (high - low) * rest / (stored[cell + 1] - stored[cell])
-    for _ in range(40):
-        missing = rest - _work(law, pretension + low, pretension + extensions)
-        force = law.force(pretension + extensions)
-        step = np.divide(missing, force, out=np.zeros_like(missing), where=force > 0.0)
-        extensions = np.clip(extensions + step, low, high)
-        if np.all(np.abs(step) <= 1e-15 * grid[-1]):
-            break
-    return extensions
 
 
 def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Array, Array]:
