@@ -14,7 +14,6 @@ from typing import ClassVar, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
@@ -426,7 +425,11 @@ def stiffness_table(drive: KnownDrive) -> Table:
     offset -= turns * float(plant.variable(body.motion).start)
     # The mean slope of each cell around a grid point, so that the sum over the table is the torque.
     edges = np.concatenate([angles[:1], (angles[1:] + angles[:-1]) / 2.0, angles[-1:]])
-    torques = _rest_torques(plant, spring.effort, (edges - offset) / turns)
+    symbols = plant.symbols()
+    (at_rest,) = evaluate_at(
+        plant, symbols, [named(plant, symbols)[spring.effort]], rest_states(plant, (edges - offset) / turns)
+    )
+    torques = at_rest.ravel()
     slopes = np.maximum(np.diff(torques) / np.diff(edges), 0.0)
     column = Variable(f"{spring.name}.tangent_stiffness", "N*m/rad", f"slope of {spring.effort} at rest")
     if not drive.spring_seen_at_the_motor:
@@ -435,13 +438,6 @@ def stiffness_table(drive: KnownDrive) -> Table:
     order = np.argsort(seen)
     step = float(abs(seen[1] - seen[0]))
     return Table(body.motion, float(np.min(seen)), step, (column,), slopes[order][:, None])
-
-
-def _rest_torques(plant: FlatModel, torque: str, angles: Array) -> Array:
-    """Return a torque at rest at many angles of the motor."""
-    s = plant.symbols()
-    (torques,) = evaluate_at(plant, s, [named(plant, s)[torque]], rest_states(plant, angles))
-    return torques.ravel()
 
 
 def _secant(table: Table) -> float:
