@@ -233,7 +233,10 @@ def _rows(
     rate = inputs[[v.name for v in block.model.inputs].index(block.moving)]
     # The filter smears what happens at a reversal; so its whole reach must be in motion.
     slow = np.abs(rate) < slowest_rate(block.drives[block.moving], record, noise, span, rate)
-    moving, whole = _in_motion(rows, slow | _reverses(rate)), float(np.sum(rows @ rate**2))
+    # Which samples have a reversal beside them: when in between it happened, no sample tells.
+    between = rate[1:] * rate[:-1] < 0.0
+    beside: Mask = np.append(between, False) | np.append(False, between)
+    moving, whole = _in_motion(rows, slow | beside), float(np.sum(rows @ rate**2))
     covered = float(np.sum(moving @ rate**2)) / whole if whole else 0.0
     # A motion that is hardly ever between two reversals, as one that shakes or swings, is read across them.
     if len(moving.places) < LEAST_ROWS or covered < LEAST_COVERED:
@@ -254,13 +257,6 @@ def slowest_rate(drive: Drive, record: Record, noise: Noise, span: float, rate: 
 def _in_motion(matrix: Smoothing, still: Mask) -> Smoothing:
     """Return the rows that hardly reach into what is still."""
     return matrix[np.flatnonzero(matrix @ still.astype(float) < _SLOW_SHARE)]
-
-
-def _reverses(rate: Array) -> Mask:
-    """Tell which samples have a reversal beside them: when in between it happened, no sample tells."""
-    between = rate[1:] * rate[:-1] < 0.0
-    beside: Mask = np.append(between, False) | np.append(False, between)
-    return beside
 
 
 def _check_alive(block: Block, records: RecordSet, noise: Noise) -> None:
@@ -365,7 +361,14 @@ def chosen_filters(
     if usual_pace == 0.0:
         return Filters(0.0, 0.0, shortest)
     if moving and 2.0 * math.pi < _COARSEST * usual_pace * max(r.step for r in records):
-        raise _too_coarse(block, list(seen), usual_pace, records)
+        now = 1.0 / max(r.step for r in records)
+        frequency = usual_pace / (2.0 * math.pi)
+        raise MeasurementError(
+            f"block '{block.name}'",
+            f"the motion of {' and '.join(seen)}, typically {frequency:.3g} Hz, is sampled too coarsely "
+            f"at {now:.3g} Hz",
+            next_step=f"sample at {2.0 * _COARSEST * frequency:.2g} Hz or more, or move more slowly",
+        )
     # Where noise hides the highest derivative, or samples are too few for it, the pace of the rate is kept.
     pace = max(usual_pace, *(pace_by_order[key] for key in seen.items()))
     # A motion that hardly changes its rate, such as a slow ramp, has no pace of its own: its record sets one.
@@ -597,16 +600,3 @@ def _power(
         count += len(rows)
         own += len(rows) * noise**2 * float(weights @ weights)
     return (squares - own) / max(count, 1), own / max(count, 1)
-
-
-def _too_coarse(
-    block: Block, signals: Sequence[str], pace: float, records: Sequence[Record]
-) -> MeasurementError:
-    now = 1.0 / max(r.step for r in records)
-    frequency = pace / (2.0 * math.pi)
-    return MeasurementError(
-        f"block '{block.name}'",
-        f"the motion of {' and '.join(signals)}, typically {frequency:.3g} Hz, is sampled too coarsely at "
-        f"{now:.3g} Hz",
-        next_step=f"sample at {2.0 * _COARSEST * frequency:.2g} Hz or more, or move more slowly",
-    )

@@ -137,7 +137,9 @@ def colour_of(stretches: Sequence[Stretch], duration: float = 0.0) -> Colour | N
     if not np.any(density > 0.0):
         return None
     seen, parts = _fitted(frequency, density, count, step)
-    model = _total(seen, parts, frequency, step)
+    model = seen + sum(
+        (p.variance * _density(p.time, frequency, step) for p in parts), np.zeros_like(frequency)
+    )
     if model.max() < _PLAIN * max(seen, model.min()):
         return Colour(float(np.sum(model * count) / np.sum(count)), ())
     below = _continued(frequency, density - seen, count, duration)
@@ -226,12 +228,6 @@ def _continued(frequency: Array, risen: Array, count: Array, duration: float) ->
     number = math.ceil(math.log(duration * lowest) / math.log(_BAND))
     below = np.geomspace(1.0 / duration, lowest, number + 1)[:-1]
     return below, np.exp(mean - power * (np.log(below / lowest) - middle))
-
-
-def _total(white: float, parts: Sequence[NoisePart], frequency: Array, step: float) -> Array:
-    return white + sum(
-        (p.variance * _density(p.time, frequency, step) for p in parts), np.zeros_like(frequency)
-    )
 
 
 def _density(time: float, frequency: Array, step: float) -> Array:

@@ -536,7 +536,12 @@ def split(
     ``held_out``.
     """
     if not held_out and len(records) == 1:
-        return _cut_after_two_thirds(records[0])
+        record = records[0]
+        cut = 2 * len(record.trace) // 3
+        return (
+            _part(record, slice(None, cut), "fit", "first two thirds"),
+            _part(record, slice(cut, None), "held_out", "last third"),
+        )
     names = [r.name for r in records]
     compared = {n for g in selection for n in _named_by(g, names)}
     if held_out:
@@ -586,14 +591,6 @@ def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
 def from_sample(record: Record, first: int) -> Record:
     """Return a record from one sample on."""
     return _part(record, slice(first, None), record.role, f"from {record.trace.time[first]:g} s")
-
-
-def _cut_after_two_thirds(record: Record) -> tuple[Record, ...]:
-    cut = 2 * len(record.trace) // 3
-    return (
-        _part(record, slice(None, cut), "fit", "first two thirds"),
-        _part(record, slice(cut, None), "held_out", "last third"),
-    )
 
 
 def _part(record: Record, rows: slice, role: Role, label: str) -> Record:
