@@ -129,7 +129,17 @@ class IsolatedWork:
                     child.end()
                     os.close(ours)
         if answer is None:
-            raise self._crashed(child)
+            status = child.status
+            if os.WIFSIGNALED(status):
+                number = os.WTERMSIG(status)
+                reason = f"its library crashed ({signal.Signals(number).name})"
+            else:
+                reason = f"its library ended the process (exit status {os.waitstatus_to_exitcode(status)})"
+            raise ExportError(
+                self.watch.thing,
+                f"{reason} {self._when()}{self._printed()}",
+                next_step="the binary is damaged or has a fault: get or export it again",
+            )
         if answer:
             _reraise(json.loads(answer))
         return array
@@ -181,19 +191,6 @@ class IsolatedWork:
         row = min(self.watch.cells[2], len(self.times) - 1)
         at = f" from {self.times[row]:g} s" if self.watch.cells[1] == Activity.STEPPING else ""
         return self.watch.doing + at
-
-    def _crashed(self, child: _Child) -> ExportError:
-        status = child.status
-        if os.WIFSIGNALED(status):
-            number = os.WTERMSIG(status)
-            reason = f"its library crashed ({signal.Signals(number).name})"
-        else:
-            reason = f"its library ended the process (exit status {os.waitstatus_to_exitcode(status)})"
-        return ExportError(
-            self.watch.thing,
-            f"{reason} {self._when()}{self._printed()}",
-            next_step="the binary is damaged or has a fault: get or export it again",
-        )
 
     def _printed(self) -> str:
         """Return the last line that the libraries printed."""
