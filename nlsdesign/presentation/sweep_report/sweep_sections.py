@@ -44,17 +44,6 @@ def asked_sections(table: SweepTable, ranked: RankedPoints) -> list[Section]:
         for axis in table.axes
     )
     caption = "Axes of the sweep: what was changed, how the values were chosen, and what stands in the table."
-    return [
-        _numbers(table, ranked),
-        TableSection(
-            "What was changed", ("axis", "chosen as", "values", "range", "what it is"), rows, caption=caption
-        ),
-        *_directions(table, ranked),
-        *_failures(table),
-    ]
-
-
-def _numbers(table: SweepTable, ranked: RankedPoints) -> Section:
     done, failed = int(np.sum(table.done)), int(np.sum(ranked.failed))
     numbers = [
         KeyNumber("points with answers", str(done), _of_asked(table)),
@@ -70,7 +59,15 @@ def _numbers(table: SweepTable, ranked: RankedPoints) -> Section:
         numbers.append(
             KeyNumber("points on the front", str(len(ranked.front)), f"of {among} that were compared")
         )
-    return NumbersSection("In short", tuple(numbers))
+    summary = NumbersSection("In short", tuple(numbers))
+    return [
+        summary,
+        TableSection(
+            "What was changed", ("axis", "chosen as", "values", "range", "what it is"), rows, caption=caption
+        ),
+        *_directions(table, ranked),
+        *_failures(table),
+    ]
 
 
 def _of_asked(table: SweepTable) -> str:
@@ -84,7 +81,8 @@ def _of_asked(table: SweepTable) -> str:
 def _range(table: SweepTable, axis: SweepColumn) -> tuple[str, str]:
     """Return how many different values an axis has, and from where to where."""
     column = shown_column(table, axis)
-    distinct = np.unique(column.values[~_missing(column.values)])
+    given = column.values
+    distinct = np.unique(given[~np.isnan(given)] if given.dtype.kind == "f" else given)
     if column.words:
         names = ", ".join(distinct.tolist()[:8]) + (", …" if len(distinct) > 8 else "")
         return str(len(distinct)), names[:_LONGEST] or "–"
@@ -99,10 +97,6 @@ def _range(table: SweepTable, axis: SweepColumn) -> tuple[str, str]:
         if abs(axis.lower * factor - distinct[0]) + abs(axis.upper * factor - distinct[-1]) > 0.02 * width:
             text += f" (asked: {with_unit(asked, column.unit or '1')})"
     return str(len(distinct)), text
-
-
-def _missing(values: np.ndarray) -> np.ndarray:
-    return np.isnan(values) if values.dtype.kind == "f" else np.zeros(len(values), dtype=bool)
 
 
 def _directions(table: SweepTable, ranked: RankedPoints) -> list[Section]:
@@ -136,7 +130,12 @@ def _failures(table: SweepTable) -> list[Section]:
         examples.setdefault(reason, []).append(int(table.values["point"][row]))
     ordered = groups.most_common()
     rows = [
-        (str(count), _cut(reason), point_list(examples[reason])) for reason, count in ordered[:_MOST_REASONS]
+        (
+            str(count),
+            reason if len(reason) <= _LONGEST else reason[: _LONGEST - 1] + "…",
+            point_list(examples[reason]),
+        )
+        for reason, count in ordered[:_MOST_REASONS]
     ]
     rest = ordered[_MOST_REASONS:]
     if rest:
@@ -146,10 +145,6 @@ def _failures(table: SweepTable) -> list[Section]:
         f"{len(failed)} of {len(table)} points failed, grouped by reason. They are results of no figure."
     )
     return [TableSection("Points that failed", ("points", "reason", "numbers"), tuple(rows), caption=caption)]
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
 def unit_of(column: SweepColumn) -> str:
@@ -467,12 +462,9 @@ def _sentence(surface: AnswerSurface | str, answer: ShownColumn, why: str) -> st
             f"the answers {deviation}, so less than a tenth of their variance is predicted, and it is not "
             f"drawn.{outside}"
         )  # fmt: skip
+    # Never rounded up to all of it.
+    share = "more than 99.9 %" if surface.explained > 0.999 else f"{100.0 * surface.explained:.1f} %"
     return (
         f"{head}{surface.method}; error on left-out points {error} rms, with a deviation of the answers of "
-        f"{deviation} ({_share(surface.explained)} of the variance is predicted).{outside}"
+        f"{deviation} ({share} of the variance is predicted).{outside}"
     )  # fmt: skip
-
-
-def _share(value: float) -> str:
-    """Return a share as text that is never rounded up to all of it."""
-    return "more than 99.9 %" if value > 0.999 else f"{100.0 * value:.1f} %"
