@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from ...components.assembly.named_parts import Assembly
-from ...foundation.arrays import Array, Mask
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, InfeasibleError, ValueRangeError
 from ...foundation.quantity import Quantity
 from ...model import flatten
@@ -211,18 +211,14 @@ def unmakeable_parts(
         (hollow, "the contour would have to be hollow, and a taut cable lifts off"),
         (sharp, f"the contour is sharper than {least}"),
     ):
+        # A run of true values begins at an even edge and ends before the next one.
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
         result += [
             UnmakeablePart(
                 float(theta[a]),
-                float(theta[b]),
-                f"{reason} (radius of curvature down to {1e3 * float(rho[a : b + 1].min()):.3g} mm)",
+                float(theta[b - 1]),
+                f"{reason} (radius of curvature down to {1e3 * float(rho[a:b].min()):.3g} mm)",
             )
-            for a, b in _runs(where)
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
         ]
     return tuple(sorted(result, key=lambda part: part.first))
-
-
-def _runs(where: Mask) -> list[tuple[int, int]]:
-    """Return first and last index of each run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
