@@ -362,13 +362,6 @@ class ScheduledTorque(TorqueLaw):
         if table.argument != drive.names.angle:
             writer.input(table.argument, "rad", "measured angle of the spring")
         (slope,) = writer.look_up(table)
-        floor = writer.number(self._floor(table))
-        stiffness = ca.sqrt(slope * slope + floor * floor)
-        name = f"{series_spring(drive.plant).name}.stiffness.scheduled"
-        return writer.signal(name, "N*m/rad", "stiffness that the law divides by", stiffness)
-
-    def _floor(self, table: Table) -> Variable:
-        """Return the floor of the stiffness as a parameter; it is positive where the table has a zero."""
         secant, smallest = _secant(table), int(np.argmin(table.values[:, 0]))
         value = FLOOR_SHARE * secant if self.stiffness_floor is None else self.stiffness_floor
         least = LEAST_FLOOR * secant if table.values[smallest, 0] <= LEAST_FLOOR * secant else 0.0
@@ -380,10 +373,14 @@ class ScheduledTorque(TorqueLaw):
                 next_step=f"give at least {least:.2g} N·m/rad; a fifth of the secant stiffness, "
                 f"{FLOOR_SHARE * secant:.3g} N·m/rad, is the default",
             )
-        return Variable(
+        stiffness_floor = Variable(
             f"{GAIN}.stiffness_floor", "N*m/rad", "torque loop: stiffness that the law takes at least",
             value, value or 1.0, least,
         )  # fmt: skip
+        floor = writer.number(stiffness_floor)
+        stiffness = ca.sqrt(slope * slope + floor * floor)
+        name = f"{series_spring(drive.plant).name}.stiffness.scheduled"
+        return writer.signal(name, "N*m/rad", "stiffness that the law divides by", stiffness)
 
     def _acceleration(self, writer: LawWriter, ahead: Expression) -> Expression:
         """Return the filtered rate of the feedforward part of the speed.
