@@ -434,14 +434,8 @@ def _difference(record: Record, signal: str, rows: slice, lag: int) -> Stretch:
 def _quiet(record: Record, motions: Mapping[str, float]) -> tuple[list[slice], list[tuple[slice, int]]]:
     """Return where all motions rest, and where the record repeats itself after so many samples."""
     counts = [record.trace[name] / quantum for name, quantum in motions.items()]
-    return _rests(counts), _repeats(counts)
-
-
-def _rests(counts: Sequence[Array]) -> list[slice]:
-    """Return the stretches in which no motion leaves its count by more than one, without their first third.
-
-    There rubber still creeps, which would be taken for slow noise.
-    """
+    # The stretches in which no motion leaves its count by more than one, without their first third. There
+    # rubber still creeps, which would be taken for slow noise.
     n = len(counts[0])
     least = max(_LEAST_SAMPLES, n // _MOST_STRETCHES)
     result, first = [], 0
@@ -456,7 +450,7 @@ def _rests(counts: Sequence[Array]) -> list[slice]:
         else:
             # What has moved on since this sample is not at rest at any sample before it left either.
             first += max(1, (behind - first) // 2)
-    return result
+    return result, _repeats(counts)
 
 
 def _repeats(counts: Sequence[Array]) -> list[tuple[slice, int]]:

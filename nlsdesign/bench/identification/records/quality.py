@@ -506,8 +506,11 @@ def check_channels(file: str, time: Array, columns: Sequence[Sampled], *, first_
         now = values.get(column.head, column.values)
         if np.ptp(now) == 0.0:
             rows = rows_in_words(np.arange(len(now)), first_row)
-            all_rest = bool(others) and not any(_moves(each.values) for each in others)
-            rests = column.shows_input or all_rest
+            moving = (
+                np.ptp(each.values) > _MOVES * max(noise_of(each.values), quantum_of(each.values))
+                for each in others
+            )
+            rests = column.shows_input or (bool(others) and not any(moving))
             (remarks if rests else findings).append(Finding(f"{place}, {rows}", f"is constant at {now[0]:g}"))
         remarks += _too_coarse(place, column, now, time)
         for finding, suspect in _clipped(place, column, now, others, first_row):
@@ -584,10 +587,6 @@ def _too_coarse(place: str, column: Sampled, values: Array, time: Array) -> Iter
         wanted = float(f"{rate * _LEAST_PERIOD / period:.2g}")
         text = f"has about {period:.2g} samples a period where it is fastest, too few for its rates"
         yield Finding(place, f"{text}: record at {wanted:g} Hz or more")
-
-
-def _moves(values: Array) -> bool:
-    return bool(np.ptp(values) > _MOVES * max(noise_of(values), quantum_of(values)))
 
 
 def _clipped(
