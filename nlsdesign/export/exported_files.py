@@ -233,9 +233,12 @@ def _fmu(path: Path, size: int) -> ExportedFile | None:
             }
             deck = record["deck"] or {"name": "", "sha256": "", "parent": None}
             parent = deck["parent"]["sha256"] if deck["parent"] else ""
-            return ExportedFile(
-                path, "FMU", deck["name"], deck["sha256"], parent, _difference(record["files"], digests)
-            )
+            stated = record["files"]
+            changed = [name for name in stated if name in digests and stated[name] != digests[name]]
+            missing, added = sorted(stated.keys() - digests.keys()), sorted(digests.keys() - stated.keys())
+            parts = {"changed": changed, "missing": missing, "added": added}
+            difference = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
+            return ExportedFile(path, "FMU", deck["name"], deck["sha256"], parent, difference)
     except (RuntimeError, NotImplementedError) as error:
         # Encrypted, or packed in a way that the library does not know.
         raise ExportError(str(path), f"cannot be unpacked: {error}") from None
@@ -275,13 +278,6 @@ def _is_deck(raw: object) -> bool:
     if not isinstance(raw.get("sha256"), str) or not _DIGEST.fullmatch(raw["sha256"]):
         return False
     return raw.setdefault("parent", None) is None or _is_deck(raw["parent"])
-
-
-def _difference(stated: dict[str, str], actual: dict[str, str]) -> str:
-    changed = [name for name in stated if name in actual and stated[name] != actual[name]]
-    missing, added = sorted(stated.keys() - actual.keys()), sorted(actual.keys() - stated.keys())
-    parts = {"changed": changed, "missing": missing, "added": added}
-    return "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
 
 
 def _deck(path: Path, size: int) -> ExportedFile | None:

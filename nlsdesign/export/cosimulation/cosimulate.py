@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
-from ...simulation.signals import Sine
+from ...simulation.input_signals import Sine
 from ...simulation.trace import Trace
 from .coupling import Stepping
 from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description, unpack

@@ -205,7 +205,19 @@ class IsolatedWork:
         """Work in the new process, say at the end how it went, and never return."""
         answer: dict[str, Any] | None
         try:
-            _made_ready(self.folder, owner)
+            # Make the new process one that can crash quietly and leaves interruptions to its owner.
+            with contextlib.suppress(OSError):  # its owner did so already
+                os.setpgid(0, 0)
+            ready_as_helper(owner, signal.SIGKILL)
+            faulthandler.disable()
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+            os.chdir(self.folder)
+            printed = os.open(self.folder / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+            nothing = os.open(os.devnull, os.O_RDONLY)
+            for descriptor, place in ((0, nothing), (1, printed), (2, printed)):
+                os.dup2(place, descriptor)
             self.work(array)
             answer = None
         except NlsError as error:
@@ -252,22 +264,6 @@ class _Child:
         if not self._ended:
             _, self.status = os.waitpid(self._number, 0)
             self._ended = True
-
-
-def _made_ready(folder: Path, owner: int) -> None:
-    """Make the new process one that can crash quietly and leaves interruptions to its owner."""
-    with contextlib.suppress(OSError):  # its owner did so already
-        os.setpgid(0, 0)
-    ready_as_helper(owner, signal.SIGKILL)
-    faulthandler.disable()
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
-    os.chdir(folder)
-    printed = os.open(folder / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    for descriptor, place in ((0, nothing), (1, printed), (2, printed)):
-        os.dup2(place, descriptor)
 
 
 def _reraise(answer: dict[str, Any]) -> NoReturn:
