@@ -233,10 +233,7 @@ def _rows(
     rate = inputs[[v.name for v in block.model.inputs].index(block.moving)]
     # The filter smears what happens at a reversal; so its whole reach must be in motion.
     slow = np.abs(rate) < slowest_rate(block.drives[block.moving], record, noise, span, rate)
-    # Which samples have a reversal beside them: when in between it happened, no sample tells.
-    between = rate[1:] * rate[:-1] < 0.0
-    beside: Mask = np.append(between, False) | np.append(False, between)
-    moving, whole = _in_motion(rows, slow | beside), float(np.sum(rows @ rate**2))
+    moving, whole = _in_motion(rows, slow | _reverses(rate)), float(np.sum(rows @ rate**2))
     covered = float(np.sum(moving @ rate**2)) / whole if whole else 0.0
     # A motion that is hardly ever between two reversals, as one that shakes or swings, is read across them.
     if len(moving.places) < LEAST_ROWS or covered < LEAST_COVERED:
@@ -257,6 +254,13 @@ def slowest_rate(drive: Drive, record: Record, noise: Noise, span: float, rate: 
 def _in_motion(matrix: Smoothing, still: Mask) -> Smoothing:
     """Return the rows that hardly reach into what is still."""
     return matrix[np.flatnonzero(matrix @ still.astype(float) < _SLOW_SHARE)]
+
+
+def _reverses(rate: Array) -> Mask:
+    """Tell which samples have a reversal beside them: when in between it happened, no sample tells."""
+    between = rate[1:] * rate[:-1] < 0.0
+    beside: Mask = np.append(between, False) | np.append(False, between)
+    return beside
 
 
 def _check_alive(block: Block, records: RecordSet, noise: Noise) -> None:
