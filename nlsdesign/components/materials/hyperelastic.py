@@ -111,6 +111,11 @@ class Ogden(Hyperelastic):
     Each product μₚ·αₚ must be positive, which makes the stress rise with the strain. Three pairs follow
     unfilled rubber to a stretch of 7. Source: Ogden 1972.
 
+    Raises
+    ------
+    ValueRangeError
+        If a modulus has no exponent, or their product is not positive.
+
     Examples
     --------
     >>> Ogden(moduli=(0.618e6, 1.18e3, -9.81e3), exponents=(1.3, 5.0, -2.0)).title()

@@ -329,8 +329,9 @@ def _hdf5(file: Path) -> RecordTable:
     arrays: dict[str, Any] = {}
 
     def visit(name: str, node: Any) -> None:
-        is_vector = node.dtype.kind in "fiub" and sum(length != 1 for length in node.shape) == 1
-        if isinstance(node, h5py.Dataset) and not name.startswith("#") and is_vector:
+        if not isinstance(node, h5py.Dataset) or name.startswith("#"):
+            return
+        if node.dtype.kind in "fiub" and sum(length != 1 for length in node.shape) == 1:
             # Refuse a column whose numbers stand in other files, or are more than a record can hold.
             where = f"{file.name}: '{name}'"
             if node.external or node.is_virtual:
