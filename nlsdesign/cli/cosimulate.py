@@ -89,7 +89,13 @@ def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **
     from ..export import Coupling, Extrapolated, Held, Iterated, Stepping, convergence
     from ..foundation.progress import Steps
 
-    _check_out(out, [*given["fmus"], *([str(given["system"])] if given.get("system") else [])])
+    # Refuse to write over what is read.
+    for words in [*given["fmus"], *([str(given["system"])] if given.get("system") else [])]:
+        file = Path(words.partition("=")[2] or words)
+        if out.exists() and file.exists() and file.samefile(out):
+            raise ValueRangeError(
+                f"--out {out}", "is an FMU or a system that is read", next_step="name another file: run.csv"
+            )
     steps = Steps()
     with tempfile.TemporaryDirectory(prefix="nlsdesign-system-") as folder:
         system = _system(given, Path(folder))
@@ -145,16 +151,6 @@ def _system(given: Mapping[str, Any], folder: Path) -> FmuSystem:
         parameters={**read.parameters, **own.parameters},
         order=own.order or read.order,
     )
-
-
-def _check_out(out: Path, reads: list[str]) -> None:
-    """Refuse to write over what is read."""
-    for words in reads:
-        file = Path(words.partition("=")[2] or words)
-        if out.exists() and file.exists() and file.samefile(out):
-            raise ValueRangeError(
-                f"--out {out}", "is an FMU or a system that is read", next_step="name another file: run.csv"
-            )
 
 
 def _as_json(run: CoSimulation, study: Convergence | None, out: Path) -> dict[str, Any]:

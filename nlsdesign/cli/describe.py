@@ -46,7 +46,20 @@ def describe(folder: Path, deck_name: str, joint: str | None, out: Path, as_json
     if written:
         write_text(out, description.mapping())
     if as_json:
-        show_json({**_content(description), "written": written})
+        notes = (*description.records.findings, *description.records.remarks) if description.records else ()
+        roles = {r.name: r.role for r in description.records.records} if description.records else {}
+        content = {
+            "time": description.time,
+            "time_unit": description.time_unit,
+            "files": [asdict(file) for file in description.files],
+            "columns": [asdict(column) for column in description.columns],
+            "records": roles,
+            "remarks": [f"{note.place}: {note.text}" for note in notes],
+            "undecided": [column.head for column in description.undecided],
+            "problem": description.problem,
+            "written": written,
+        }
+        show_json(content)
     else:
         _show(description)
         if written:
@@ -57,21 +70,6 @@ def describe(folder: Path, deck_name: str, joint: str | None, out: Path, as_json
             click.echo(f"next: {next_command(*words)}")
     if description.problem or description.undecided:
         raise click.exceptions.Exit(1)
-
-
-def _content(description: RecordsDescription) -> dict[str, object]:
-    notes = (*description.records.findings, *description.records.remarks) if description.records else ()
-    roles = {r.name: r.role for r in description.records.records} if description.records else {}
-    return {
-        "time": description.time,
-        "time_unit": description.time_unit,
-        "files": [asdict(file) for file in description.files],
-        "columns": [asdict(column) for column in description.columns],
-        "records": roles,
-        "remarks": [f"{note.place}: {note.text}" for note in notes],
-        "undecided": [column.head for column in description.undecided],
-        "problem": description.problem,
-    }
 
 
 def _show(description: RecordsDescription) -> None:

@@ -6,7 +6,7 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from .typed_values import NamedPath, parse_number
 
 if TYPE_CHECKING:
     from ..components import Assembly
-    from ..design import CamDesign, DesignJob, Limit, Target, TaskTarget
+    from ..design import DesignJob, Limit, Target, TaskTarget
 
 KINDS = ("targets", "limits", "goals")
 _FIELD = re.compile(r"^(?P<names>\w+(?:, \w+)*)\n(?P<text>(?:[ ]{4}.*\n?|\n(?=[ ]{4}))+)", re.MULTILINE)
@@ -139,7 +139,13 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
     if as_json:
         show_json({**design_summary(designed), "remarks": remarks, "warnings": ranges, "files": files})
     else:
-        _show(designed, files)
+        limits = (("limit", str(state)) for state in designed.limits)
+        show_table("Design", ("what", "value"), [*designed.rows(), *limits])
+        if designed.tolerance is not None:
+            show_table("Tolerance", ("what", "value"), designed.tolerance.rows())
+        click.echo("written: " + ", ".join(str(path) for path in files))
+        if not designed.met:
+            click.echo("no drawings are written of a design that misses its target")
         for remark in remarks:
             click.echo(remark)
     sys.exit(0 if designed.met else 1)
@@ -258,16 +264,6 @@ def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Tar
     write_figures(out, {"task_curve": curve_of_task(curve), "task_motor": motor_over_task(curve)})
     click.echo(str(curve))
     return curve.target
-
-
-def _show(designed: CamDesign, files: Iterable[Path]) -> None:
-    limits = (("limit", str(state)) for state in designed.limits)
-    show_table("Design", ("what", "value"), [*designed.rows(), *limits])
-    if designed.tolerance is not None:
-        show_table("Tolerance", ("what", "value"), designed.tolerance.rows())
-    click.echo("written: " + ", ".join(str(path) for path in files))
-    if not designed.met:
-        click.echo("no drawings are written of a design that misses its target")
 
 
 def show_kinds(what: str, as_json: bool) -> None:

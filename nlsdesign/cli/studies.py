@@ -119,7 +119,12 @@ def run_study(name: str, out: Path, *, fast: bool = False) -> dict[str, float]:
     """Run a study and return its numbers; none where it was skipped."""
     study = load_study(name)
     if Path(name).suffix == ".py":
-        _check_signature(name, study)
+        try:
+            inspect.signature(study.main).bind(Path(), fast=False)
+        except TypeError as error:
+            raise NlsError(
+                f"{name}: main", f"cannot be called so: {error}", next_step=f"write {_SIGNATURE}"
+            ) from None
         with _mistakes_named(Path(name)):
             results = study.main(out, fast=fast)
     else:
@@ -139,15 +144,6 @@ def run_study(name: str, out: Path, *, fast: bool = False) -> dict[str, float]:
         if not isinstance(key, str) or isinstance(value, bool) or not isinstance(value, SupportsFloat):
             raise NlsError(f"study '{name}'", f"its number {brief(key)} is {brief(value)}, not a float")
     return {key: float(value) for key, value in numbers.items()}
-
-
-def _check_signature(name: str, study: ModuleType) -> None:
-    try:
-        inspect.signature(study.main).bind(Path(), fast=False)
-    except TypeError as error:
-        raise NlsError(
-            f"{name}: main", f"cannot be called so: {error}", next_step=f"write {_SIGNATURE}"
-        ) from None
 
 
 def not_as_claimed(results: Mapping[str, float], expected: Mapping[str, Claim]) -> dict[str, str]:

@@ -68,7 +68,17 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
         return
     pages: Path | None = given["report"]
     if pages is not None:
-        _require_room(pages)
+        # Refuse, before any point is computed, a page that would replace what somebody has changed.
+        from ..foundation.text_files import WORDS, file_state
+
+        for path in (pages / name for name in ("sweep.html", "points.csv")):
+            state = file_state(path)
+            if state not in ("new", "as written"):
+                raise ExportError(
+                    str(path), WORDS[state],
+                    next_step="nothing was computed; name another folder for --report, "
+                    "or move that file away",
+                )  # fmt: skip
     table = _run(task, out, executor, given)
     page = None
     if pages is not None:
@@ -78,19 +88,6 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
             page = write_sweep_report(table, pages, source=out).page
     _show_result(table, out, page, as_json=as_json)
     ctx.exit(0 if table.done.all() else 1)
-
-
-def _require_room(folder: Path) -> None:
-    """Refuse, before any point is computed, a page that would replace what somebody has changed."""
-    from ..foundation.text_files import WORDS, file_state
-
-    for path in (folder / name for name in ("sweep.html", "points.csv")):
-        state = file_state(path)
-        if state not in ("new", "as written"):
-            raise ExportError(
-                str(path), WORDS[state],
-                next_step="nothing was computed; name another folder for --report, or move that file away",
-            )  # fmt: skip
 
 
 def _show_result(table: SweepTable, out: Path, page: Path | None, *, as_json: bool) -> None:

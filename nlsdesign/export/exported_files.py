@@ -216,30 +216,34 @@ def _fmu(path: Path, size: int) -> ExportedFile | None:
         raise _too_large(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            return _archive(path, archive)
+            entries = {entry.filename: entry for entry in archive.infolist() if not entry.is_dir()}
+            if (
+                len(entries) > _MOST_FILES
+                or sum(entry.file_size for entry in entries.values()) > LARGEST_ARCHIVE
+            ):
+                raise _too_large(path)
+            if "modelDescription.xml" not in entries:
+                raise ExportError(str(path), "is no FMU: it has no modelDescription.xml")
+            if ORIGIN_FILE not in entries:
+                own = b"nlsdesign" in archive.read("modelDescription.xml")[:4096]
+                return ExportedFile(path, "FMU", edited=f"it has no {ORIGIN_FILE}") if own else None
+            record = _record(path, archive.read(ORIGIN_FILE))
+            digests = {
+                name: _digest(archive, entry) for name, entry in entries.items() if name != ORIGIN_FILE
+            }
+            deck = record["deck"] or {"name": "", "sha256": "", "parent": None}
+            parent = deck["parent"]["sha256"] if deck["parent"] else ""
+            stated = record["files"]
+            changed = [name for name in stated if name in digests and stated[name] != digests[name]]
+            missing, added = sorted(stated.keys() - digests.keys()), sorted(digests.keys() - stated.keys())
+            parts = {"changed": changed, "missing": missing, "added": added}
+            difference = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
+            return ExportedFile(path, "FMU", deck["name"], deck["sha256"], parent, difference)
     except (RuntimeError, NotImplementedError) as error:
         # Encrypted, or packed in a way that the library does not know.
         raise ExportError(str(path), f"cannot be unpacked: {error}") from None
     except BROKEN_ARCHIVE as error:
         raise ExportError(str(path), f"is a damaged archive: {error}") from None
-
-
-def _archive(path: Path, archive: zipfile.ZipFile) -> ExportedFile | None:
-    entries = {entry.filename: entry for entry in archive.infolist() if not entry.is_dir()}
-    if len(entries) > _MOST_FILES or sum(entry.file_size for entry in entries.values()) > LARGEST_ARCHIVE:
-        raise _too_large(path)
-    if "modelDescription.xml" not in entries:
-        raise ExportError(str(path), "is no FMU: it has no modelDescription.xml")
-    if ORIGIN_FILE not in entries:
-        own = b"nlsdesign" in archive.read("modelDescription.xml")[:4096]
-        return ExportedFile(path, "FMU", edited=f"it has no {ORIGIN_FILE}") if own else None
-    record = _record(path, archive.read(ORIGIN_FILE))
-    digests = {name: _digest(archive, entry) for name, entry in entries.items() if name != ORIGIN_FILE}
-    deck = record["deck"] or {"name": "", "sha256": "", "parent": None}
-    parent = deck["parent"]["sha256"] if deck["parent"] else ""
-    return ExportedFile(
-        path, "FMU", deck["name"], deck["sha256"], parent, _difference(record["files"], digests)
-    )
 
 
 def _digest(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> str:
@@ -274,13 +278,6 @@ def _is_deck(raw: object) -> bool:
     if not isinstance(raw.get("sha256"), str) or not _DIGEST.fullmatch(raw["sha256"]):
         return False
     return raw.setdefault("parent", None) is None or _is_deck(raw["parent"])
-
-
-def _difference(stated: dict[str, str], actual: dict[str, str]) -> str:
-    changed = [name for name in stated if name in actual and stated[name] != actual[name]]
-    missing, added = sorted(stated.keys() - actual.keys()), sorted(actual.keys() - stated.keys())
-    parts = {"changed": changed, "missing": missing, "added": added}
-    return "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
 
 
 def _deck(path: Path, size: int) -> ExportedFile | None:

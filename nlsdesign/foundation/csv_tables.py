@@ -84,7 +84,17 @@ def read_csv(file: Path) -> CsvTable:
     with named_if_unreadable(file):
         layout = _Layout.of(file)
         try:
-            columns = _at_once(file, layout, lines)
+            # The columns of a file in which every row has a number in every cell.
+            some = range(len(layout.heads)) if layout.open_ended else None
+            with warnings.catch_warnings(action="ignore", category=UserWarning):  # of a file without numbers
+                numbers = np.loadtxt(
+                    layout.rows(file, lines), delimiter=layout.separator, quotechar='"', comments=None,
+                    ndmin=2, usecols=some,
+                )  # fmt: skip
+            if len(numbers) and numbers.shape[1] != len(layout.heads):
+                raise _uneven(layout, lines[0], numbers.shape[1])
+            numbers = numbers if len(numbers) else np.zeros((0, len(layout.heads)))
+            columns = {head: numbers[:, place] for place, head in enumerate(layout.heads)}
         except ValueError:
             del lines[:]
             columns = _cell_by_cell(file, layout, lines)
@@ -92,20 +102,6 @@ def read_csv(file: Path) -> CsvTable:
     if len(lines) and lines[-1] - lines[0] + 1 > len(lines):
         remarks.append("has comments or empty lines between its rows, which messages do not count")
     return CsvTable(layout.heads, layout.units, columns, lines, tuple(remarks))
-
-
-def _at_once(file: Path, layout: _Layout, lines: array[int]) -> dict[str, Array]:
-    """Return the columns of a file in which every row has a number in every cell."""
-    some = range(len(layout.heads)) if layout.open_ended else None
-    with warnings.catch_warnings(action="ignore", category=UserWarning):  # of a file without numbers
-        numbers = np.loadtxt(
-            layout.rows(file, lines), delimiter=layout.separator, quotechar='"', comments=None, ndmin=2,
-            usecols=some,
-        )  # fmt: skip
-    if len(numbers) and numbers.shape[1] != len(layout.heads):
-        raise _uneven(layout, lines[0], numbers.shape[1])
-    numbers = numbers if len(numbers) else np.zeros((0, len(layout.heads)))
-    return {head: numbers[:, place] for place, head in enumerate(layout.heads)}
 
 
 def _encoding(file: Path) -> str:
@@ -164,7 +160,13 @@ class _Layout:
             heads, at = cells, at + 1
         open_ended = len(heads) > 1 and not heads[-1]
         heads = heads[:-1] if open_ended else heads
-        _check_heads(file.name, heads)
+        for place, head in enumerate(heads):
+            if head in heads[:place]:
+                raise MeasurementError(
+                    f"{file.name}: columns {heads.index(head) + 1} and {place + 1}",
+                    f"have the same head '{head}'" if head else "have no head",
+                    next_step="give each column a head of its own",
+                )
         units: dict[str, str] = {}
         if at < len(lines):
             below = _cells(file.name, lines[at], separator)
@@ -213,16 +215,6 @@ def _is_unit(cell: str) -> bool:
     except UnitError:
         return False
     return not _is_number(cell)
-
-
-def _check_heads(file: str, heads: Sequence[str]) -> None:
-    for place, head in enumerate(heads):
-        if head in heads[:place]:
-            raise MeasurementError(
-                f"{file}: columns {heads.index(head) + 1} and {place + 1}",
-                f"have the same head '{head}'" if head else "have no head",
-                next_step="give each column a head of its own",
-            )
 
 
 def _uneven(layout: _Layout, row: int, cells: int) -> MeasurementError:

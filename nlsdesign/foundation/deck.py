@@ -162,7 +162,19 @@ class Deck:
             factor = parse_unit(raw["unit"]).factor
             scaled = tuple(v.times(factor) if isinstance(v, Written) else float(v) * factor for v in items)
             if "range" in raw:
-                return _of_range(scaled, raw["unit"], raw["source"])
+                # The middle of a range with the range as its spread.
+                if len(scaled) != 2 or not scaled[0] < scaled[1]:
+                    raise ValueRangeError(
+                        "range",
+                        "is a range from a smaller to a larger number",
+                        next_step="write range = [1.0, 3.0]",
+                    )
+                return Quantity(
+                    0.5 * (scaled[0] + scaled[1]),
+                    raw["unit"],
+                    raw["source"],
+                    UniformSpread(0.5 * (scaled[1] - scaled[0])),
+                )
             in_si = scaled if isinstance(given, list) else scaled[0]
             return Quantity(in_si, raw["unit"], raw["source"], _spread(spread, raw["unit"]))
         except NlsError as error:
@@ -170,15 +182,6 @@ class Deck:
         except OverflowError:
             rule = f"{brief(given)} {raw['unit']}, spread {brief(spread)}, is too large to compute with"
             raise ValueRangeError(where, rule, next_step="correct the number or its unit") from None
-
-
-def _of_range(ends: tuple[float, ...], unit: str, source: str) -> Quantity:
-    """Return the middle of a range with the range as its spread."""
-    if len(ends) != 2 or not ends[0] < ends[1]:
-        raise ValueRangeError(
-            "range", "is a range from a smaller to a larger number", next_step="write range = [1.0, 3.0]"
-        )
-    return Quantity(0.5 * (ends[0] + ends[1]), unit, source, UniformSpread(0.5 * (ends[1] - ends[0])))
 
 
 def _spread(given: float | str, unit: str) -> Spread:
@@ -257,7 +260,11 @@ def load_deck(name: str | Path) -> Deck:
             if is_there(inside):
                 raise DeckError(f"deck '{name}'", "is a folder", next_step=f"name the deck in it: {inside}")
             if is_there(path) and path.is_dir():
-                raise _is_folder(path)
+                decks = sorted(path.glob("*.toml"))
+                named = f"name the deck in it: {decks[0]}" if len(decks) == 1 else "name a .toml file"
+                if len(decks) > 1:
+                    named += f" in it, for instance {decks[0]}"
+                raise DeckError(f"deck '{path}'", "is a folder", next_step=named)
             if is_there(path) and path.is_file():
                 raise DeckError(
                     f"deck '{name}'", "is a file whose name does not end in .toml",
@@ -271,15 +278,6 @@ def load_deck(name: str | Path) -> Deck:
     return read_deck(text_of(path, DeckError), path)
 
 
-def _is_folder(path: Path) -> DeckError:
-    """Return the error on a folder in place of a deck, with the decks that may stand in it."""
-    inside = sorted(path.glob("*.toml"))
-    named = f"name the deck in it: {inside[0]}" if len(inside) == 1 else "name a .toml file"
-    if len(inside) > 1:
-        named += f" in it, for instance {inside[0]}"
-    return DeckError(f"deck '{path}'", "is a folder", next_step=named)
-
-
 def read_deck(text: str, path: Path) -> Deck:
     """Read a deck from text."""
     deep = _TOO_DEEP.search(text)
@@ -288,14 +286,28 @@ def read_deck(text: str, path: Path) -> Deck:
     try:
         tables = tomllib.loads(text, parse_float=Written)
     except tomllib.TOMLDecodeError as error:
-        raise _not_toml(text, path, str(error)) from None
+        message = str(error)
+        match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
+        lines = text.splitlines() or [""]
+        place = f"{match[1]}:{match[2]}" if match else f"{len(lines)}:{len(lines[-1]) + 1}"
+        rule = message.replace(match[0], "") if match else message
+        raise DeckError(
+            f"{path.name}:{place}", f"is not valid TOML: {rule}", next_step="correct that line"
+        ) from None
     except RecursionError:
         raise _too_deep(path.name) from None
     except ValueError:  # of Python, for whole numbers of more digits than it reads
         long = _TOO_MANY_DIGITS.search(text)
         line = text.count("\n", 0, long.start() if long else 0) + 1
         raise DeckError(f"{path.name}:{line}", f"has a number of more than {_MOST_DIGITS} digits") from None
-    if _levels(tables) > _MOST_LEVELS:
+    # How many tables and lists stand within each other.
+    levels = 0
+    inner: list[Any] = [tables]
+    while inner:
+        levels += 1
+        each = [v for t in inner for v in (t.values() if isinstance(t, dict) else t)]
+        inner = [v for v in each if isinstance(v, dict | list)]
+    if levels > _MOST_LEVELS:
         raise _too_deep(path.name)
     places = _places(text)
     head = tables.pop("deck", {})
@@ -307,28 +319,9 @@ def read_deck(text: str, path: Path) -> Deck:
     return Deck(name, description, path, tables, places, head)
 
 
-def _levels(tables: Mapping[str, Any]) -> int:
-    """Return how many tables and lists stand within each other."""
-    levels = 0
-    inner: list[Any] = [tables]
-    while inner:
-        levels += 1
-        each = [v for t in inner for v in (t.values() if isinstance(t, dict) else t)]
-        inner = [v for v in each if isinstance(v, dict | list)]
-    return levels
-
-
 def _too_deep(where: str) -> DeckError:
     rule = f"has tables or lists within each other, more than {_MOST_LEVELS} deep"
     return DeckError(where, rule, next_step="combine parts side by side instead of within each other")
-
-
-def _not_toml(text: str, path: Path, message: str) -> DeckError:
-    match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
-    lines = text.splitlines() or [""]
-    place = f"{match[1]}:{match[2]}" if match else f"{len(lines)}:{len(lines[-1]) + 1}"
-    rule = message.replace(match[0], "") if match else message
-    return DeckError(f"{path.name}:{place}", f"is not valid TOML: {rule}", next_step="correct that line")
 
 
 def _places(text: str) -> dict[str, tuple[int, int]]:

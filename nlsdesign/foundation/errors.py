@@ -84,15 +84,12 @@ class NlsError(Exception):
         self.rule = rule
         self.did_you_mean = did_you_mean
         self.next_step = next_step
-        super().__init__(self._message())
-
-    def _message(self) -> str:
         text = f"{fit_for_message(self.thing)}: {fit_for_message(self.rule)}"
         if self.did_you_mean:
             text += f"; did you mean '{fit_for_message(self.did_you_mean)}'?"
         if self.next_step:
             text += f" -> {fit_for_message(self.next_step)}"
-        return text
+        super().__init__(text)
 
     def at(self, place: str) -> NlsError:
         """Return the same error with the place in front of the thing.

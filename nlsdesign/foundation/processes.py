@@ -177,7 +177,19 @@ class _Guard:
     def end(self, *, announced: bool = False) -> None:
         """End the processes that were started, remove what is temporary, and end this process."""
         self._ending.acquire()  # never released: whoever comes second waits for the end
-        for number in _descendants():  # none where the system does not list them
+        parents: dict[int, list[int]] = {}
+        with contextlib.suppress(OSError):
+            for entry in os.listdir("/proc"):
+                with contextlib.suppress(OSError, ValueError, IndexError):
+                    fields = (
+                        Path("/proc", entry, "stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+                    )
+                    parents.setdefault(int(fields[1]), []).append(int(entry))
+        below, left = [], [os.getpid()]
+        while left:
+            left = [child for one in left for child in parents.get(one, [])]
+            below += left
+        for number in below:  # none where the system does not list them
             with contextlib.suppress(OSError):
                 os.kill(number, signal.SIGKILL)
         self._sweep()
@@ -205,17 +217,3 @@ class _Guard:
             if not self._folder.exists():
                 return
             time.sleep(0.02)  # a process that was ended just now may still have written
-
-
-def _descendants() -> list[int]:
-    parents: dict[int, list[int]] = {}
-    with contextlib.suppress(OSError):
-        for entry in os.listdir("/proc"):
-            with contextlib.suppress(OSError, ValueError, IndexError):
-                fields = Path("/proc", entry, "stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-                parents.setdefault(int(fields[1]), []).append(int(entry))
-    below, left = [], [os.getpid()]
-    while left:
-        left = [child for one in left for child in parents.get(one, [])]
-        below += left
-    return below

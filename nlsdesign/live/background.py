@@ -140,7 +140,12 @@ def _run(pipe: Connection, packages: tuple[str, ...], packed: bytes) -> None:
     """Call the work, within the packages that the session is extended by, and send what came out."""
     if sys.platform != "win32":
         os.setpgid(0, 0)
-    _end_with_parent()
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+        if os.getppid() == 1:
+            os._exit(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def stage(words: str) -> None:
@@ -158,12 +163,3 @@ def _run(pipe: Connection, packages: tuple[str, ...], packed: bytes) -> None:
         answer = (WorkStage.FAILED, f"{type(error).__name__}: {error}")
     with contextlib.suppress(OSError):
         pipe.send(answer)
-
-
-def _end_with_parent() -> None:
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
-        if os.getppid() == 1:
-            os._exit(1)

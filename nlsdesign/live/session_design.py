@@ -176,7 +176,22 @@ class SessionDesign:
     def _served(self, asked: Mapping[str, Any]) -> dict[str, Any] | None:
         """Return an answer; nothing where it is given when a file is ready."""
         if asked["what"] == "open":
-            self._opened(base64.b64decode(asked["content"]))
+            # Go on from a saved design or a deck, one step that can be undone. What is open stays as it is
+            # where the file cannot be read.
+            content = base64.b64decode(asked["content"])
+            values: dict[str, float] = {}
+            if content.startswith(b"PK"):
+                question, values = reopened(unarchived(content))
+            else:
+                try:
+                    text = content.decode("utf-8")
+                except UnicodeDecodeError:
+                    raise NlsError("deck", "is no text in UTF-8", next_step="open a deck (TOML)") from None
+                question = question_of_deck(text, "deck.toml")
+            open_question(self._news.live, question, values)
+            self._refuse_file("another design was opened meanwhile")
+            self._begin(self._news.live)
+            self._news.everything(None)
             return {}
         if asked["kind"] == "design":
             return _file("design.zip", archived(self._news.live.saved()))
@@ -191,25 +206,6 @@ class SessionDesign:
         if self._file_for is not None:
             self._outbox.server({"number": self._file_for, "refused": reason})
         self._file_for = None
-
-    def _opened(self, content: bytes) -> None:
-        """Go on from a saved design or a deck, one step that can be undone.
-
-        What is open stays as it is where the file cannot be read.
-        """
-        values: dict[str, float] = {}
-        if content.startswith(b"PK"):
-            question, values = reopened(unarchived(content))
-        else:
-            try:
-                text = content.decode("utf-8")
-            except UnicodeDecodeError:
-                raise NlsError("deck", "is no text in UTF-8", next_step="open a deck (TOML)") from None
-            question = question_of_deck(text, "deck.toml")
-        open_question(self._news.live, question, values)
-        self._refuse_file("another design was opened meanwhile")
-        self._begin(self._news.live)
-        self._news.everything(None)
 
     def _send_file(self) -> None:
         """Send the file that the server waits for once it is made."""

@@ -17,7 +17,7 @@ from ..design.optimisation.limits import limit_kinds
 from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
 from ..foundation.rubber_library import materials
-from .answers import AngleAnswer, AnswerSource, DesignView, LiveAnswer, Mechanism, WorkStage, to_json
+from .answers import AngleAnswer, AnswerSource, DesignView, LiveAnswer, WorkStage, to_json
 from .at_angle import AngleView
 from .background import WorkState
 from .gallery import gallery_cards
@@ -82,7 +82,13 @@ def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, An
     except NlsError as error:
         # A contour of no radius has no outline; its torque is an answer all the same.
         return {"angle": angle, "mechanism": None, "reason": in_words(str(error))}
-    return {"angle": angle, "mechanism": _lines(mechanism), "reason": ""}
+    lines = {
+        name: [short_numbers(_fewer(each)) for each in getattr(mechanism, name)]
+        for name in ("halves", "cables", "contacts", "guides", "rubbers")
+    }
+    extent = short_numbers(np.array(mechanism.extent))
+    picture = {"angle": mechanism.angle, **lines, "extent": extent, "remark": mechanism.remark}
+    return {"angle": angle, "mechanism": picture, "reason": ""}
 
 
 def short_numbers(values: Array) -> list[Any]:
@@ -98,15 +104,6 @@ def short_numbers(values: Array) -> list[Any]:
     shown = rounded.astype(object)
     shown[~finite] = None
     return list(shown.tolist())
-
-
-def _lines(mechanism: Mechanism) -> dict[str, Any]:
-    lines = {
-        name: [short_numbers(_fewer(each)) for each in getattr(mechanism, name)]
-        for name in ("halves", "cables", "contacts", "guides", "rubbers")
-    }
-    extent = short_numbers(np.array(mechanism.extent))
-    return {"angle": mechanism.angle, **lines, "extent": extent, "remark": mechanism.remark}
 
 
 def _fewer(points: Array) -> Array:

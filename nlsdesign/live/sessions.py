@@ -43,7 +43,13 @@ class Uploads:
         left. ``announced``: its length in bytes, where the page says it.
         """
         kept = plain_name(name)
-        self._require_place(kept, name)
+        # Refuse a file that would take the place of another: one of two records would be lost unseen.
+        other = self._names.get(kept, name) if kept in self._sizes else name
+        if other != name:
+            raise NlsError(
+                f"file '{name[:80]}'", f"would take the place of '{other[:80]}': here both are called {kept}",
+                next_step="rename one of them, with letters of English, digits, '-' and '_'",
+            )  # fmt: skip
         others = sum(size for each, size in self._sizes.items() if each != kept)
         if kept not in self._sizes and len(self._sizes) >= FILES:
             raise TooLargeError(
@@ -69,15 +75,6 @@ class Uploads:
             raise
         self._sizes[kept], self._names[kept] = size, name
         return kept
-
-    def _require_place(self, kept: str, name: str) -> None:
-        """Refuse a file that would take the place of another: one of two records would be lost unseen."""
-        other = self._names.get(kept, name) if kept in self._sizes else name
-        if other != name:
-            raise NlsError(
-                f"file '{name[:80]}'", f"would take the place of '{other[:80]}': here both are called {kept}",
-                next_step="rename one of them, with letters of English, digits, '-' and '_'",
-            )  # fmt: skip
 
     def clear(self) -> None:
         """Remove all files."""

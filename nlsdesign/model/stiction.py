@@ -107,7 +107,18 @@ def _solved(
     cleaned = ca.vertsplit(builder.cleaned(ca.vertcat(*builder.derivatives.values())))
     rates = dict(zip(builder.derivatives, cleaned, strict=True))
     for constraint in constraints:
-        _check_rate(builder, constraint)
+        known = {
+            e.element_hash()
+            for group in (builder.states, builder.inputs, builder.parameters)
+            for _, e in group.values()
+        }
+        known |= {s.mode.element_hash() for s in builder.jumps}
+        inside = [s.element_hash() for s in ca.symvar(constraint.rate)]
+        if not inside or not known.issuperset(inside):
+            raise ArrangementError(
+                constraint.name, "its rate is itself an unknown, as in series with another element",
+                next_step=f"tie it directly between two bodies, or {_SMOOTH}",
+            )  # fmt: skip
     accelerations = ca.vertcat(*[_acceleration(builder, h.rate, rates) for h in constraints])
     matrix = ca.jacobian(accelerations, efforts)
     moving = builder.cleaned(ca.vertcat(*[h.moving for h in constraints]))
@@ -139,21 +150,6 @@ def _eliminated(rows: list[Expression], right: list[Expression]) -> Expression:
         rest = sum((rows[i][k] * solution[k] for k in range(i + 1, count)), start=ca.SX(0))
         solution[i] = (right[i] - rest) / rows[i][i]
     return ca.vertcat(*[solution[i] for i in range(count)])
-
-
-def _check_rate(builder: EquationBuilder, constraint: StictionConstraint) -> None:
-    known = {
-        e.element_hash()
-        for group in (builder.states, builder.inputs, builder.parameters)
-        for _, e in group.values()
-    }
-    known |= {s.mode.element_hash() for s in builder.jumps}
-    inside = [s.element_hash() for s in ca.symvar(constraint.rate)]
-    if not inside or not known.issuperset(inside):
-        raise ArrangementError(
-            constraint.name, "its rate is itself an unknown, as in series with another element",
-            next_step=f"tie it directly between two bodies, or {_SMOOTH}",
-        )  # fmt: skip
 
 
 def _acceleration(builder: EquationBuilder, rate: Expression, rates: Mapping[str, Expression]) -> Expression:

@@ -396,7 +396,22 @@ def _shown_torque(model: FlatModel, spring: SpringNames, record: Record, shown: 
     for cam in spring.cams:
         force = next((n for n in shown if n == cam.force or n.startswith(f"{cam.element}.")), None)
         if force is not None and model.variable(force).unit == "N":
-            arm = _along(model, record, shown, cam.lever_arm)
+            # A signal of the model along the measured states and inputs of a record.
+            s, count = model.symbols(), len(record.trace)
+            groups = []
+            for variables in (model.states, model.inputs):
+                values = np.repeat(model.start(variables)[:, None], count, axis=1)
+                for place, variable in enumerate(variables):
+                    if variable.name in shown:
+                        values[place] = shown_values(model, record, shown[variable.name])
+                groups.append(values)
+            place = next(i for i, v in enumerate(model.signals) if v.name == cam.lever_arm)
+            wanted = ca.Function("wanted", [s.state, s.input, s.parameter, s.table], [s.signal[place]])
+            states, inputs = groups
+            result: Array = wanted.map(count)(
+                states, inputs, model.start(model.parameters), np.zeros(0)
+            ).full()
+            arm = result.ravel()
             elements = model.values[cam.elements]
             return elements * arm * shown_values(model, record, shown[force])
     raise MeasurementError(
@@ -404,23 +419,6 @@ def _shown_torque(model: FlatModel, spring: SpringNames, record: Record, shown: 
         f"measures neither the torque '{spring.effort}' nor a force behind its cam",
         next_step="measure one of them to know the error of the observer",
     )
-
-
-def _along(model: FlatModel, record: Record, shown: Mapping[str, str], signal: str) -> Array:
-    """Return a signal of the model along the measured states and inputs of a record."""
-    s, count = model.symbols(), len(record.trace)
-    groups = []
-    for variables in (model.states, model.inputs):
-        values = np.repeat(model.start(variables)[:, None], count, axis=1)
-        for place, variable in enumerate(variables):
-            if variable.name in shown:
-                values[place] = shown_values(model, record, shown[variable.name])
-        groups.append(values)
-    place = next(i for i, v in enumerate(model.signals) if v.name == signal)
-    wanted = ca.Function("wanted", [s.state, s.input, s.parameter, s.table], [s.signal[place]])
-    states, inputs = groups
-    result: Array = wanted.map(count)(states, inputs, model.start(model.parameters), np.zeros(0)).full()
-    return result.ravel()
 
 
 def _draws(model: FlatModel, fits: Sequence[Fit]) -> list[dict[str, float]]:

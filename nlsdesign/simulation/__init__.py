@@ -10,11 +10,11 @@ from .driven_run import rms_against as rms_against
 from .driven_run import signal_names as signal_names
 from .driven_run import signal_sizes as signal_sizes
 from .driven_run import with_prescribed_speeds as with_prescribed_speeds
+from .input_signals import Sine, sine
 from .integrate import simulate
 from .limits_reached import limits_reached
 from .measure import measure
 from .prior import Prior, declared_prior
-from .signals import Sine, sine
 from .simulated_batch import simulate_batch
 from .trace import RangeWarning, Trace, range_warnings
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..foundation.arrays import Array
 from ..foundation.errors import ValueRangeError
 from ..model import FlatModel
-from .signals import Sine
+from .input_signals import Sine
 from .trace import Trace
 
 _MOST_ROWS = 2_000_000

@@ -80,7 +80,16 @@ def simulate(
         x0[names.index(name)] = value
     events: list[Event] = []
     if model.sample_time is not None:
-        x = _stepped(model, times, drives.samples, x0)
+        samples = np.diff(times) / float(model.sample_time or 1.0)
+        if np.any(np.abs(samples - 1.0) > 1e-6):
+            raise ValueRangeError(
+                "times", f"must lie {model.sample_time:g} s apart, the sample time of {model.name}"
+            )
+        p, x = model.start(model.parameters), np.zeros((len(x0), len(times)))
+        x[:, 0] = x0
+        for k in range(len(times) - 1):
+            w = model.look_up(list(x[:, k]), list(drives.samples[:, k]))
+            x[:, k + 1] = np.array(model.equations(times[k], x[:, k], drives.samples[:, k], p, w)[0]).ravel()
     else:
         x, events = _integrated(model, drives, x0, tolerance, translate)
     return replace(_evaluated(model, times, x, drives.samples), events=tuple(events))
@@ -108,20 +117,6 @@ def _integrated(
     if not np.all(np.isfinite(x)):
         raise ConvergenceError(f"simulation of {model.name}", "a state is not finite")
     return x, events
-
-
-def _stepped(model: FlatModel, times: Array, u: Array, x0: Array) -> Array:
-    samples = np.diff(times) / float(model.sample_time or 1.0)
-    if np.any(np.abs(samples - 1.0) > 1e-6):
-        raise ValueRangeError(
-            "times", f"must lie {model.sample_time:g} s apart, the sample time of {model.name}"
-        )
-    p, x = model.start(model.parameters), np.zeros((len(x0), len(times)))
-    x[:, 0] = x0
-    for k in range(len(times) - 1):
-        w = model.look_up(list(x[:, k]), list(u[:, k]))
-        x[:, k + 1] = np.array(model.equations(times[k], x[:, k], u[:, k], p, w)[0]).ravel()
-    return x
 
 
 def _evaluated(model: FlatModel, times: Array, x: Array, u: Array) -> Trace:

@@ -148,7 +148,25 @@ class ManySteps:
         left = self._drives.times[self._interval[going] + 1] - self._now[going]
         # A very short last step would cost as much as a full one.
         length = np.where(left <= 1.001 * self._proposed[going], left, self._proposed[going])
-        after, error, _, least, rate = self._tried(going, length)
+        # What a step of each column gives.
+        # Most columns stand at the same time, and a function of time need not be asked twice.
+        steps = np.stack([self._now[going], length, self._interval[going]])
+        steps, which = np.unique(steps, axis=1, return_inverse=True)
+        moments = steps[0][:, None] + steps[1][:, None] * self._moments
+        inputs = _inputs(self._drives, steps[2].astype(np.intp), moments)[which.ravel()]
+        count = len(going)
+        after, error, _, least, rate = self._step(
+            [
+                self._now[None, going],
+                length[None],
+                self.state[:, going],
+                inputs.reshape(count, -1).T,
+                self.numbers[:, going],
+                np.full((1, count), self._tolerance),
+                np.repeat(self._nominal, count, axis=1),
+                self._modes[:, going],
+            ]
+        )
         ended = (error[0] < LARGEST_ERROR) & (least[0] < 0.0)
         self._done[going] += 1
         for place in np.flatnonzero(ended):
@@ -157,23 +175,16 @@ class ManySteps:
         self.state[:, going[good]] = after[:, good]
         self._move(going[~ended], (length[~ended], left[~ended]), error[0, ~ended])
         self._keep(going[good], rate[:, good])
-        self._check(going[self._done[going] > self._budget[going]])
-
-    def _tried(self, going: Indices, length: Array) -> list[Array]:
-        """Return what a step of each column gives."""
-        # Most columns stand at the same time, and a function of time need not be asked twice.
-        steps = np.stack([self._now[going], length, self._interval[going]])
-        steps, which = np.unique(steps, axis=1, return_inverse=True)
-        moments = steps[0][:, None] + steps[1][:, None] * self._moments
-        inputs = _inputs(self._drives, steps[2].astype(np.intp), moments)[which.ravel()]
-        count = len(going)
-        return self._step(
-            [
-                self._now[None, going], length[None], self.state[:, going], inputs.reshape(count, -1).T,
-                self.numbers[:, going], np.full((1, count), self._tolerance),
-                np.repeat(self._nominal, count, axis=1), self._modes[:, going],
-            ]
-        )  # fmt: skip
+        columns = going[self._done[going] > self._budget[going]]
+        jumps = self._switching is not None and bool(self._switching.jumps)
+        for column in columns[~self._gone[columns]].tolist():
+            proposed, k = float(self._proposed[column]), int(self._interval[column])
+            values = {name: float(each[column]) for name, each in self._columns.items()}
+            model, state = self._model.with_values(values), self.state[:, column]
+            if not jumps and limited_by_stability(model, self._drives, k, state, proposed):
+                self.stiff.add(column)
+                self._gone[column] = True
+            self._budget[column] *= 2.0
 
     def _move(self, columns: Indices, lengths: tuple[Array, Array], error: Array) -> None:
         """Move the time of the columns whose step is good enough; propose the next steps."""
@@ -226,15 +237,3 @@ class ManySteps:
         except ConvergenceError as failed:
             self._fail(column, str(failed))
         self.state[:, column], self._modes[:, column] = stepper.state, modes.now
-
-    def _check(self, columns: Indices) -> None:
-        """Note the columns whose steps stability limits, and give the others a larger budget."""
-        jumps = self._switching is not None and bool(self._switching.jumps)
-        for column in columns[~self._gone[columns]].tolist():
-            length, k = float(self._proposed[column]), int(self._interval[column])
-            values = {name: float(each[column]) for name, each in self._columns.items()}
-            model, state = self._model.with_values(values), self.state[:, column]
-            if not jumps and limited_by_stability(model, self._drives, k, state, length):
-                self.stiff.add(column)
-                self._gone[column] = True
-            self._budget[column] *= 2.0

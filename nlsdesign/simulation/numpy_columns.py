@@ -79,25 +79,22 @@ class NumpyColumns:
         (parameters, columns).
         """
         with self._lock:
-            return self._run(state, given, parameter)
-
-    def _run(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
-        count = state.shape[1]
-        after, kept = np.empty_like(state), np.empty((len(given), len(self._graph.results[1]), count))
-        for first in range(0, count, AT_ONCE):
-            part = slice(first, min(first + AT_ONCE, count))
-            size = part.stop - part.start
-            if size not in self._made:
-                if len(self._made) >= _SIZES:
-                    self._made.clear()
-                self._made[size] = _Columns(self._graph, size)
-            columns = self._made[size]
-            with np.errstate(all="ignore"):
-                columns.begin(state[:, part], parameter[:, part])
-                for k in range(len(given)):
-                    kept[k, :, part] = columns.sample(given[k, :, part])
-            after[:, part] = columns.state
-        return after, kept
+            count = state.shape[1]
+            after, kept = np.empty_like(state), np.empty((len(given), len(self._graph.results[1]), count))
+            for first in range(0, count, AT_ONCE):
+                part = slice(first, min(first + AT_ONCE, count))
+                size = part.stop - part.start
+                if size not in self._made:
+                    if len(self._made) >= _SIZES:
+                        self._made.clear()
+                    self._made[size] = _Columns(self._graph, size)
+                columns = self._made[size]
+                with np.errstate(all="ignore"):
+                    columns.begin(state[:, part], parameter[:, part])
+                    for k in range(len(given)):
+                        kept[k, :, part] = columns.sample(given[k, :, part])
+                after[:, part] = columns.state
+            return after, kept
 
 
 class _Columns:

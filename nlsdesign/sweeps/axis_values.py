@@ -145,7 +145,9 @@ class Subject:
     def _unit_of(self, name: str, values: Sequence[Given]) -> str:
         """Return the unit in SI; that of the question's own fields is the one that is written."""
         if name in question_settings(self.question):
-            present, fixed = question_settings(self.question)[name], _units(self.question).get(name)
+            present = question_settings(self.question)[name]
+            stated = {f"{ASK}.{each.name}": unit_of_field(each) for each in dataclasses.fields(self.question)}
+            fixed = stated.get(name)
             if fixed is not None:
                 return fixed
             units = [u for u in (_written_unit(name, v) for v in (*values, present)) if u]
@@ -232,12 +234,6 @@ def unit_of_field(field: dataclasses.Field[Any]) -> str | None:
     """Return the unit in SI that a field of a question states, or ``None``."""
     unit: str | None = field.metadata.get(_UNIT)
     return unit
-
-
-def _units(question: Any) -> dict[str, str]:
-    """Return the units that the fields of a question state, by the name of their axis."""
-    stated = {each.name: unit_of_field(each) for each in dataclasses.fields(question)}
-    return {f"{ASK}.{name}": unit for name, unit in stated.items() if unit is not None}
 
 
 def _inner(holder: Any) -> dict[str, Any]:

@@ -47,7 +47,14 @@ def changed_assembly(bases: Mapping[str, Assembly], values: Mapping[str, Any]) -
         if isinstance(value, str):
             if name not in pieces:
                 raise unknown_name("piece of rubber", name, pieces)
-            made = _with_rubber(made, name, value)
+            # The assembly with another rubber; kept, since the fit of its law takes long.
+            key = (id(made), name, value)
+            if key not in _kept:
+                while len(_kept) >= _MOST_KEPT:
+                    _kept.pop(next(iter(_kept)))
+                # The base is kept beside it, so that its number stands for nothing else.
+                _kept[key] = made, with_rubber(made, material(value), piece=name)
+            made = _kept[key][1]
     known = made.quantities()
     for name, value in values.items():
         row = row_of_factor(name)
@@ -59,17 +66,6 @@ def changed_assembly(bases: Mapping[str, Assembly], values: Mapping[str, Any]) -
         elif not isinstance(value, str) and not name.startswith(f"{ASK}."):
             numbers[name] = float(value)
     return made.with_values(numbers) if numbers else made
-
-
-def _with_rubber(base: Assembly, piece: str, rubber: str) -> Assembly:
-    """Return the assembly with another rubber; kept, since the fit of its law takes long."""
-    key = (id(base), piece, rubber)
-    if key not in _kept:
-        while len(_kept) >= _MOST_KEPT:
-            _kept.pop(next(iter(_kept)))
-        # The base is kept beside it, so that its number stands for nothing else.
-        _kept[key] = base, with_rubber(base, material(rubber), piece=piece)
-    return _kept[key][1]
 
 
 def row_of_factor(name: str) -> str | None:

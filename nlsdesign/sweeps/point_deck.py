@@ -52,9 +52,6 @@ def _text(table: SweepTable, row: int, bases: dict[str, Assembly]) -> str:
     deck = table.about.get("deck", "a deck")
     lines = [f"Point {table.values['point'][row]} of a sweep of {deck}; its axes, in SI:"]
     lines += [f"{axis.name} = {values[axis.name]} {axis.unit}".rstrip() for axis in table.axes]
-    return "".join(f"# {' '.join(_printable(line).split())}\n" for line in lines) + text
-
-
-def _printable(text: str) -> str:
-    """Return a text without control characters, which a comment of TOML may not hold."""
-    return "".join(each if each.isprintable() else " " for each in text)
+    # Without control characters, which a comment of TOML may not hold.
+    printable = ["".join(each if each.isprintable() else " " for each in line) for line in lines]
+    return "".join(f"# {' '.join(line.split())}\n" for line in printable) + text

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -28,7 +28,6 @@ from .axis_values import Subject
 from .changes import DECK
 from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn, libraries
 from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
-from .sweep_parts import Parts
 from .sweep_plan import PointPlan
 from .sweep_question import PointWork, SweepQuestion
 from .sweep_table import SweepTable, read_sweep
@@ -203,34 +202,29 @@ def run_task(
         if left:
             results.unlink(missing_ok=True)
             points = ((k, task.plan.point(k)) for k in range(len(task.plan)) if not standing[k])
-            _compute(task, parts, points, executor=executor, watch=_Watch(progress, len(task.plan), left))
+            watch = _Watch(progress, len(task.plan), left)
+            rows: list[dict[str, Any]] = []
+            begin = written = time.monotonic()
+            outcomes = shared_map(
+                task.work, points, executor, count=watch.left, without_workers=watch.without_workers
+            )
+            try:
+                with contextlib.closing(outcomes):  # type: ignore[type-var]
+                    for batch in outcomes:
+                        rows += [_row(task, each) for each in batch]
+                        watch.count(batch)
+                        now = time.monotonic()
+                        patience = min(_LATEST_PART, max(_FIRST_PART, 0.02 * (now - begin)))
+                        if len(rows) >= _MOST_ROWS or now - written > patience:
+                            parts.write(rows)
+                            rows, written = [], now
+            finally:
+                # Also when the run is interrupted: what has come is not computed again.
+                parts.write(rows)
         if left or not results.exists():
             progress.note("writing the table")
             parts.finish()
     return read_sweep(folder)
-
-
-def _compute(
-    task: SweepTask, parts: Parts, points: Iterator[tuple[int, Any]], *, executor: Executor, watch: _Watch
-) -> None:
-    rows: list[dict[str, Any]] = []
-    begin = written = time.monotonic()
-    outcomes = shared_map(
-        task.work, points, executor, count=watch.left, without_workers=watch.without_workers
-    )
-    try:
-        with contextlib.closing(outcomes):  # type: ignore[type-var]
-            for batch in outcomes:
-                rows += [_row(task, each) for each in batch]
-                watch.count(batch)
-                now = time.monotonic()
-                patience = min(_LATEST_PART, max(_FIRST_PART, 0.02 * (now - begin)))
-                if len(rows) >= _MOST_ROWS or now - written > patience:
-                    parts.write(rows)
-                    rows, written = [], now
-    finally:
-        # Also when the run is interrupted: what has come is not computed again.
-        parts.write(rows)
 
 
 def _row(task: SweepTask, outcome: PointOutcome) -> dict[str, Any]:

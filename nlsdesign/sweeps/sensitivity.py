@@ -221,21 +221,17 @@ def _from_data(
             return AnswerSensitivity(
                 name, "", len(values), refusal=f"axis {axis} has fewer than ten points for each of its names"
             )
-        indices.append(SensitivityIndex(axis, *_correlation_ratio(column, values)))
+        groups = np.unique(codes(column), return_inverse=True)[1].ravel()
+        random = np.random.default_rng(_SEED)
+        drawn = []
+        for _ in range(_DRAWS):
+            rows = random.integers(len(values), size=len(values))
+            drawn.append(_between_groups(groups[rows], values[rows]))
+        correlation_ratio = (_between_groups(groups, values), float(1.96 * np.nanstd(drawn, ddof=1)))
+        indices.append(SensitivityIndex(axis, *correlation_ratio))
     if steps:
         methods.append(f"correlation ratio for {', '.join(steps)}, intervals by bootstrap")
     return AnswerSensitivity(name, "; ".join(methods), len(values), _ordered(indices), tuple(remarks))
-
-
-def _correlation_ratio(column: NDArray[Any], values: Array) -> tuple[float, float]:
-    """Return the share of the variance between groups, corrected for their number, and half its interval."""
-    groups = np.unique(codes(column), return_inverse=True)[1].ravel()
-    random = np.random.default_rng(_SEED)
-    drawn = []
-    for _ in range(_DRAWS):
-        rows = random.integers(len(values), size=len(values))
-        drawn.append(_between_groups(groups[rows], values[rows]))
-    return _between_groups(groups, values), float(1.96 * np.nanstd(drawn, ddof=1))
 
 
 def _between_groups(groups: NDArray[Any], values: Array) -> float:

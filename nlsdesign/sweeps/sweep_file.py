@@ -73,10 +73,13 @@ def read_sweep_file(path: Path | str) -> SweepTask:
         if key not in _TABLES:
             raise unknown_name(deck.place(key), key, _TABLES)
     assemblies = _assemblies(deck, file.parent)
-    axes = [
-        _beside(_axes(deck, number, given), file.parent)
-        for number, given in enumerate(_axes_tables(deck), start=1)
-    ]
+    tables = deck.tables.get("axes")
+    if not isinstance(tables, list) or not tables:
+        raise DeckError(
+            deck.place("axes"), "no axes are given",
+            next_step='write [[axes]] and then GridAxis = {name = "...", lower = 1, upper = 2, count = 5}',
+        )  # fmt: skip
+    axes = [_beside(_axes(deck, number, given), file.parent) for number, given in enumerate(tables, start=1)]
     question = _question(deck)
     task = sweep_task(assemblies, axes=axes, ask=question)
     try:
@@ -102,16 +105,6 @@ def _assemblies(deck: Deck, folder: Path) -> dict[str, Assembly]:
             raise DeckError(deck.place("decks"), f"names '{short}' twice", next_step="leave one out")
         made[short] = declare(read)
     return made
-
-
-def _axes_tables(deck: Deck) -> list[Any]:
-    given = deck.tables.get("axes")
-    if not isinstance(given, list) or not given:
-        raise DeckError(
-            deck.place("axes"), "no axes are given",
-            next_step='write [[axes]] and then GridAxis = {name = "...", lower = 1, upper = 2, count = 5}',
-        )  # fmt: skip
-    return given
 
 
 def _axes(deck: Deck, number: int, given: Any) -> AxisSet:

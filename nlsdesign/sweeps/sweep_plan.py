@@ -11,7 +11,7 @@ from dataclasses import asdict
 from typing import Any
 
 from ..foundation.errors import ValueRangeError
-from .axes import AxisSet, BoundAxes
+from .axes import AxisSet
 from .axis_values import Subject
 from .changes import row_of_factor
 from .sweep_columns import SALTELLI, SweepColumn
@@ -36,8 +36,34 @@ class PointPlan:
                 next_step="split it by an axis, with a folder for each stretch",
             )  # fmt: skip
         self.columns: tuple[SweepColumn, ...] = tuple(c for each in self._sets for c in each.columns)
-        _require_apart(self.columns)
-        _require_alone(self._sets)
+        # Refuse axes that change the same number.
+        for name, times in Counter(column.name for column in self.columns).items():
+            if times > 1:
+                raise ValueRangeError(
+                    f"axis '{name}'", f"stands {times} times: its points collide",
+                    next_step="keep one of them",
+                )  # fmt: skip
+        names = {column.name for column in self.columns}
+        for name in names:
+            row = row_of_factor(name)
+            inside = sorted(each for each in names if row is not None and each.partition("[")[0] == row)
+            if inside:
+                raise ValueRangeError(
+                    f"axes '{name}' and '{inside[0]}'", "change the same number: their points collide",
+                    next_step="keep one of them",
+                )  # fmt: skip
+        # Refuse a Saltelli plan that is crossed: crossed blocks are no plan, and what they give is no share.
+        for plan in self._sets:
+            others = [
+                c.name for each in self._sets if each is not plan and each.count > 1 for c in each.columns
+            ]
+            if others and any(column.kind == SALTELLI for column in plan.columns):
+                raise ValueRangeError(
+                    f"Saltelli sample over {', '.join(column.name for column in plan.columns)}",
+                    f"is crossed with axis {', '.join(others)}: shares of the variance need it to be alone",
+                    next_step="put a number among its ranges, and give each word a sweep and a folder of its "
+                    "own",
+                )  # fmt: skip
 
     def __len__(self) -> int:
         return math.prod(each.count for each in self._sets)
@@ -74,34 +100,3 @@ class PointPlan:
             if each.count <= _PROBES**2:
                 content.append([list(map(repr, each.row(k))) for k in range(each.count)])
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
-
-
-def _require_apart(columns: Sequence[SweepColumn]) -> None:
-    """Refuse axes that change the same number."""
-    for name, times in Counter(column.name for column in columns).items():
-        if times > 1:
-            raise ValueRangeError(
-                f"axis '{name}'", f"stands {times} times: its points collide",
-                next_step="keep one of them",
-            )  # fmt: skip
-    names = {column.name for column in columns}
-    for name in names:
-        row = row_of_factor(name)
-        inside = sorted(each for each in names if row is not None and each.partition("[")[0] == row)
-        if inside:
-            raise ValueRangeError(
-                f"axes '{name}' and '{inside[0]}'", "change the same number: their points collide",
-                next_step="keep one of them",
-            )  # fmt: skip
-
-
-def _require_alone(sets: Sequence[BoundAxes]) -> None:
-    """Refuse a Saltelli plan that is crossed: crossed blocks are no plan, and what they give is no share."""
-    for plan in sets:
-        others = [c.name for each in sets if each is not plan and each.count > 1 for c in each.columns]
-        if others and any(column.kind == SALTELLI for column in plan.columns):
-            raise ValueRangeError(
-                f"Saltelli sample over {', '.join(column.name for column in plan.columns)}",
-                f"is crossed with axis {', '.join(others)}: shares of the variance need it to be alone",
-                next_step="put a number among its ranges, and give each word a sweep and a folder of its own",
-            )  # fmt: skip

@@ -280,12 +280,17 @@ def _estimated(
     # Of a number that shares its part in a product the records tell a share of the strain only.
     left = np.diag(unknowns.root @ covariance[:size, :size] @ unknowns.root.T) / scale**2
     doubt = strain / np.sqrt(np.maximum(1.0 - left, _LEAST_TOLD))
+    # How often numbers as declared would move as far in the directions that the records tell.
+    strength, axes = np.linalg.eigh(covariance[:size, :size])
+    informed = strength < _TELLS
+    squares = float(np.sum((axes[:, informed].T @ y[:size]) ** 2))
+    chance = float(scipy.stats.chi2.sf(squares, max(1, int(np.sum(informed)))))
     return Estimate(
         known,
         after,
         dict(zip(unknowns.shapes, strain.tolist(), strict=True)),
         dict(zip(unknowns.shapes, doubt.tolist(), strict=True)),
-        _chance(y[:size], covariance[:size, :size]),
+        chance,
         misfits,
         _told_by(unknowns, fitted_pieces, after),
         tuple(bench.source for bench in unknowns.benches),
@@ -304,14 +309,6 @@ def _covariance(
         residual, slope = huber_rows(piece.residual, piece.slope, _HUBER)
         robust.append(piece._replace(residual=residual, slope=slope))
     return robust_covariance(robust, np.eye(unknowns.count))
-
-
-def _chance(y: Array, covariance: Array) -> float:
-    """Return how often numbers as declared would move as far in the directions that the records tell."""
-    strength, axes = np.linalg.eigh(covariance)
-    informed = strength < _TELLS
-    squares = float(np.sum((axes[:, informed].T @ y) ** 2))
-    return float(scipy.stats.chi2.sf(squares, max(1, int(np.sum(informed)))))
 
 
 def _told_by(

@@ -55,7 +55,13 @@ class _Sweep(NamedTuple):
 
 def planned_bench(model: FlatModel, kind: CalibrationTest, known: Prior) -> BenchEvidence:
     """Return a bench with the runs that are planned for a kind of calibration."""
-    channels = _cells(model)
+    # The readings of efforts.
+    efforts = {"N", "N*m"}
+    channels = [
+        r.signal
+        for r in model.readings
+        if model.variable(reading_of(model.readings, r.signal).measured).unit in efforts
+    ]
     response = bench_response(model, bench_prior(model, known), channels)
     share = 1.0
     while True:
@@ -72,16 +78,6 @@ def planned_bench(model: FlatModel, kind: CalibrationTest, known: Prior) -> Benc
                 f"needs more than {_CURRENT:g} of the limit of its drive for any motion worth the name",
                 next_step="check the limit of the current in the deck",
             )
-
-
-def _cells(model: FlatModel) -> list[str]:
-    """Return the readings of efforts."""
-    efforts = {"N", "N*m"}
-    return [
-        r.signal
-        for r in model.readings
-        if model.variable(reading_of(model.readings, r.signal).measured).unit in efforts
-    ]
 
 
 def sweep_end(model: FlatModel) -> float:
@@ -108,20 +104,16 @@ def _sweeps(
         size = share * _FREE_SPEED * (1.0 + 0.5 * np.sin(0.31 * turn * time))
         return [_Sweep("free run", step, np.cumsum(size * _begun(time) * np.sin(turn * time)) * step, 0.0)]
     end = share * sweep_end(model) * drive_ratio(model)
-    both = _pulls_both_ways(response, end)
+    # Whether the spring resists to both sides.
+    still = np.zeros(response.columns)
+    forth, back = (abs(float(response.resting(angle, still).value[0, 0])) for angle in (end, -end))
+    both = back > 0.1 * forth
     if isinstance(kind, HungWeightTest):
         held = response.resting(end, np.zeros(response.columns))
         torque = _WEIGHT * response.inertia * abs(float(held.value[0, 0])) * abs(drive_ratio(model))
         weights = (0.0, torque, -torque) if both else (0.0, torque, 2.0 * torque)
         return [_sine(f"weight {w:.3g} N·m", end, _SLOW, both)._replace(weight=w) for w in weights]
     return [_sine(f"{sweep[0]:g} Hz", end, sweep, both) for sweep in _QUICK]
-
-
-def _pulls_both_ways(response: BenchResponse, end: float) -> bool:
-    """Tell whether the spring resists to both sides."""
-    still = np.zeros(response.columns)
-    forth, back = (abs(float(response.resting(angle, still).value[0, 0])) for angle in (end, -end))
-    return back > 0.1 * forth
 
 
 def _step(window: float) -> float:

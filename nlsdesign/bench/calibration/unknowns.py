@@ -86,7 +86,12 @@ def bench_evidence(
     deviations = [instruments.zero_angle, instruments.offset * largest, instruments.weight]
     for k, channel in enumerate(channels):
         most = max(float(np.max(np.abs(run.measured[k]))) for _, run in runs)
-        deviations += [instruments.offset * most, 0.0 if _gain_is_free(model, channel) else instruments.cell]
+        # Whether the deck says itself how well the gain of a cell is known.
+        reading = reading_of(model.readings, channel)
+        gain_is_free = any(
+            "gain" in law.parameters() and bool(law.parameters()["gain"].spread) for law in reading.laws
+        )
+        deviations += [instruments.offset * most, 0.0 if gain_is_free else instruments.cell]
     body = driven_body(model)
     return BenchEvidence(
         kind.title,
@@ -97,12 +102,6 @@ def bench_evidence(
         {BALANCE: body.domain.effort_unit, **{c: model.variable(c).unit for c in channels}},
         np.array(deviations),
     )
-
-
-def _gain_is_free(model: FlatModel, channel: str) -> bool:
-    """Tell whether the deck says itself how well the gain of a cell is known."""
-    reading = reading_of(model.readings, channel)
-    return any("gain" in law.parameters() and bool(law.parameters()["gain"].spread) for law in reading.laws)
 
 
 def recorded_bench(

@@ -476,7 +476,16 @@ class StackedRows:
     def __call__(self, x: Array) -> tuple[Array, Array]:
         """Return residuals and slopes of priors and evidence, one below the other."""
         if self._last is None or self._last[0] != x.tobytes():
-            self._last = x.tobytes(), self._evaluated(x)
+            rows, slopes = ([each] for each in self.prior_rows(x))
+            for each in self._evidence:
+                residual, wide = self.of(each, x)
+                if each.driven.stiff and self._known is not None:
+                    residual, wide = huber_rows(residual, wide, _HUBER)
+                    bound = self._known.get((each.driven.block.name, each.record.name), math.inf)
+                    residual, wide = bounded_total(residual, wide, max(bound, float(len(residual))))
+                rows.append(residual)
+                slopes.append(wide)
+            self._last = x.tobytes(), (np.concatenate(rows), np.vstack(slopes))
         return self._last[1]
 
     def of(self, each: Evidence, x: Array) -> tuple[Array, Array]:
@@ -490,18 +499,6 @@ class StackedRows:
         if each.driven.stiff:
             wide[np.abs(wide).max(axis=1) > _OUTLYING_SLOPE] = 0.0
         return residual, wide
-
-    def _evaluated(self, x: Array) -> tuple[Array, Array]:
-        rows, slopes = ([each] for each in self.prior_rows(x))
-        for each in self._evidence:
-            residual, wide = self.of(each, x)
-            if each.driven.stiff and self._known is not None:
-                residual, wide = huber_rows(residual, wide, _HUBER)
-                bound = self._known.get((each.driven.block.name, each.record.name), math.inf)
-                residual, wide = bounded_total(residual, wide, max(bound, float(len(residual))))
-            rows.append(residual)
-            slopes.append(wide)
-        return np.concatenate(rows), np.vstack(slopes)
 
 
 def covariance_of(residual: Array, slope: Array, priors: int) -> Array:

@@ -107,7 +107,17 @@ class Windows:
         self.inputs = inputs
         self.measured = np.array([record.as_computed(name) for name in wiring.outputs])
         # Motion and speed that are measured tell where a window begins.
-        self.seen = _seen(model, wiring, record)
+        seen = {}
+        names = [v.name for v in model.states]
+        for signal, output in wiring.outputs.items():
+            if output in names:
+                seen[names.index(output)] = record.trace[signal]
+                body = body_moved_by(model.bodies, output)
+                if body and body.rate in names and body.rate not in wiring.outputs.values():
+                    time_span = rate_span([record], signal)
+                    rate = derivative(record.trace[signal], record.step, order=1, span=time_span)
+                    seen[names.index(body.rate)] = rate
+        self.seen = seen
 
     @classmethod
     def only(cls, whole: Windows, number: int) -> Windows:
@@ -131,20 +141,6 @@ class Windows:
         for i, values in self.seen.items():
             start[:, i] = values[self.places]
         return start
-
-
-def _seen(model: FlatModel, wiring: Wiring, record: Record) -> dict[int, Array]:
-    seen = {}
-    names = [v.name for v in model.states]
-    for signal, output in wiring.outputs.items():
-        if output in names:
-            seen[names.index(output)] = record.trace[signal]
-            body = body_moved_by(model.bodies, output)
-            if body and body.rate in names and body.rate not in wiring.outputs.values():
-                span = rate_span([record], signal)
-                rate = derivative(record.trace[signal], record.step, order=1, span=span)
-                seen[names.index(body.rate)] = rate
-    return seen
 
 
 class Shooter:

@@ -253,7 +253,9 @@ class Builder:
         kind = self.classes[name]
         if issubclass(kind, Sensor) and not isinstance(table.get("of"), str):
             self.problem(path, f"{name} needs 'of'", next_step='add of = "...", the signal that it reads')
-        if issubclass(kind, Transmission) and not _is_pair(table.get("between")):
+        between = table.get("between")
+        paired = isinstance(between, list) and len(between) == 2 and all(isinstance(e, str) for e in between)
+        if issubclass(kind, Transmission) and not paired:
             self.problem(path, f"{name} needs 'between'", next_step='add between = ["motor", "wheel"]')
         return kind
 
@@ -322,10 +324,6 @@ def _domain_of(kind: type[Part], given: Mapping[str, Quantity], inner: Part | No
         for name, template in templates(holder).items()
     }
     return domain_by_units(kind.domains(), named, given)
-
-
-def _is_pair(raw: object) -> bool:
-    return isinstance(raw, list) and len(raw) == 2 and all(isinstance(end, str) for end in raw)
 
 
 def _without_one_behind(has_cam: bool, names: list[str]) -> DeckError:

@@ -244,27 +244,22 @@ def arrangement_problems(
             )
     yield from transmission_problems(parts, unreadable)
     yield from chain_problems(parts)
-    yield from _twofold(parts)
-
-
-def _twofold(parts: Sequence[tuple[str, Part]]) -> Iterator[tuple[str, NlsError]]:
-    """Yield the ties that bring dry friction where another one has brought it between the same bodies."""
     first: dict[frozenset[str], str] = {}
-    for name, part in parts:
-        if not isinstance(part, Tie) or not _rubs(part.element):
+    for path, tie in parts:
+        if not isinstance(tie, Tie) or not _rubs(tie.element):
             continue
-        ends = frozenset(part.between)
+        ends = frozenset(tie.between)
         if ends in first:
-            where = " and ".join(f"'{end}'" for end in part.between)
+            where = " and ".join(f"'{end}'" for end in tie.between)
             yield (
-                name,
+                path,
                 ArrangementError(
-                    f"parts '{first[ends]}' and '{name}'",
+                    f"parts '{first[ends]}' and '{path}'",
                     f"both bring dry friction to {where}, and hold the same motion",
                     next_step="take one of them, with the sum of both",
                 ),
             )
-        first.setdefault(ends, name)
+        first.setdefault(ends, path)
 
 
 def _rubs(element: Element) -> bool:

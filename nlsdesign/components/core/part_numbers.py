@@ -79,12 +79,9 @@ class ParameterInfo:
                 continue
             if same_dimension(unit, self.unit) and self.minimum <= number * factor <= self.maximum:
                 return f"was '{unit}' meant? {with_unit(f'{number:g}', unit)} is in the range"
-        return self._unconverted(given)
-
-    def _unconverted(self, given: Quantity) -> str | None:
-        """Return the next step where numbers in the shown unit were taken for numbers in SI."""
-        factor = parse_unit(given.unit).factor
-        if factor == 1.0 or not all(self.minimum <= v * factor <= self.maximum for v in given.values):
+        # The next step where numbers in the shown unit were taken for numbers in SI.
+        of_unit = parse_unit(given.unit).factor
+        if of_unit == 1.0 or not all(self.minimum <= v * of_unit <= self.maximum for v in given.values):
             return None
         numbers = [f"{v:g}" for v in given.values[:_SHOWN]] + ["..."] * (len(given.values) > _SHOWN)
         row = ", ".join(numbers)

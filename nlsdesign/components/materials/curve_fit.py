@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -59,13 +59,12 @@ def fit_curve(strains: Sequence[float], stresses: Sequence[float], *, like: Quan
     if np.any(stress <= 0.0):
         raise ValueRangeError("curve with stresses of zero or less", "rubber in tension has positive stress")
     forms = (_yeoh(strain, stress, like), _ogden(strain, stress, like), _engaging(strain, stress, like))
-    fits = [_judged(law, values / stress - 1.0) for form in forms for law, values in form]
+    fits = []
+    for law, values in chain(*forms):
+        errors = values / stress - 1.0
+        fits.append(CurveFit(law, float(np.sqrt(np.mean(errors**2))), float(np.max(np.abs(errors)))))
     # To a tenth of a per mille, so that what is alike stays in the order above on every processor.
     return min(fits, key=lambda fit: round(fit.rms_error, 4))
-
-
-def _judged(law: FittedLaw, errors: Array) -> CurveFit:
-    return CurveFit(law, float(np.sqrt(np.mean(errors**2))), float(np.max(np.abs(errors))))
 
 
 def _yeoh(strain: Array, stress: Array, like: Quantity) -> Iterator[tuple[FittedLaw, Array]]:

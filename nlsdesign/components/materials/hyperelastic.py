@@ -8,7 +8,6 @@ piece.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -112,6 +111,11 @@ class Ogden(Hyperelastic):
     Each product μₚ·αₚ must be positive, which makes the stress rise with the strain. Three pairs follow
     unfilled rubber to a stretch of 7. Source: Ogden 1972.
 
+    Raises
+    ------
+    ValueRangeError
+        If a modulus has no exponent, or their product is not positive.
+
     Examples
     --------
     >>> Ogden(moduli=(0.618e6, 1.18e3, -9.81e3), exponents=(1.3, 5.0, -2.0)).title()
@@ -123,7 +127,20 @@ class Ogden(Hyperelastic):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_ogden(self.moduli.values, self.exponents.values)
+        moduli = self.moduli.values
+        exponents = self.exponents.values
+        if len(moduli) != len(exponents):
+            raise ValueRangeError(
+                f"moduli ({len(moduli)}) and exponents ({len(exponents)})",
+                "there must be one exponent per modulus",
+            )
+        for modulus, exponent in zip(moduli, exponents, strict=True):
+            if not modulus * exponent > 0.0:
+                raise ValueRangeError(
+                    f"modulus {modulus:g} Pa with exponent {exponent:g}",
+                    "their product must be positive, or the stress falls as the strain rises",
+                    next_step="give both the same sign",
+                )
 
     @property
     def range_of_form(self) -> Range:
@@ -183,18 +200,3 @@ class ExtendedTube(Hyperelastic):
 def _first_invariant(stretch: Expression) -> Expression:
     """Return I₁ − 3."""
     return stretch**2 + 2 / stretch - 3
-
-
-def _check_ogden(moduli: Sequence[float], exponents: Sequence[float]) -> None:
-    if len(moduli) != len(exponents):
-        raise ValueRangeError(
-            f"moduli ({len(moduli)}) and exponents ({len(exponents)})",
-            "there must be one exponent per modulus",
-        )
-    for modulus, exponent in zip(moduli, exponents, strict=True):
-        if not modulus * exponent > 0.0:
-            raise ValueRangeError(
-                f"modulus {modulus:g} Pa with exponent {exponent:g}",
-                "their product must be positive, or the stress falls as the strain rises",
-                next_step="give both the same sign",
-            )

@@ -186,7 +186,23 @@ def _cited(material: Material, known: Property, how: str = "") -> Quantity:
 
 def _from_constants(material: Material, known: Property) -> tuple[tuple[str, Element], ...]:
     if known.name.startswith(_ENGAGING):
-        return _engaging(material, known)
+        # Moduli that engage, and the branch of the same publication: names that end alike.
+        moduli, end = _cited(material, known), known.name.removeprefix(_ENGAGING)
+        strain = known.conditions["strain"]
+        reach = f"largest_strain{end}"
+        data: Reading = NotDeclared()
+        if reach in material:
+            data = FittedRange(_cited(material, material[reach]))
+        knots = replace(strain, source=moduli.source)
+        members: tuple[tuple[str, Element], ...] = (
+            ("stiff", StrainStiffening(modulus=moduli, knots=knots, data=data)),
+        )
+        names = f"relaxing_modulus{end}", f"viscosity{end}"
+        if all(name in material for name in names):
+            modulus, viscosity = (_cited(material, material[name]) for name in names)
+            spring, dashpot = LinearElastic(modulus=modulus), ViscousMaterial(viscosity=viscosity)
+            members += (("relaxing", series(spring=spring, dashpot=dashpot)),)
+        return members
     law: FittedLaw
     if known.name.startswith(_OGDEN):
         exponents = material[known.name.replace("moduli", "exponents")]
@@ -194,26 +210,6 @@ def _from_constants(material: Material, known: Property) -> tuple[tuple[str, Ele
     else:
         law = NeoHooke(shear_modulus=_cited(material, known))
     return (("stiff", law),)
-
-
-def _engaging(material: Material, known: Property) -> tuple[tuple[str, Element], ...]:
-    """Return moduli that engage, and the branch of the same publication: names that end alike."""
-    moduli, end = _cited(material, known), known.name.removeprefix(_ENGAGING)
-    strain = known.conditions["strain"]
-    reach = f"largest_strain{end}"
-    data: Reading = NotDeclared()
-    if reach in material:
-        data = FittedRange(_cited(material, material[reach]))
-    knots = replace(strain, source=moduli.source)
-    members: tuple[tuple[str, Element], ...] = (
-        ("stiff", StrainStiffening(modulus=moduli, knots=knots, data=data)),
-    )
-    names = f"relaxing_modulus{end}", f"viscosity{end}"
-    if all(name in material for name in names):
-        modulus, viscosity = (_cited(material, material[name]) for name in names)
-        spring, dashpot = LinearElastic(modulus=modulus), ViscousMaterial(viscosity=viscosity)
-        members += (("relaxing", series(spring=spring, dashpot=dashpot)),)
-    return members
 
 
 def _strength(material: Material) -> Reading:

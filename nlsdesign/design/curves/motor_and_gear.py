@@ -12,7 +12,6 @@ from ...foundation.errors import ArrangementError, InfeasibleError
 from ...foundation.quantity import Quantity
 from ...model import FlatModel
 from ...model.roles import driven_body, series_spring
-from ...model.structure import MotorNames, MovingBody
 from .numbers import in_si, plain
 from .target import Target
 from .task import Task, TaskCycle
@@ -119,29 +118,25 @@ def motor_and_gear(model: FlatModel) -> MotorAndGear:
             "declares no resistance of its winding, and without it there is no Joule heat",
             next_step="declare a CurrentDrivenMotor, or give MotorAndGear(..., resistance=...)",
         )
-    return _declared(model, body, body.motor, resistance)
-
-
-def _declared(model: FlatModel, body: MovingBody, motor: MotorNames, resistance: str) -> MotorAndGear:
-    numbers = model.values
+    declared = model.values
     behind = [end for end in series_spring(model).between if end in body.geared]
     ratio = 1.0
     if behind:
         turned = [1.0 if v.name == body.motion else v.start for v in model.states]
         ratio = 1.0 / model.evaluate(turned)[f"{behind[0]}.{body.domain.motion}"]
-    rotor = numbers[motor.inertia]
+    rotor = declared[body.motor.inertia]
     total = (
-        numbers.get(str(body.inertia)) or model.evaluate([v.start for v in model.states])[str(body.inertia)]
+        declared.get(str(body.inertia)) or model.evaluate([v.start for v in model.states])[str(body.inertia)]
     )
     infinite = float("inf")
     return MotorAndGear(
         inertia=rotor,
-        torque_constant=numbers[motor.torque_constant],
-        resistance=numbers[resistance],
+        torque_constant=declared[body.motor.torque_constant],
+        resistance=declared[resistance],
         gear_ratio=abs(ratio),
         output_inertia=max(total - rotor, 0.0) * ratio**2,
-        current_limit=numbers.get(motor.current_limit, infinite),
-        voltage_limit=numbers.get(f"{body.name}.voltage_limit", infinite),
+        current_limit=declared.get(body.motor.current_limit, infinite),
+        voltage_limit=declared.get(f"{body.name}.voltage_limit", infinite),
     )
 
 

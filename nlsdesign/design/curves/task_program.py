@@ -240,7 +240,16 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     which the tangents of the power proved to hold; the best end is taken.
     """
     energetic = least_energy(program).unknowns
-    starts = [energetic, _without_inertia(program, energetic)]
+    # The spring of least peak power of a motor without inertia: a linear program.
+    light = replace(program, drive=replace(program.drive, inertia=0.0, output_inertia=0.0, damping=0.0))
+    rows = light.affine()
+    torque, (matrix, offset) = rows["torque"][1][::_THIN], rows["speed"]
+    bounds = np.full(len(energetic), program.floor), np.full(len(energetic), np.inf)
+    solution = _least_largest(
+        torque[:, None] * matrix[::_THIN], torque * offset[::_THIN], light.limits(), bounds
+    )
+    without_inertia = solution if np.all(np.isfinite(solution)) else energetic
+    starts = [energetic, without_inertia]
     if len(energetic) > 1:
         starts += [np.full(len(energetic), each) for each in _linear_of_least_peak_power(program)]
     limits = program.limits()
@@ -297,15 +306,3 @@ def _least_largest(
         bounds=[*zip(*inside, strict=True), (0.0, None)],
     )
     return np.asarray(solution.x[:-1]) if solution.status == 0 else 0.5 * (inside[0] + inside[1])
-
-
-def _without_inertia(program: TaskProgram, otherwise: Array) -> Array:
-    """Return the spring of least peak power of a motor without inertia: a linear program."""
-    light = replace(program, drive=replace(program.drive, inertia=0.0, output_inertia=0.0, damping=0.0))
-    rows = light.affine()
-    torque, (matrix, offset) = rows["torque"][1][::_THIN], rows["speed"]
-    bounds = np.full(len(otherwise), program.floor), np.full(len(otherwise), np.inf)
-    solution = _least_largest(
-        torque[:, None] * matrix[::_THIN], torque * offset[::_THIN], light.limits(), bounds
-    )
-    return solution if np.all(np.isfinite(solution)) else otherwise

@@ -12,7 +12,6 @@ import numpy as np
 
 from ...foundation.errors import ExportError, missing_library
 from ...foundation.quantity import MM
-from .arc_path import ArcPath
 from .cam_part import CamPart
 
 _PRODUCT = re.compile(r"PRODUCT\('[^']*','[^']*'")
@@ -64,7 +63,30 @@ def _solid(part: CamPart) -> Any:
     floor = top - MM * part.number("groove_depth") if part.base_radius else 0.0
     shape = _cylinder(0.0, 0.0, MM * part.base_radius, floor) if part.base_radius else None
     for outline in part.outlines:
-        lip = _prism(outline, floor, top)
+        from OCP.BRepBuilderAPI import (
+            BRepBuilderAPI_MakeEdge,
+            BRepBuilderAPI_MakeFace,
+            BRepBuilderAPI_MakeWire,
+        )
+        from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+        from OCP.GC import GC_MakeArcOfCircle
+        from OCP.gp import gp_Pnt, gp_Vec
+
+        def point(place: Any) -> Any:
+            return gp_Pnt(MM * float(place[0]), MM * float(place[1]), floor)
+
+        wire = BRepBuilderAPI_MakeWire()
+        for start, end, bulge in zip(*outline.ends, strict=True):
+            if bulge == 0.0:
+                wire.Add(BRepBuilderAPI_MakeEdge(point(start), point(end)).Edge())
+                continue
+            # The middle of the arc lies bulge·chord/2 to the right of the chord's middle.
+            chord = end - start
+            middle = (start + end) / 2.0 + np.array([chord[1], -chord[0]]) * (bulge / 2.0)
+            arc = GC_MakeArcOfCircle(point(start), point(middle), point(end)).Value()
+            wire.Add(BRepBuilderAPI_MakeEdge(arc).Edge())
+        face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
+        lip = BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, top - floor)).Shape()
         shape = lip if shape is None else BRepAlgoAPI_Fuse(shape, lip).Shape()
     for hole in part.holes:
         x, y = MM * hole.centre
@@ -80,26 +102,3 @@ def _cylinder(x: float, y: float, radius: float, height: float) -> Any:
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
     return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(x, y, 0.0), gp_Dir(0.0, 0.0, 1.0)), radius, height).Shape()
-
-
-def _prism(outline: ArcPath, floor: float, top: float) -> Any:
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
-    from OCP.GC import GC_MakeArcOfCircle
-    from OCP.gp import gp_Pnt, gp_Vec
-
-    def point(place: Any) -> Any:
-        return gp_Pnt(MM * float(place[0]), MM * float(place[1]), floor)
-
-    wire = BRepBuilderAPI_MakeWire()
-    for start, end, bulge in zip(*outline.ends, strict=True):
-        if bulge == 0.0:
-            wire.Add(BRepBuilderAPI_MakeEdge(point(start), point(end)).Edge())
-            continue
-        # The middle of the arc lies bulge·chord/2 to the right of the chord's middle.
-        chord = end - start
-        middle = (start + end) / 2.0 + np.array([chord[1], -chord[0]]) * (bulge / 2.0)
-        arc = GC_MakeArcOfCircle(point(start), point(middle), point(end)).Value()
-        wire.Add(BRepBuilderAPI_MakeEdge(arc).Edge())
-    face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
-    return BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, top - floor)).Shape()

@@ -76,7 +76,16 @@ class SolvedSearch:
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
         """Contour, and the declared cam made for it; none where the contour was given."""
-        return _contour(self.search.question.cam, self.search.problem, self.best)
+        cam = self.search.question.cam
+        problem = self.search.problem
+        if problem.contour is None:
+            return contour_of_cam(cam), None
+        contour = problem.contour.made(problem.design, lambda each: problem.evaluate(each, self.best.point))
+        given = None if problem.design.cam.anchor_distance is None else contour.anchor_distance
+        fit = cam_from_profile(
+            contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES, anchor_distance=given
+        )
+        return contour, fit
 
     @cached_property
     def changes(self) -> dict[str, Quantity]:
@@ -351,17 +360,6 @@ def _designed(old: Quantity, value: float, source: str) -> Quantity:
     """Return a designed number, shown in millimetres where only metres were stated."""
     (rounded,) = significant([value])
     return replace(old.with_value(rounded, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
-
-
-def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
-    if problem.contour is None:
-        return contour_of_cam(cam), None
-    contour = problem.contour.made(problem.design, lambda each: problem.evaluate(each, best.point))
-    given = None if problem.design.cam.anchor_distance is None else contour.anchor_distance
-    fit = cam_from_profile(
-        contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES, anchor_distance=given
-    )
-    return contour, fit
 
 
 def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitState:

@@ -13,7 +13,7 @@ derivatives are exact.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -106,7 +106,12 @@ class ToleranceQuantile(Goal):
         if not rows:
             return ca.dot(weights, errors**2)
         left = ca.horzcat(*[row for _, row in rows])
-        for tangent in _orthogonal(tangents, weights):
+        result: list[Expression] = []
+        for column in tangents:
+            for other in result:
+                column = column - other * ca.dot(weights, other * column) / ca.dot(weights, other**2)
+            result.append(column)
+        for tangent in result:
             along = (weights * tangent).T @ left / (ca.dot(weights, tangent**2) + least)
             left = left - tangent @ along
         weighed = ca.diag(weights) @ left
@@ -198,16 +203,6 @@ def _weights(design: DesignPoint) -> Expression:
     importance = [design.target.weight_law(design.angles[i]) for i in range(design.angles.shape[0])]
     sizes = ca.vertcat(*importance) * (ca.vertcat(steps, 0.0) + ca.vertcat(0.0, steps))
     return sizes / ca.sum1(sizes)
-
-
-def _orthogonal(columns: Sequence[Expression], weights: Expression) -> list[Expression]:
-    """Return columns with the same span, at right angles to each other."""
-    result: list[Expression] = []
-    for column in columns:
-        for other in result:
-            column = column - other * ca.dot(weights, other * column) / ca.dot(weights, other**2)
-        result.append(column)
-    return result
 
 
 class _Sensitivities:

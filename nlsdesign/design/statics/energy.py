@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from ...components.assembly.named_parts import Assembly
-from ...foundation.arrays import Array, Mask
+from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, InfeasibleError, ValueRangeError
 from ...foundation.quantity import Quantity
 from ...model import flatten
@@ -82,7 +82,19 @@ def closed_form(
         raise ValueRangeError(f"points = {points}", "a profile needs at least three angles")
     angles = np.linspace(0.0, target.last_angle, points)
     torques = target.torque(angles)
-    extensions = _stretched(law, target.energy(angles) / elements, pretension)
+    energies = target.energy(angles) / elements
+    grid, stored = _stored(law, float(np.max(energies)), pretension)
+    cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
+    low, high = grid[cell], grid[cell + 1]
+    rest = energies - stored[cell]
+    extensions = low + (high - low) * rest / (stored[cell + 1] - stored[cell])
+    for _ in range(40):
+        missing = rest - _work(law, pretension + low, pretension + extensions)
+        force = law.force(pretension + extensions)
+        step = np.divide(missing, force, out=np.zeros_like(missing), where=force > 0.0)
+        extensions = np.clip(extensions + step, low, high)
+        if np.all(np.abs(step) <= 1e-15 * grid[-1]):
+            break
     forces = law.force(pretension + extensions)
     lever_arms = np.empty(points)
     lever_arms[0] = _first_lever_arm(law, target, elements, pretension)
@@ -110,23 +122,6 @@ def _work(law: ElasticLaw, start: Array, end: Array) -> Array:
     places = start[..., None] + half * (1.0 + _GAUSS)
     result: Array = (law.force(places) * _WEIGHTS * half).sum(axis=-1)
     return result
-
-
-def _stretched(law: ElasticLaw, energies: Array, pretension: float) -> Array:
-    """Return the extensions beyond the pretension at which one element has taken up the given energies."""
-    grid, stored = _stored(law, float(np.max(energies)), pretension)
-    cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
-    low, high = grid[cell], grid[cell + 1]
-    rest = energies - stored[cell]
-    extensions = low + (high - low) * rest / (stored[cell + 1] - stored[cell])
-    for _ in range(40):
-        missing = rest - _work(law, pretension + low, pretension + extensions)
-        force = law.force(pretension + extensions)
-        step = np.divide(missing, force, out=np.zeros_like(missing), where=force > 0.0)
-        extensions = np.clip(extensions + step, low, high)
-        if np.all(np.abs(step) <= 1e-15 * grid[-1]):
-            break
-    return extensions
 
 
 def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Array, Array]:
@@ -216,18 +211,14 @@ def unmakeable_parts(
         (hollow, "the contour would have to be hollow, and a taut cable lifts off"),
         (sharp, f"the contour is sharper than {least}"),
     ):
+        # A run of true values begins at an even edge and ends before the next one.
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
         result += [
             UnmakeablePart(
                 float(theta[a]),
-                float(theta[b]),
-                f"{reason} (radius of curvature down to {1e3 * float(rho[a : b + 1].min()):.3g} mm)",
+                float(theta[b - 1]),
+                f"{reason} (radius of curvature down to {1e3 * float(rho[a:b].min()):.3g} mm)",
             )
-            for a, b in _runs(where)
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
         ]
     return tuple(sorted(result, key=lambda part: part.first))
-
-
-def _runs(where: Mask) -> list[tuple[int, int]]:
-    """Return first and last index of each run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

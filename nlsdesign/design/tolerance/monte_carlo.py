@@ -240,11 +240,18 @@ def _effects(made: MadeSpring, with_less: _WithLess, acting: Sequence[int]) -> l
             halved, measured = (with_less.small((rows[k], left[k]), k, part) for part in (0.5, 1.0))
         else:
             halved, measured = (with_less(k, part) for part in (0.5, 1.0))
+        # The 95 % quantile for one cause, from evenly spaced shares of its distribution.
+        normal = ndtri((np.arange(_STRATA) + 0.5) / _STRATA)
+        places = made.causes[k].spread.deviate(normal)
+        nodes = np.linspace(places[0], places[-1], _NODES)
+        deviations = np.zeros((_NODES, len(made.causes)))
+        deviations[:, k] = nodes
+        errors = made.rms(CubicSpline(nodes, made.torques(deviations))(places))
         return CauseEffect(
             cause=made.causes[k],
             share=shares[0],
             share_after_trim=shares[1],
-            alone=_alone(made, k),
+            alone=float(np.quantile(errors, SHARES[-1])),
             halved=halved[0],
             measured=measured[0],
             halved_after_trim=halved[1],
@@ -252,14 +259,3 @@ def _effects(made: MadeSpring, with_less: _WithLess, acting: Sequence[int]) -> l
         )
 
     return list(parallel_map(effect, len(acting)))
-
-
-def _alone(made: MadeSpring, column: int) -> float:
-    """Return the 95 % quantile for one cause, from evenly spaced shares of its distribution."""
-    normal = ndtri((np.arange(_STRATA) + 0.5) / _STRATA)
-    places = made.causes[column].spread.deviate(normal)
-    nodes = np.linspace(places[0], places[-1], _NODES)
-    deviations = np.zeros((_NODES, len(made.causes)))
-    deviations[:, column] = nodes
-    errors = made.rms(CubicSpline(nodes, made.torques(deviations))(places))
-    return float(np.quantile(errors, SHARES[-1]))

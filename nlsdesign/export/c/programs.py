@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...foundation.arrays import Array
-from ...model.flat import FlatModel, Variable
+from ...model.flat import FlatModel
 from ..files import filled, write_all
 from .c_text import Real, comment
 from .guarded_step import GuardedModel
@@ -38,7 +38,18 @@ def sample_inputs(model: FlatModel, real: Real) -> Array:
         if variable.plausibility is None and math.isfinite(variable.minimum + variable.maximum):
             middle = (variable.minimum + variable.maximum) / 2
             half = (variable.maximum - variable.minimum) / 2
-        columns[:, i] = middle + half * _wave(variable, half, float(model.sample_time or 0.0), i)
+        slow, fast = 0.071 * (i + 1), 0.39
+        k = np.arange(SAMPLES, dtype=float)
+        if variable.plausibility is not None:
+            k *= min(
+                1.0,
+                0.5
+                * variable.plausibility.largest_rate
+                * float(model.sample_time or 0.0)
+                / (half * (0.6 * slow + 0.3 * fast)),
+            )
+        wave = np.asarray(0.6 * np.sin(slow * k + i) + 0.3 * np.sin(fast * k + 2 * i))
+        columns[:, i] = middle + half * wave
         for at, bad in ((50, math.nan), (60, math.inf), (70, -math.inf)):
             columns[at + i % 8, i] = bad
         if variable.maximum < math.inf:
@@ -49,17 +60,6 @@ def sample_inputs(model: FlatModel, real: Real) -> Array:
             columns[100 + i % 8, i] += 0.5 * half
             columns[108 + i % 4 : 112 + i % 4, i] = math.nan
     return np.vectorize(real.round, otypes=[float])(columns) if columns.size else columns
-
-
-def _wave(variable: Variable, half: float, sample_time: float, number: int) -> Array:
-    """Return a motion within ±0.9; a measured one is slow enough to be believed."""
-    slow, fast = 0.071 * (number + 1), 0.39
-    k = np.arange(SAMPLES, dtype=float)
-    if variable.plausibility is not None:
-        k *= min(
-            1.0, 0.5 * variable.plausibility.largest_rate * sample_time / (half * (0.6 * slow + 0.3 * fast))
-        )
-    return np.asarray(0.6 * np.sin(slow * k + number) + 0.3 * np.sin(fast * k + 2 * number))
 
 
 def selftest_source(c: CWriter) -> str:

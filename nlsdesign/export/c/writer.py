@@ -193,7 +193,13 @@ class CWriter:
         def walk(branch: _Branch, indent: str) -> None:
             for member, below in branch.branches.items():
                 if below.leaf is not None:
-                    remark = numbers[below.leaf.name] + _remark(below.leaf)
+                    variable = below.leaf
+                    limits = ""
+                    if variable.minimum > -float("inf") or variable.maximum < float("inf"):
+                        limits = f", {variable.minimum:.6g} to {variable.maximum:.6g}"
+                    source = f"; {variable.source}" if variable.source else ""
+                    described = comment(f"[{variable.unit}{limits}] {variable.description}{source}")
+                    remark = numbers[variable.name] + described
                     lines.append(f"{indent}{self.real} {_leaf_name(member, below)}; /* {remark} */")
                 if below.branches:
                     lines.append(f"{indent}struct {{")
@@ -454,11 +460,3 @@ def paths_in_memory(variables: Sequence[Variable]) -> dict[str, str]:
 
     walk(_tree(variables), "")
     return paths
-
-
-def _remark(variable: Variable) -> str:
-    limits = ""
-    if variable.minimum > -float("inf") or variable.maximum < float("inf"):
-        limits = f", {variable.minimum:.6g} to {variable.maximum:.6g}"
-    source = f"; {variable.source}" if variable.source else ""
-    return comment(f"[{variable.unit}{limits}] {variable.description}{source}")

@@ -27,7 +27,7 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.column_graph import ColumnGraph
 from ...simulation.column_runs import ColumnRun
 from ..c.c_text import Real
-from ..c.writer import CSource, CWriter
+from ..c.writer import CSource
 from .columns_in_c import WIDTH, ColumnsInC, sampled_run_in_c
 from .cross_compiler import (
     BASELINE,
@@ -54,9 +54,15 @@ class CompiledStep:
         self._type: Any = ctypes.c_double if source.real is Real.DOUBLE else ctypes.c_float
         with tempfile.TemporaryDirectory(prefix="nlsdesign-step-", ignore_cleanup_errors=True) as folder:
             adapter = Path(folder) / "adapter.c"
-            adapter.write_text(
-                source.writer.filled("adapter.c", _conversions(source.writer)), encoding="utf-8"
-            )
+            # C that converts between the named structures and vectors in the order of the model.
+            paths = source.writer.paths
+            conversions = {
+                "parameters": [f"to->{path} = p[{i}];" for i, path in enumerate(paths.parameters)],
+                "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(paths.inputs)],
+                "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(paths.outputs)],
+                "states": [f"x[{i}] = state->states.{path};" for i, path in enumerate(paths.states)],
+            }
+            adapter.write_text(source.writer.filled("adapter.c", conversions), encoding="utf-8")
             library = compile_library(
                 [adapter, source.source], Path(folder) / "step.so", include=[source.header.parent.resolve()],
                 flags=("-std=c99", *flags_of_environment()),
@@ -104,16 +110,6 @@ class CompiledStep:
     @staticmethod
     def _plain(values: Any, count: int) -> Array:
         return np.array(values[:count], dtype=float)
-
-
-def _conversions(c: CWriter) -> dict[str, list[str]]:
-    """Return C that converts between the named structures and vectors in the order of the model."""
-    return {
-        "parameters": [f"to->{path} = p[{i}];" for i, path in enumerate(c.paths.parameters)],
-        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(c.paths.inputs)],
-        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(c.paths.outputs)],
-        "states": [f"x[{i}] = state->states.{path};" for i, path in enumerate(c.paths.states)],
-    }
 
 
 _STEP_FLAGS = ("-std=c99", "-DGCC_HASCLASSVISIBILITY")

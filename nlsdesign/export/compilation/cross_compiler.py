@@ -152,17 +152,13 @@ def compile_library(
     if where.extension == ".dylib":
         arguments.append(f"-Wl,-install_name,@rpath/{target.name}")
     if where.extension == ".dll":
-        arguments += _windows(target.parent)
+        # Arguments that omit the start-up code of Windows libraries, see the template for the reason.
+        start = target.parent / "windows.c"
+        start.write_text(template("windows.c"), encoding="utf-8")
+        home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent
+        headers = home / "lib" / "libc" / "include" / "any-windows-any"
+        arguments += ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]
     for folder in include:
         arguments += ["-isystem", folder]
     run_compiler([*arguments, *sources, "-o", target], about=f"{sources[0].name} for {where.name}")
     return target
-
-
-def _windows(folder: Path) -> list[str | Path]:
-    """Return arguments that omit the start-up code of Windows libraries, see the template for the reason."""
-    start = folder / "windows.c"
-    start.write_text(template("windows.c"), encoding="utf-8")
-    home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent
-    headers = home / "lib" / "libc" / "include" / "any-windows-any"
-    return ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]

@@ -149,8 +149,17 @@ def prove_step(source: CSource) -> StepProof:
         )
         if not _within(induction, f"outputs_{number}", v.minimum, v.maximum)
     )
+    # The members that were not shown finite wherever they were shown, or not shown at all.
+    finite: dict[str, bool] = {}
+    for label, _, values in _SHOWN.findall(induction):
+        good = "NaN" not in values and "inf" not in values and "--" not in values
+        finite[label] = finite.get(label, True) and good
+    at_first = [label.removeprefix("at_first_") for label, good in finite.items() if not good]
+    open_members = tuple(
+        path for label, path in members.items() if not finite.get(label, False) or label in at_first
+    )
     return StepProof(
-        name=source.name, alarms=alarms, open_members=_open(induction, members), beyond=beyond,
+        name=source.name, alarms=alarms, open_members=open_members, beyond=beyond,
         loops=_loops(code), reached=reached, statements=statements, seconds=time.perf_counter() - begin,
     )  # fmt: skip
 
@@ -263,16 +272,6 @@ def _harness(source: CSource, members: dict[str, str]) -> str:
 
 def _shown(prefix: str, members: dict[str, str]) -> list[str]:
     return [f"Frama_C_show_each_{prefix}{label}(0, {path});" for label, path in members.items()]
-
-
-def _open(output: str, members: dict[str, str]) -> tuple[str, ...]:
-    """Return the members that were not shown finite wherever they were shown, or not shown at all."""
-    finite: dict[str, bool] = {}
-    for label, _, values in _SHOWN.findall(output):
-        good = "NaN" not in values and "inf" not in values and "--" not in values
-        finite[label] = finite.get(label, True) and good
-    at_first = [label.removeprefix("at_first_") for label, good in finite.items() if not good]
-    return tuple(path for label, path in members.items() if not finite.get(label, False) or label in at_first)
 
 
 def _run(words: Sequence[str] | Iterable[str], folder: Path) -> str:

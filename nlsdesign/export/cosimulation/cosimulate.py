@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
-from ...simulation.signals import Sine
+from ...simulation.input_signals import Sine
 from ...simulation.trace import Trace
 from .coupling import Stepping
 from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description, unpack
@@ -240,7 +240,18 @@ class _Run:
         self._links = tuple(self._link(target, wire) for target, wire in wires.items())
         times = [each.sample_time for each in descriptions.values() if each.sample_time is not None]
         self._step = min(times, default=DEFAULT_STEP) if stepping.step is None else stepping.step
-        _check_fast(inputs, self._step)
+        # Refuse sines of which an instance would see another signal: it gets one value a step.
+        for name, signal in inputs.items():
+            if (
+                isinstance(signal, Sine)
+                and _STEPS_OF_A_PERIOD * self._step * abs(signal.frequency) > 1.0 + 1e-9
+            ):
+                raise ValueRangeError(
+                    f"input '{name}': {signal.frequency:g} Hz",
+                    f"has {1.0 / (self._step * abs(signal.frequency)):.2g} steps to a period, at least "
+                    f"{_STEPS_OF_A_PERIOD} are needed",
+                    next_step=f"take a step of {50.0 / abs(signal.frequency):.2g} ms, or a slower sine",
+                )
 
     def result(self, parts: int) -> CoSimulation:
         """Run, and once more with half the step where that tells an error."""
@@ -248,7 +259,15 @@ class _Run:
         if plan.coupled and self._stepping.coupling.rolls_back:
             self._check_roll_back(plan)
         rows = self._rows(plan)
-        self._check_finite(plan, rows)
+        # Refuse a run in which an output is no number.
+        for column, name in enumerate(plan.columns):
+            instance, variable = split_name(name)
+            lost = np.flatnonzero(~np.isfinite(rows[:, column]))
+            if len(lost) and self._descriptions[instance].variables[variable].causality == "output":
+                raise ConvergenceError(
+                    f"instance '{instance}' at {plan.points[lost[0]]:g} s",
+                    f"its output {variable} is no number",
+                )
         columns = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(plan.columns)}
         variables = ((name, *split_name(name)) for name in columns)
         units = {name: self._descriptions[i].variables[v].unit or "1" for name, i, v in variables}
@@ -259,9 +278,24 @@ class _Run:
             order = self._stepping.coupling.order
             largest = np.max(np.abs(rows - finer), axis=0) * 2**order / (2**order - 1)
             errors = dict(zip(plan.columns, largest.tolist(), strict=True))
-            self._check_converges(plan, errors, rows)
+            # Refuse a run whose wires between continuous instances are mostly error.
+            for link in plan.coupling_links:
+                extent = float(np.ptp(rows[:, plan.columns.index(link.source)]))
+                if errors[link.source] > _MOST_ERROR * extent and extent > _AT_REST:
+                    raise ConvergenceError(
+                        f"wire from '{link.source}'",
+                        f"half the step changes it by about {errors[link.source]:.2g} of its {extent:.2g}: "
+                        f"the coupling does not converge in steps of {plan.points[1]:.3g} s",
+                        next_step="take a shorter step, or coupling=Iterated()",
+                    )
         shown = (*ends(self._descriptions, "input"), *ends(self._descriptions, "output"))
-        return CoSimulation(trace, self._step, self._system.order, self._delays(), errors, shown)
+        # The delay of each wire in s; a sampled source that computes later is one sample late.
+        periods = {name: each.sample_time or 0.0 for name, each in self._descriptions.items()}
+        delays = {
+            link.target: link.delay or (0.0 if link.fresh else periods[split_name(link.source)[0]])
+            for link in self._links
+        }
+        return CoSimulation(trace, self._step, self._system.order, delays, errors, shown)
 
     def _plan(self, parts: int) -> Plan:
         points = points_of(self._descriptions, self._links, self._stop, self._step, parts)
@@ -295,14 +329,6 @@ class _Run:
         gain = gain_to(self._descriptions, target, wire)
         return Link(target, wire.source, gain, delay_of(self._descriptions, wire), fresh)
 
-    def _delays(self) -> dict[str, float]:
-        """Return the delay of each wire in s; a sampled source that computes later is one sample late."""
-        periods = {name: each.sample_time or 0.0 for name, each in self._descriptions.items()}
-        return {
-            link.target: link.delay or (0.0 if link.fresh else periods[split_name(link.source)[0]])
-            for link in self._links
-        }
-
     def _check_roll_back(self, plan: Plan) -> None:
         ends_of = [end for link in plan.coupling_links for end in (link.target, link.source)]
         for name in dict.fromkeys(split_name(end)[0] for end in ends_of):
@@ -311,29 +337,6 @@ class _Run:
                     f"instance '{name}'",
                     "cannot keep and restore its state, which this coupling needs",
                     next_step="take coupling=Extrapolated()",
-                )
-
-    def _check_converges(self, plan: Plan, errors: Mapping[str, float], rows: Array) -> None:
-        """Refuse a run whose wires between continuous instances are mostly error."""
-        for link in plan.coupling_links:
-            extent = float(np.ptp(rows[:, plan.columns.index(link.source)]))
-            if errors[link.source] > _MOST_ERROR * extent and extent > _AT_REST:
-                raise ConvergenceError(
-                    f"wire from '{link.source}'",
-                    f"half the step changes it by about {errors[link.source]:.2g} of its {extent:.2g}: the "
-                    f"coupling does not converge in steps of {plan.points[1]:.3g} s",
-                    next_step="take a shorter step, or coupling=Iterated()",
-                )
-
-    def _check_finite(self, plan: Plan, rows: Array) -> None:
-        """Refuse a run in which an output is no number."""
-        for column, name in enumerate(plan.columns):
-            instance, variable = split_name(name)
-            lost = np.flatnonzero(~np.isfinite(rows[:, column]))
-            if len(lost) and self._descriptions[instance].variables[variable].causality == "output":
-                raise ConvergenceError(
-                    f"instance '{instance}' at {plan.points[lost[0]]:g} s",
-                    f"its output {variable} is no number",
                 )
 
 
@@ -380,18 +383,6 @@ def check_signals(
         if name in wires:
             raise ExportError(
                 f"input '{name}'", "is driven by a wire and by a signal", next_step="remove one of them"
-            )
-
-
-def _check_fast(inputs: Mapping[str, Signal], step: float) -> None:
-    """Refuse sines of which an instance would see another signal: it gets one value a step."""
-    for name, signal in inputs.items():
-        if isinstance(signal, Sine) and _STEPS_OF_A_PERIOD * step * abs(signal.frequency) > 1.0 + 1e-9:
-            raise ValueRangeError(
-                f"input '{name}': {signal.frequency:g} Hz",
-                f"has {1.0 / (step * abs(signal.frequency)):.2g} steps to a period, at least "
-                f"{_STEPS_OF_A_PERIOD} are needed",
-                next_step=f"take a step of {50.0 / abs(signal.frequency):.2g} ms, or a slower sine",
             )
 
 

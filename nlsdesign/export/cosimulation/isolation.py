@@ -129,7 +129,17 @@ class IsolatedWork:
                     child.end()
                     os.close(ours)
         if answer is None:
-            raise self._crashed(child)
+            status = child.status
+            if os.WIFSIGNALED(status):
+                number = os.WTERMSIG(status)
+                reason = f"its library crashed ({signal.Signals(number).name})"
+            else:
+                reason = f"its library ended the process (exit status {os.waitstatus_to_exitcode(status)})"
+            raise ExportError(
+                self.watch.thing,
+                f"{reason} {self._when()}{self._printed()}",
+                next_step="the binary is damaged or has a fault: get or export it again",
+            )
         if answer:
             _reraise(json.loads(answer))
         return array
@@ -182,19 +192,6 @@ class IsolatedWork:
         at = f" from {self.times[row]:g} s" if self.watch.cells[1] == Activity.STEPPING else ""
         return self.watch.doing + at
 
-    def _crashed(self, child: _Child) -> ExportError:
-        status = child.status
-        if os.WIFSIGNALED(status):
-            number = os.WTERMSIG(status)
-            reason = f"its library crashed ({signal.Signals(number).name})"
-        else:
-            reason = f"its library ended the process (exit status {os.waitstatus_to_exitcode(status)})"
-        return ExportError(
-            self.watch.thing,
-            f"{reason} {self._when()}{self._printed()}",
-            next_step="the binary is damaged or has a fault: get or export it again",
-        )
-
     def _printed(self) -> str:
         """Return the last line that the libraries printed."""
         try:
@@ -208,7 +205,19 @@ class IsolatedWork:
         """Work in the new process, say at the end how it went, and never return."""
         answer: dict[str, Any] | None
         try:
-            _made_ready(self.folder, owner)
+            # Make the new process one that can crash quietly and leaves interruptions to its owner.
+            with contextlib.suppress(OSError):  # its owner did so already
+                os.setpgid(0, 0)
+            ready_as_helper(owner, signal.SIGKILL)
+            faulthandler.disable()
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+            os.chdir(self.folder)
+            printed = os.open(self.folder / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+            nothing = os.open(os.devnull, os.O_RDONLY)
+            for descriptor, place in ((0, nothing), (1, printed), (2, printed)):
+                os.dup2(place, descriptor)
             self.work(array)
             answer = None
         except NlsError as error:
@@ -255,22 +264,6 @@ class _Child:
         if not self._ended:
             _, self.status = os.waitpid(self._number, 0)
             self._ended = True
-
-
-def _made_ready(folder: Path, owner: int) -> None:
-    """Make the new process one that can crash quietly and leaves interruptions to its owner."""
-    with contextlib.suppress(OSError):  # its owner did so already
-        os.setpgid(0, 0)
-    ready_as_helper(owner, signal.SIGKILL)
-    faulthandler.disable()
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
-    os.chdir(folder)
-    printed = os.open(folder / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    for descriptor, place in ((0, nothing), (1, printed), (2, printed)):
-        os.dup2(place, descriptor)
 
 
 def _reraise(answer: dict[str, Any]) -> NoReturn:

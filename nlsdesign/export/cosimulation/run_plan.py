@@ -54,21 +54,18 @@ def communication_points(
     breaks += [sample_times(period, stop) + delay % period for period, delay in rhythms]
     if not rhythms:
         breaks.append(step * np.arange(math.floor(stop / step + 1e-6) + 1.0))
-    merged = _merged(np.concatenate(breaks), stop, _SAME * min([step, *(period for period, _ in rhythms)]))
+    # Ascending times up to the end, those that are one by rounding taken once.
+    times = np.concatenate(breaks)
+    same = _SAME * min([step, *(period for period, _ in rhythms)])
+    ascending = np.unique(times[times <= stop + same])
+    merged: Array = ascending[np.append(True, np.diff(ascending) > same)]
+    if len(merged) > 1 and merged[-1] >= stop - same:
+        merged[-1] = stop
     gaps = np.diff(merged)
     counts = parts * np.maximum(1, np.ceil(gaps / step - 1e-6).astype(int))
     starts, lengths = np.repeat(merged[:-1], counts), np.repeat(gaps / counts, counts)
     numbers = np.arange(len(starts)) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.append(starts + numbers * lengths, merged[-1])
-
-
-def _merged(times: Array, stop: float, same: float) -> Array:
-    """Return ascending times up to the end, those that are one by rounding taken once."""
-    ascending = np.unique(times[times <= stop + same])
-    kept: Array = ascending[np.append(True, np.diff(ascending) > same)]
-    if len(kept) > 1 and kept[-1] >= stop - same:
-        kept[-1] = stop
-    return kept
 
 
 def rows_of(points: Array, times: Array) -> NDArray[np.int64]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 
 from ...foundation.errors import ExportError
-from ...model.flat import Symbols, Variable
+from ...model.flat import Symbols
 from ..c.c_text import Real, comment, identifier, string
 from ..c.controller_code import check_discrete, header_text, source_text
 from ..c.instructions import print_statements
@@ -75,19 +75,19 @@ def _head(layout: FmuLayout, token: str) -> str:
     sizes = [f"#define MODEL_{size} {number}" for size, number in numbers.items()]
     if model.sample_time is not None:
         sizes.append(f"#define MODEL_SAMPLE_TIME {Real.DOUBLE.literal(model.sample_time)}")
+    real = Real.DOUBLE
     values = {
         "name": comment(model.name),
         "description": comment(model.description),
         "token": string(token),
         "sizes": sizes,
-        "variables": [f"{_row(each.variable)}," for each in layout.reals],
+        "variables": [
+            f"{{{string(v.name)}, {real.literal(v.start)}, {real.bound(v.minimum)}, "
+            f"{real.bound(v.maximum)}}},"
+            for v in (each.variable for each in layout.reals)
+        ],
     }
     return filled("fmu_model.c", values)
-
-
-def _row(v: Variable) -> str:
-    limits = f"{Real.DOUBLE.bound(v.minimum)}, {Real.DOUBLE.bound(v.maximum)}"
-    return f"{{{string(v.name)}, {Real.DOUBLE.literal(v.start)}, {limits}}}"
 
 
 def _continuous(layout: FmuLayout) -> str:

@@ -63,14 +63,11 @@ def _flanges(model: FlatModel) -> Iterator[Terminal]:
             effort = f"{name}.reaction" if body.prescribed else f"{name}.{domain.effort}"
             attached = {motion, rate} <= inputs if body.prescribed else effort in inputs
             if attached and {motion, rate, effort} <= everything:
-                yield _flange(name, domain.name, (motion, rate, effort))
-
-
-def _flange(name: str, domain: str, variables: tuple[str, str, str]) -> Terminal:
-    *labels, kind = _MODELICA[domain]
-    kinds = ("signal", "signal", "inflow")
-    members = tuple(TerminalMember(*each) for each in zip(labels, variables, kinds, strict=True))
-    return Terminal(name, f"Where a load is attached to {name}", FLANGE, "plug", kind, members)
+                variables = (motion, rate, effort)
+                *labels, kind = _MODELICA[domain.name]
+                kinds = ("signal", "signal", "inflow")
+                members = tuple(TerminalMember(*each) for each in zip(labels, variables, kinds, strict=True))
+                yield Terminal(name, f"Where a load is attached to {name}", FLANGE, "plug", kind, members)
 
 
 def terminals(model: FlatModel) -> tuple[Terminal, ...]:

@@ -230,24 +230,6 @@ def export_modelica(model: FlatModel, path: str | Path) -> Path:
 
 def modelica_text(model: FlatModel) -> str:
     """Return a continuous model as Modelica text."""
-    _refuse(model)
-    groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
-    names = quoted_names(v.name for group in groups for v in group)
-    equations = modelica_equations(model, names)
-    name = identifier(model.name, KEYWORDS)
-    lines = [
-        *_head(model),
-        f"model {name} {string(model.description)}",
-        *_declarations(model, names, equations),
-        "equation",
-        *_equations(equations),
-        "  annotation (experiment(StopTime = 1.0, Tolerance = 1e-8));",
-        f"end {name};",
-    ]
-    return stamped("\n".join(lines) + "\n", model)
-
-
-def _refuse(model: FlatModel) -> None:
     if model.sample_time is not None or model.tables:
         raise ExportError(
             f"model '{model.name}'",
@@ -261,16 +243,27 @@ def _refuse(model: FlatModel) -> None:
             next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as "
             "FMU, which holds the sharp form",
         )
-
-
-def _head(model: FlatModel) -> list[str]:
+    groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
+    names = quoted_names(v.name for group in groups for v in group)
+    equations = modelica_equations(model, names)
+    name = identifier(model.name, KEYWORDS)
     about = comment(f"{model.name}: {model.description}")
-    return [
+    head = [
         f"/* {about}",
         "   All numbers in SI units. Relations are under noEvent: the text has no events.",
         *origin_lines(model),
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]
+    lines = [
+        *head,
+        f"model {name} {string(model.description)}",
+        *_declarations(model, names, equations),
+        "equation",
+        *_equations(equations),
+        "  annotation (experiment(StopTime = 1.0, Tolerance = 1e-8));",
+        f"end {name};",
+    ]
+    return stamped("\n".join(lines) + "\n", model)
 
 
 def _declarations(model: FlatModel, names: Mapping[str, str], equations: ModelicaEquations) -> Iterator[str]:
@@ -287,22 +280,20 @@ def _declarations(model: FlatModel, names: Mapping[str, str], equations: Modelic
             shown = f"output {kind}" if kind == "Real" and v.name in outputs else kind
             state, parameter = group is model.states, group is model.parameters
             starts = state or group is model.inputs
-            attributes = _attributes(v, starts=starts, fixed=state)
+            parts = [f"unit = {string(modelica_unit(v.unit))}"]
+            parts += [f"start = {literal(v.start)}"] if starts else []
+            parts += ["fixed = true"] if state else []
+            parts += [f"nominal = {literal(v.nominal)}"] if state else []
+            limits = {"min": v.minimum, "max": v.maximum}
+            attributes = ", ".join(
+                parts + [f"{k} = {literal(n)}" for k, n in limits.items() if abs(n) != float("inf")]
+            )
             value = f" = {literal(v.start)}" if parameter else ""
             about = f"  // {_evidence(v)}" if parameter and _evidence(v) else ""
             yield f"  {shown} {names[v.name]}({attributes}){value} {string(v.description)};{about}"
     if equations.common:
         yield "protected"
         yield from (f"  Real {name};" for name in equations.common)
-
-
-def _attributes(v: Variable, *, starts: bool, fixed: bool) -> str:
-    parts = [f"unit = {string(modelica_unit(v.unit))}"]
-    parts += [f"start = {literal(v.start)}"] if starts else []
-    parts += ["fixed = true"] if fixed else []
-    parts += [f"nominal = {literal(v.nominal)}"] if fixed else []
-    limits = {"min": v.minimum, "max": v.maximum}
-    return ", ".join(parts + [f"{k} = {literal(n)}" for k, n in limits.items() if abs(n) != float("inf")])
 
 
 def _evidence(v: Variable) -> str:

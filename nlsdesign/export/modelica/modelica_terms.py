@@ -126,7 +126,15 @@ def term(operation: int, operands: Sequence[Term]) -> Term:
     if operation == ca.OP_NOT:
         return replace(operands[0].negated(), size=size)
     if operation in (ca.OP_AND, ca.OP_OR):
-        return replace(_joined(operation, operands), size=size)
+        a, b = (each.as_truth() for each in operands)
+        not_a, not_b = a.negated(), b.negated()
+        both = Term(f"{a.inside(AND)} and {b.inside(RELATION)}", AND)
+        either = Term(f"{a.inside(OR)} or {b.inside(AND)}", OR)
+        none = Term(f"{not_a.inside(AND)} and {not_b.inside(RELATION)}", AND)
+        not_both = Term(f"{not_a.inside(OR)} or {not_b.inside(AND)}", OR)
+        one, other = (both, not_both) if operation == ca.OP_AND else (either, none)
+        joined = replace(one, opposite=(other.text, other.strength), events=True)
+        return replace(joined, size=size)
     if operation == ca.OP_IF_ELSE_ZERO:
         return _choice(operands[0].as_truth(), operands[1].as_number(), size)
     numbers = [each.as_number() for each in operands]
@@ -148,18 +156,6 @@ def term(operation: int, operands: Sequence[Term]) -> Term:
         )
     text, strength = _ARITHMETIC[operation](*numbers)
     return Term(text, strength, events=events or operation in SERIES, size=size)
-
-
-def _joined(operation: int, operands: Sequence[Term]) -> Term:
-    """Return both or either of two truth values."""
-    a, b = (each.as_truth() for each in operands)
-    not_a, not_b = a.negated(), b.negated()
-    both = Term(f"{a.inside(AND)} and {b.inside(RELATION)}", AND)
-    either = Term(f"{a.inside(OR)} or {b.inside(AND)}", OR)
-    none = Term(f"{not_a.inside(AND)} and {not_b.inside(RELATION)}", AND)
-    not_both = Term(f"{not_a.inside(OR)} or {not_b.inside(AND)}", OR)
-    one, other = (both, not_both) if operation == ca.OP_AND else (either, none)
-    return replace(one, opposite=(other.text, other.strength), events=True)
 
 
 def _choice(condition: Term, number: Term, size: int) -> Term:

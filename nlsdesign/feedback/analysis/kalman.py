@@ -183,7 +183,14 @@ class EstimateDeviation(View):
         assumed = NoiseAssumptions(sample_time=self.sample_time)
         process = assumed.process(points) if self.process is None else self.process
         measurement = self.measurement or {points.angle: declared_deviation(points.model, points.angle)}
-        _check(points, estimate, process, measurement)
+        for named in (estimate, *measurement):
+            if named not in points.output_names:
+                raise unknown_name("output", named, points.output_names)
+        for named in process:
+            if named not in points.state_names:
+                raise unknown_name("state", named, points.state_names)
+        if not all(value > 0.0 for value in measurement.values()):
+            raise ValueRangeError("measurement", "a standard deviation must be positive")
         density = np.diag([process.get(name, 0.0) ** 2 for name in points.state_names])
         wanted = points.moving.c[:, points.output_names.index(estimate)]
         rows = [points.output_names.index(name) for name in measurement]
@@ -260,16 +267,3 @@ def deviation_of(row: Array, covariance: Array) -> Array:
     known = np.all(np.isfinite(covariance), axis=(-1, -2))
     square = np.einsum("Ni,Nij,Nj->N", row, np.where(known[:, None, None], covariance, 0.0), row)
     return np.where(known, np.sqrt(np.maximum(square, 0.0)), np.inf)
-
-
-def _check(
-    points: RestPoints, estimate: str, process: Mapping[str, float], measurement: Mapping[str, float]
-) -> None:
-    for name in (estimate, *measurement):
-        if name not in points.output_names:
-            raise unknown_name("output", name, points.output_names)
-    for name in process:
-        if name not in points.state_names:
-            raise unknown_name("state", name, points.state_names)
-    if not all(value > 0.0 for value in measurement.values()):
-        raise ValueRangeError("measurement", "a standard deviation must be positive")

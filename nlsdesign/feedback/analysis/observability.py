@@ -109,7 +109,14 @@ class Observability(View):
         UnknownNameError
             If something measured is no output of the model, or a size is of something that is not in it.
         """
-        self._check(points.model)
+        outputs = {v.name for v in points.model.outputs}
+        known = outputs | {v.name for v in points.model.states}
+        for name in self.nominal:
+            if name not in known:
+                raise unknown_name("state or output", name, known)
+        for name in self.measured:
+            if name not in outputs:
+                raise unknown_name("measured output", name, outputs)
         a, c = self.scaled(points)
         _, singular, directions = np.linalg.svd(observability_matrices(a, c), full_matrices=True)
         # Directions that no row can see have the singular value zero.
@@ -152,16 +159,6 @@ class Observability(View):
         output = np.array([sizes.get(points.output_names[i], 1.0) for i in chosen])
         a = self.time_scale * points.moving.a * state[None, :] / state[:, None]
         return a, points.moving.c[:, chosen] * state[None, :] / output[:, None]
-
-    def _check(self, model: FlatModel) -> None:
-        outputs = {v.name for v in model.outputs}
-        known = outputs | {v.name for v in model.states}
-        for name in self.nominal:
-            if name not in known:
-                raise unknown_name("state or output", name, known)
-        for name in self.measured:
-            if name not in outputs:
-                raise unknown_name("measured output", name, outputs)
 
     def _columns(self, points: RestPoints) -> tuple[Variable, ...]:
         scale = f"scaled, time scale {self.time_scale:g} s, mode {points.moving.name!r}"
@@ -516,7 +513,11 @@ class _Search:
         minima = np.flatnonzero(lower & undisturbed)
         lowest = self._refined(at[minima], at[minima + 2], _lowest)
         singles = np.concatenate([singles, lowest[self._are_zeros(lowest)]])
-        return [self._drop(float(each)) for each in singles] + [self._run(at, rows) for rows in _runs(lost)]
+        # The rows of each unbroken run of true flags.
+        groups = groupby(range(len(lost)), key=lambda row: bool(lost[row]))
+        return [self._drop(float(each)) for each in singles] + [
+            self._run(at, rows) for rows in [list(rows) for true, rows in groups if true]
+        ]
 
     def stuck(self, whole: RestPoints) -> Unseen | None:
         """Return what is not seen while dry friction holds, in the middle of the sweep."""
@@ -614,9 +615,3 @@ def _lowest(_: Array, smallest: Array) -> tuple[Indices, Indices]:
     """Return the two parts around the smallest value."""
     least = np.argmin(smallest, axis=-1)
     return np.maximum(least - 1, 0), np.minimum(least + 1, smallest.shape[-1] - 1)
-
-
-def _runs(flags: Mask) -> list[list[int]]:
-    """Return the rows of each unbroken run of true flags."""
-    groups = groupby(range(len(flags)), key=lambda row: bool(flags[row]))
-    return [list(rows) for true, rows in groups if true]

@@ -373,8 +373,11 @@ def rest_points(
     states = rest_states(model, at, angle=angle, consistent=consistent)
     if like is not None:
         sizes = like.sizes
+    elif consistent:
+        largest = [float(size) if size > 0.0 else 1.0 for size in np.max(np.abs(states), axis=0)]
+        sizes = dict(zip((v.name for v in model.states), largest, strict=True))
     else:
-        sizes = _sizes(model, states) if consistent else typical_sizes(model, at, angle=angle)
+        sizes = typical_sizes(model, at, angle=angle)
     s = model.symbols()
     slopes = [ca.jacobian(of, by) for of in (s.derivative, s.output) for by in (s.state, s.input)]
     results = evaluate_at(model, s, [s.derivative, s.output, *slopes], states)
@@ -398,8 +401,3 @@ def _speed(model: FlatModel, at: Array, rates: Array, rate: str) -> float:
     place = [v.name for v in model.states].index(rate)
     speed = float(np.sqrt(np.max(np.abs(at)) * np.max(np.abs(rates[:, place]))))
     return speed if speed > 0.0 else 1.0
-
-
-def _sizes(model: FlatModel, states: Array) -> dict[str, float]:
-    largest = np.max(np.abs(states), axis=0)
-    return {v.name: float(size) if size > 0.0 else 1.0 for v, size in zip(model.states, largest, strict=True)}

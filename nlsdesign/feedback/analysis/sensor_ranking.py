@@ -363,17 +363,14 @@ def _usual(
         candidates.append(SensorCandidate("current sensor", {CURRENT: given.current_sensor * current}))
     else:
         left_out.append("current sensor: nothing drives the measured body by a current here")
-    candidates += _of_the_load(points, left_out) + _declared(points, estimate)
-    return candidates, tuple(left_out)
-
-
-def _of_the_load(points: RestPoints, left_out: list[str]) -> list[SensorCandidate]:
     model = points.model
     others = [b for b in model.bodies if not b.prescribed and b.motion != points.angle]
     if not others:
         left_out.append("encoder of the load: no other body moves freely, its angle is known")
     resolution = declared_deviation(model, points.angle)
-    return [SensorCandidate(f"encoder of {b.name}", {b.motion: resolution}) for b in others]
+    of_the_load = [SensorCandidate(f"encoder of {b.name}", {b.motion: resolution}) for b in others]
+    candidates += of_the_load + _declared(points, estimate)
+    return candidates, tuple(left_out)
 
 
 def _declared(points: RestPoints, estimate: str) -> list[SensorCandidate]:

@@ -55,7 +55,14 @@ class Stability(View):
         columns: list[Variable] = []
         values: list[Array] = []
         for mode in points.modes:
-            columns += _columns(mode)
+            name, of = mode.name, f"of the mode {mode.name!r} ({mode.words})"
+            columns += [
+                Variable(f"{name}.decay", "1/s", f"largest real part of the eigenvalues {of}"),
+                Variable(f"{name}.frequency", "Hz", f"frequency of the least damped oscillation {of}"),
+                Variable(
+                    f"{name}.damping_ratio", "1", f"its damping ratio, 1 where nothing oscillates, {of}"
+                ),
+            ]
             values += least_damped(mode.eigenvalues)
         columns += [
             Variable("stiffness.slow", unit, f"slope of {torque} at rest, all relaxed"),
@@ -109,15 +116,6 @@ def sampled_poles(matrices: Array, sample_time: float) -> tuple[Array, tuple[Arr
     vanished = np.abs(eigenvalues) < np.finfo(float).eps
     in_time = np.log(np.where(vanished, np.finfo(float).eps, eigenvalues)) / sample_time
     return radius, least_damped(np.asarray(in_time, dtype=complex))
-
-
-def _columns(mode: PlantMode) -> list[Variable]:
-    name, of = mode.name, f"of the mode {mode.name!r} ({mode.words})"
-    return [
-        Variable(f"{name}.decay", "1/s", f"largest real part of the eigenvalues {of}"),
-        Variable(f"{name}.frequency", "Hz", f"frequency of the least damped oscillation {of}"),
-        Variable(f"{name}.damping_ratio", "1", f"its damping ratio, 1 where nothing oscillates, {of}"),
-    ]
 
 
 def _verdicts(mode: PlantMode) -> tuple[str, ...]:

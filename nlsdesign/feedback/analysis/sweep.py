@@ -283,13 +283,11 @@ def riccati(transition: Array, information: Array, noise: Array) -> tuple[Array,
             open_ = open_[np.isfinite(largest) & ~settled[open_]]
             if not len(open_):
                 break
-    settled &= _decays(transition, information, np.where(settled[:, None, None], h, 0.0))
-    return np.where(settled[:, None, None], h, np.nan), settled
-
-
-def _decays(transition: Array, information: Array, prior: Array) -> Mask:
-    """Tell whether the error of each filter decays: Φ·(I + P·CᵀR⁻¹C)⁻¹ has all eigenvalues inside 1."""
-    error = transition @ np.linalg.inv(np.eye(transition.shape[-1]) + prior @ information)
+    # Whether the error of each filter decays: Φ·(I + P·CᵀR⁻¹C)⁻¹ has all eigenvalues inside 1.
+    error = transition @ np.linalg.inv(
+        np.eye(transition.shape[-1]) + np.where(settled[:, None, None], h, 0.0) @ information
+    )
     radius = np.max(np.abs(np.linalg.eigvals(error)), axis=-1, initial=0.0)
     decays: Mask = radius < 1.0 - 1e-12
-    return decays
+    settled &= decays
+    return np.where(settled[:, None, None], h, np.nan), settled

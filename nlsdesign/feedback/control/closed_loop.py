@@ -73,8 +73,21 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
     outputs = (*observer.outputs, *controller.outputs)
     tables = (*observer.tables, *controller.tables)
     for group in ((*states, *inputs), parameters, outputs):
-        _check_names(group)
-    _check_tables(controller, {v.name for v in (*states, *inputs)})
+        once: set[str] = set()
+        for v in group:
+            if v.name in once:
+                raise ArrangementError(
+                    f"'{v.name}'", "is a variable of the observer and another one of the controller",
+                    next_step="design both on the same flat model, in which names are unique",
+                )  # fmt: skip
+            once.add(v.name)
+    known = {v.name for v in (*states, *inputs)}
+    for table in controller.tables:
+        if table.argument not in known:
+            raise ArrangementError(
+                f"table of the controller over '{table.argument}'", "is read at an output of the observer",
+                next_step="look it up over the measured angle",
+            )  # fmt: skip
     joint = _Joint(wiring, inputs, delay)
     return FlatModel(
         name=f"{observer.name}_and_controller",
@@ -243,26 +256,6 @@ def _waiting(driven: Variable, delay: int) -> tuple[Variable, ...]:
     return (first, *later)
 
 
-def _check_names(group: Sequence[Variable]) -> None:
-    names: set[str] = set()
-    for v in group:
-        if v.name in names:
-            raise ArrangementError(
-                f"'{v.name}'", "is a variable of the observer and another one of the controller",
-                next_step="design both on the same flat model, in which names are unique",
-            )  # fmt: skip
-        names.add(v.name)
-
-
-def _check_tables(controller: FlatModel, known: set[str]) -> None:
-    for table in controller.tables:
-        if table.argument not in known:
-            raise ArrangementError(
-                f"table of the controller over '{table.argument}'", "is read at an output of the observer",
-                next_step="look it up over the measured angle",
-            )  # fmt: skip
-
-
 Drive = Callable[[float], float] | float
 
 OBSERVER, CONTROLLER = "observer", "controller"
@@ -373,7 +366,12 @@ class ClosedLoop:
         ConvergenceError
             If the plant runs away.
         """
-        kept = _kept(self)
+        groups = (
+            (PLANT, self.plant.states), (PLANT, self.plant.inputs), (OBSERVER, self.observer.inputs),
+            (OBSERVER, self.observer.outputs), (CONTROLLER, self.controller.inputs),
+            (CONTROLLER, self.controller.outputs),
+        )  # fmt: skip
+        kept = [f"{owner}.{v.name}" for owner, group in groups for v in group]
         batch = run_batch(self.system(inputs), stop, inputs=inputs, start=start, keep=kept)
         if not batch.finite[0]:
             lost = np.flatnonzero(~np.all([np.isfinite(batch[name][0]) for name in kept], axis=0))
@@ -405,7 +403,12 @@ class ClosedLoop:
             for owner, model in ((OBSERVER, self.observer), (CONTROLLER, self.controller))
             for v in model.inputs
         }
-        self._check_open(opened, sources)
+        known = {f"{PLANT}.{v.name}" for v in self.plant.inputs} - {f"{PLANT}.{self.names.current}"}
+        known |= {name for name, source in sources.items() if source == name}
+        known |= {f"{CONTROLLER}.{v.name}" for v in self.controller.inputs}
+        for name in opened:
+            if name not in known:
+                raise unknown_name("input of the loop", name, known)
         self._check_sources(sources)
         return SampledSystem(
             plant=self.plant,
@@ -425,14 +428,6 @@ class ClosedLoop:
         outputs = {v.name for v in self.observer.outputs}
         return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
 
-    def _check_open(self, opened: set[str], sources: Mapping[str, str]) -> None:
-        known = {f"{PLANT}.{v.name}" for v in self.plant.inputs} - {f"{PLANT}.{self.names.current}"}
-        known |= {name for name, source in sources.items() if source == name}
-        known |= {f"{CONTROLLER}.{v.name}" for v in self.controller.inputs}
-        for name in opened:
-            if name not in known:
-                raise unknown_name("input of the loop", name, known)
-
     def _check_sources(self, sources: Mapping[str, str]) -> None:
         plant = self.plant
         groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
@@ -447,15 +442,6 @@ class ClosedLoop:
                 f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
                 next_step="give it in inputs or in wires",
             )  # fmt: skip
-
-
-def _kept(loop: ClosedLoop) -> list[str]:
-    groups = (
-        (PLANT, loop.plant.states), (PLANT, loop.plant.inputs), (OBSERVER, loop.observer.inputs),
-        (OBSERVER, loop.observer.outputs), (CONTROLLER, loop.controller.inputs),
-        (CONTROLLER, loop.controller.outputs),
-    )  # fmt: skip
-    return [f"{owner}.{v.name}" for owner, group in groups for v in group]
 
 
 def _record(loop: ClosedLoop, batch: BatchTrace) -> Trace:

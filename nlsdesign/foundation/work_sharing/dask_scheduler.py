@@ -117,7 +117,19 @@ class DaskScheduler:
         except ModuleNotFoundError:
             raise missing_library("a Dask scheduler", "distributed", "scale") from None
         if self.file is not None:
-            _require_address(self.file)
+            # Refuse a file that no scheduler wrote before Dask begins, which complains of it at its end too.
+            file = self.file
+            step = "name the file that the scheduler wrote (dask scheduler --scheduler-file FILE)"
+            if not is_there(file):
+                raise WorkSharingError(str(file), "no such file", next_step=step)
+            try:
+                content = json.loads(text_of(file, WorkSharingError))
+            except ValueError:
+                content = None
+            if not isinstance(content, dict) or not isinstance(content.get("address"), str):
+                raise WorkSharingError(
+                    str(file), "is no file of a Dask scheduler: it holds no address", next_step=step
+                )
         where = {"scheduler_file": str(self.file)} if self.file is not None else {"address": self.address}
         # Its own words on lost connections would stand between ours.
         for name in ("distributed.client", "distributed.core", "distributed.comm"):
@@ -130,21 +142,6 @@ class DaskScheduler:
                 f"Dask scheduler {self.named}", f"does not answer within {seconds:g} s ({reason_of(error)})",
                 next_step="start it with 'dask scheduler', or leave --scheduler out to use this machine",
             ) from None  # fmt: skip
-
-
-def _require_address(file: Path) -> None:
-    """Refuse a file that no scheduler wrote before Dask begins, which complains of it at its end too."""
-    step = "name the file that the scheduler wrote (dask scheduler --scheduler-file FILE)"
-    if not is_there(file):
-        raise WorkSharingError(str(file), "no such file", next_step=step)
-    try:
-        content = json.loads(text_of(file, WorkSharingError))
-    except ValueError:
-        content = None
-    if not isinstance(content, dict) or not isinstance(content.get("address"), str):
-        raise WorkSharingError(
-            str(file), "is no file of a Dask scheduler: it holds no address", next_step=step
-        )
 
 
 class _Team:

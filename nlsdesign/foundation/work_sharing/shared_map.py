@@ -181,7 +181,16 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
         for batch in outcomes:
             waiting.update((outcome.number, outcome) for outcome in batch)
             while following in waiting:
-                yield _result(waiting.pop(following))
+                outcome = waiting.pop(following)
+                if outcome.reason:
+                    raise WorkSharingError(
+                        f"part {outcome.number + 1} of the work", f"came to no result: {outcome.reason}",
+                        next_step="look at the memory of the workers, or let this process do the work "
+                        "(--workers 1)",
+                    )  # fmt: skip
+                if isinstance(outcome.value, _Caught):
+                    raise outcome.value.error
+                yield outcome.value
                 following += 1
 
 
@@ -258,14 +267,3 @@ def _received(content: bytes) -> _Caller:
 
     with casadi.global_unpickle_context():
         return _Caller(pickle.loads(content))
-
-
-def _result(outcome: PointOutcome) -> Any:
-    if outcome.reason:
-        raise WorkSharingError(
-            f"part {outcome.number + 1} of the work", f"came to no result: {outcome.reason}",
-            next_step="look at the memory of the workers, or let this process do the work (--workers 1)",
-        )  # fmt: skip
-    if isinstance(outcome.value, _Caught):
-        raise outcome.value.error
-    return outcome.value

@@ -50,7 +50,20 @@ def data_sheet(design: CamDesign, *, deck: str) -> Figure:
         view.set_ylim(min(box.y0 for box in drawn), max(box.y1 for box in drawn))
     page.table((_LEFT, 202.0), (56.0, 34.0), rows=[("The spring", ""), *_numbers(design)])
     page.table((_MIDDLE, 202.0), (56.0, 34.0), rows=[("Sizes", ""), *_sizes(design)])
-    _torque(_axes(page, _LEFT + 12.0, 87.0, 78.0, 54.0), design)
+    axes = _axes(page, _LEFT + 12.0, 87.0, 78.0, 54.0)
+    degrees = np.degrees(design.check.angles)
+    if design.tolerance is not None and design.tolerance.causes:
+        low, _, high = design.tolerance.band
+        axes.fill_between(
+            np.degrees(design.tolerance.angles), low, high, facecolor=GRID.light, label="90 % of made springs"
+        )
+    axes.plot(degrees, design.check.torques, color=AFTER.light, label="design")
+    axes.plot(
+        degrees, design.target.torque(design.check.angles), color=INK.light, linewidth=1.0,
+        linestyle=(0, (4, 2)), label="target",
+    )  # fmt: skip
+    axes.set(xlabel="angle in degrees", ylabel="torque in N·m", title="Torque")
+    axes.legend(loc="upper left", fontsize=7.5, frameon=False)
     stiffness = _axes(page, _MIDDLE + 14.0, 87.0, 76.0, 54.0)
     slope = np.gradient(design.check.torques, design.check.angles)
     stiffness.plot(np.degrees(design.check.angles), slope, color=AFTER.light)
@@ -126,23 +139,6 @@ def _sizes(design: CamDesign) -> list[tuple[str, ...]]:
             )
         )
     return rows
-
-
-def _torque(axes: Axes, design: CamDesign) -> None:
-    """Draw the torque over the angle, with the band of made springs."""
-    degrees = np.degrees(design.check.angles)
-    if design.tolerance is not None and design.tolerance.causes:
-        low, _, high = design.tolerance.band
-        axes.fill_between(
-            np.degrees(design.tolerance.angles), low, high, facecolor=GRID.light, label="90 % of made springs"
-        )
-    axes.plot(degrees, design.check.torques, color=AFTER.light, label="design")
-    axes.plot(
-        degrees, design.target.torque(design.check.angles), color=INK.light, linewidth=1.0,
-        linestyle=(0, (4, 2)), label="target",
-    )  # fmt: skip
-    axes.set(xlabel="angle in degrees", ylabel="torque in N·m", title="Torque")
-    axes.legend(loc="upper left", fontsize=7.5, frameon=False)
 
 
 def _over_angle(design: CamDesign) -> list[tuple[str, ...]]:

@@ -84,8 +84,12 @@ def limit_margins(design: CamDesign) -> Figure:
         bar.set_hatch("///" if state.active else "")
     axes.axvline(1.0, color=INK.light, linewidth=1.0)
     for place, state, share in zip(places, states, used, strict=True):
+        factor = parse_unit(state.unit).factor
+        value, bound = (f"{number / factor:.4g}" for number in (state.value, state.bound))
+        sign = "≤" if state.upper else "≥"
+        words = f"{value} {sign} {with_unit(bound, state.unit)}"
         axes.annotate(
-            _words(state), (max(min(float(share), 1.2), 1.0), place), (6, 0), textcoords="offset points",
+            words, (max(min(float(share), 1.2), 1.0), place), (6, 0), textcoords="offset points",
             fontsize=8, va="center", color=INK.light,
         )  # fmt: skip
     axes.set_yticks(places, [f"{state.of} ({'≤' if state.upper else '≥'})" for state in states])
@@ -104,13 +108,6 @@ def _used(state: LimitState) -> float:
     if state.bound <= 0.0:
         return 1.0 if state.active else 0.0
     return 1.2 if state.value <= 0.0 else state.bound / state.value
-
-
-def _words(state: LimitState) -> str:
-    factor = parse_unit(state.unit).factor
-    value, bound = (f"{number / factor:.4g}" for number in (state.value, state.bound))
-    sign = "≤" if state.upper else "≥"
-    return f"{value} {sign} {with_unit(bound, state.unit)}"
 
 
 def draw_mechanism(axes: Axes, design: CamDesign, angle: float) -> None:

@@ -244,7 +244,12 @@ def log_axis(axes: Axes, *, abscissa: bool = False) -> None:
     axis.set_major_locator(LogLocator(10.0))
     axis.set_minor_locator(LogLocator(10.0, subs=(2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: _plain(value)))
-    axis.set_minor_formatter(FuncFormatter(lambda value, _: _plain(value) if _short(axis) else ""))
+
+    def minor(value: float, _: int) -> str:
+        low, high = axis.get_view_interval()
+        return _plain(value) if low > 0.0 and high / low < 100.0 else ""
+
+    axis.set_minor_formatter(FuncFormatter(minor))
     axis.set_tick_params(which="minor", labelsize=8.0, labelcolor=INK.light)
 
 
@@ -258,11 +263,6 @@ def _plain(value: float) -> str:
     exponent = math.floor(math.log10(abs(value)) + 1e-9) if value else 0
     text = f"{abs(value):g}" if -3 <= exponent <= 4 else f"10{superscript(exponent)}"
     return f"−{text}" if value < 0.0 else text
-
-
-def _short(axis: Axis) -> bool:
-    low, high = axis.get_view_interval()
-    return bool(low > 0.0 and high / low < 100.0)
 
 
 def described(figure: Figure, text: str) -> Figure:

@@ -250,17 +250,14 @@ def figure_data(figure: Figure) -> dict[str, Any]:
     for axes in figure.axes:
         series = [*_bars(axes), *_lines(axes), *_areas(axes)]
         if series:
+            # The label of the abscissa; panels that share it have it below the last one only.
+            shared = axes.get_shared_x_axes().get_siblings(axes)
+            across = next((each.get_xlabel() for each in (axes, *shared) if each.get_xlabel()), "")
             panels.append(
-                {"title": axes.get_title(loc="left") or axes.get_title(), "x": _across(axes),
+                {"title": axes.get_title(loc="left") or axes.get_title(), "x": across,
                  "y": axes.get_ylabel(), "series": series}
             )  # fmt: skip
     return {"panels": panels}
-
-
-def _across(axes: Axes) -> str:
-    """Return the label of the abscissa; panels that share it have it below the last one only."""
-    shared = axes.get_shared_x_axes().get_siblings(axes)
-    return next((each.get_xlabel() for each in (axes, *shared) if each.get_xlabel()), "")
 
 
 def _lines(axes: Axes) -> list[dict[str, Any]]:

@@ -10,7 +10,6 @@ from .command_pages import (
 )
 from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
 from .diagnosis_sections import verdict_sections
-from .equations_section import EquationsSection
 from .page import write_report
 from .sections import (
     Chapter,
@@ -28,6 +27,7 @@ from .tables import (
     OUTCOMES,
     CalculationSection,
     CalculationStep,
+    EquationsSection,
     PublishedNumber,
     comparison_table,
     numbers_table,

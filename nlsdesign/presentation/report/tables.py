@@ -1,4 +1,4 @@
-"""Tables that reports share: numbers of a deck, points of a sweep, paper against model, calculations."""
+"""Tables that reports share: numbers of a deck, points of a sweep, paper and model, steps, equations."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from urllib.parse import quote
 
 from ...foundation.errors import unknown_name, visible
 from ...foundation.quantity import Quantity, sources, typeset_number, typeset_unit
 from ..figures.style import compact
 from .sections import Html, PagePosition, Section, TableSection
+
+if TYPE_CHECKING:
+    from ...model.equations import Equations
 
 _LONGEST_ROW = 8
 
@@ -248,3 +251,30 @@ def typeset(expression: Any) -> Html:
     text = _RATE.sub(rate, formula(expression))
     text = _STAR.sub(r"<msup><mi>\1</mi><mo>*</mo></msup>", text)
     return Html(_INDEX.sub(r"<msub><mi>\1</mi><mi>\2</mi></msub>", text))
+
+
+@dataclass(frozen=True, eq=False)
+class EquationsSection(Section):
+    """The equations of a flat model.
+
+    Parameters
+    ----------
+    equations
+        From :func:`nlsdesign.model.equations.equations`.
+    caption
+        What they describe.
+    folded
+        Whether they are closed until the reader opens them.
+    """
+
+    equations: Equations
+    caption: str = ""
+    folded: bool = False
+    template: ClassVar[str] = "equations.html"
+
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return the rows of the derivatives and of the definitions."""
+        from .mathml import equation_rows  # loads SymPy
+
+        states, signals = equation_rows(self.equations)
+        return {"states": states, "signals": signals, "caption": self.caption, "folded": self.folded}

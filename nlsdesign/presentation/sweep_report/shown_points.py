@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ...foundation.arrays import Indices, Mask
+from ...foundation.arrays import Indices
 from ...foundation.errors import visible
 from ...foundation.quantity import typeset_unit
 from ...sweeps import SweepColumn, SweepTable
@@ -55,7 +55,16 @@ def shown_points(table: SweepTable, ranked: RankedPoints) -> ShownPoints:
     count = len(table)
     on_front = np.zeros(count, dtype=bool)
     on_front[ranked.front] = True
-    always = ranked.failed | on_front | _ends(table)
+    # The points with the least and the largest number of each column.
+    mask = np.zeros(len(table), dtype=bool)
+    for column in (*table.axes, *table.answers):
+        values = np.asarray(table.values[column.name])
+        if values.dtype.kind != "f":
+            continue
+        finite = np.flatnonzero(np.isfinite(values))
+        if len(finite):
+            mask[finite[[np.argmin(values[finite]), np.argmax(values[finite])]]] = True
+    always = ranked.failed | on_front | mask
     chosen, rule = np.ones(count, dtype=bool), ""
     others = np.flatnonzero(~always)
     random = np.random.default_rng(_SEED)
@@ -82,19 +91,6 @@ def shown_points(table: SweepTable, ranked: RankedPoints) -> ShownPoints:
         on_front[rows], ranked.missed[rows], ranked.failed[rows],
     )  # fmt: skip
     return ShownPoints(rows, kinds, rule.strip())
-
-
-def _ends(table: SweepTable) -> Mask:
-    """Return the points with the least and the largest number of each column."""
-    mask = np.zeros(len(table), dtype=bool)
-    for column in (*table.axes, *table.answers):
-        values = np.asarray(table.values[column.name])
-        if values.dtype.kind != "f":
-            continue
-        finite = np.flatnonzero(np.isfinite(values))
-        if len(finite):
-            mask[finite[[np.argmin(values[finite]), np.argmax(values[finite])]]] = True
-    return mask
 
 
 _DIGITS, _LONGEST = 6, 300

@@ -183,7 +183,12 @@ def _written(
         ),
     ]  # fmt: skip
     deck = str(table.about.get("deck", "")) or "a deck"
-    facts = {name: _brief(text) for name, text in about.items() if name in _FACTS}
+    # A text for the head of the page; of a digest its beginning, the whole stands at the end.
+    facts = {
+        name: (text[:12] if len(text) == 64 and not text.strip("0123456789abcdef") else text)
+        for name, text in about.items()
+        if name in _FACTS
+    }
     title = f"{visible(deck)}: {len(table)} points"
     return write_report(path, *sections, title=title, abstract=_ABSTRACT, facts=facts)
 
@@ -191,11 +196,6 @@ def _written(
 def usual_requirements(table: SweepTable) -> list[Requirement]:
     """Return what a point must keep where nothing is stated: a design must have met its target."""
     return [NotBelow(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
-
-
-def _brief(text: str) -> str:
-    """Return a text for the head of the page; of a digest its beginning, the whole stands at the end."""
-    return text[:12] if len(text) == 64 and not text.strip("0123456789abcdef") else text
 
 
 def _sensitivities(

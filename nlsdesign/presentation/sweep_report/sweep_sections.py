@@ -12,8 +12,6 @@ from ...foundation.quantity import three_digits, typeset_unit, with_unit
 from ...sweeps import SweepColumn, SweepTable
 from ...sweeps.answer_statistics import AnswerSurface, BoundedQuantile, answer_quantiles, answer_surface
 from ...sweeps.preferences import NearIsBetter, RankedPoints
-from ...sweeps.sensitivity import AnswerSensitivity
-from ..figures import Figure
 from ..figures.sweep_figures import (
     MOST_COORDINATES,
     MOST_PANELS,
@@ -46,17 +44,6 @@ def asked_sections(table: SweepTable, ranked: RankedPoints) -> list[Section]:
         for axis in table.axes
     )
     caption = "Axes of the sweep: what was changed, how the values were chosen, and what stands in the table."
-    return [
-        _numbers(table, ranked),
-        TableSection(
-            "What was changed", ("axis", "chosen as", "values", "range", "what it is"), rows, caption=caption
-        ),
-        *_directions(table, ranked),
-        *_failures(table),
-    ]
-
-
-def _numbers(table: SweepTable, ranked: RankedPoints) -> Section:
     done, failed = int(np.sum(table.done)), int(np.sum(ranked.failed))
     numbers = [
         KeyNumber("points with answers", str(done), _of_asked(table)),
@@ -72,7 +59,15 @@ def _numbers(table: SweepTable, ranked: RankedPoints) -> Section:
         numbers.append(
             KeyNumber("points on the front", str(len(ranked.front)), f"of {among} that were compared")
         )
-    return NumbersSection("In short", tuple(numbers))
+    summary = NumbersSection("In short", tuple(numbers))
+    return [
+        summary,
+        TableSection(
+            "What was changed", ("axis", "chosen as", "values", "range", "what it is"), rows, caption=caption
+        ),
+        *_directions(table, ranked),
+        *_failures(table),
+    ]
 
 
 def _of_asked(table: SweepTable) -> str:
@@ -86,7 +81,8 @@ def _of_asked(table: SweepTable) -> str:
 def _range(table: SweepTable, axis: SweepColumn) -> tuple[str, str]:
     """Return how many different values an axis has, and from where to where."""
     column = shown_column(table, axis)
-    distinct = np.unique(column.values[~_missing(column.values)])
+    given = column.values
+    distinct = np.unique(given[~np.isnan(given)] if given.dtype.kind == "f" else given)
     if column.words:
         names = ", ".join(distinct.tolist()[:8]) + (", …" if len(distinct) > 8 else "")
         return str(len(distinct)), names[:_LONGEST] or "–"
@@ -101,10 +97,6 @@ def _range(table: SweepTable, axis: SweepColumn) -> tuple[str, str]:
         if abs(axis.lower * factor - distinct[0]) + abs(axis.upper * factor - distinct[-1]) > 0.02 * width:
             text += f" (asked: {with_unit(asked, column.unit or '1')})"
     return str(len(distinct)), text
-
-
-def _missing(values: np.ndarray) -> np.ndarray:
-    return np.isnan(values) if values.dtype.kind == "f" else np.zeros(len(values), dtype=bool)
 
 
 def _directions(table: SweepTable, ranked: RankedPoints) -> list[Section]:
@@ -138,7 +130,12 @@ def _failures(table: SweepTable) -> list[Section]:
         examples.setdefault(reason, []).append(int(table.values["point"][row]))
     ordered = groups.most_common()
     rows = [
-        (str(count), _cut(reason), point_list(examples[reason])) for reason, count in ordered[:_MOST_REASONS]
+        (
+            str(count),
+            reason if len(reason) <= _LONGEST else reason[: _LONGEST - 1] + "…",
+            point_list(examples[reason]),
+        )
+        for reason, count in ordered[:_MOST_REASONS]
     ]
     rest = ordered[_MOST_REASONS:]
     if rest:
@@ -148,10 +145,6 @@ def _failures(table: SweepTable) -> list[Section]:
         f"{len(failed)} of {len(table)} points failed, grouped by reason. They are results of no figure."
     )
     return [TableSection("Points that failed", ("points", "reason", "numbers"), tuple(rows), caption=caption)]
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
 def unit_of(column: SweepColumn) -> str:
@@ -337,10 +330,34 @@ def sensitivity_sections(content: PageContent) -> list[Section]:
     sections: list[Section] = []
     if shown:
         remarks = dict.fromkeys(remark for each in shown.values() for remark in each.remarks)
+        errors = [
+            error for each in shown.values() for i in each.indices for error in (i.first_error, i.total_error)
+        ]
+        have_intervals = any(np.isfinite(error) and error > 0.0 for error in errors)
+        shares = {
+            name: [
+                VarianceShare(i.axis, i.first, i.first_error, i.total, i.total_error) for i in each.indices
+            ]
+            for name, each in shown.items()
+        }
+        leading = "; ".join(f"{name}: {each.indices[0].axis}" for name, each in shown.items())
+        shares_figure = sensitivity_bars(
+            {name: rows[:_MOST_SHARES] for name, rows in shares.items()},
+            words=f"Shares of the variance of the answers by axis. Largest, {leading}.",
+        )
+        groups: dict[tuple[str, int], list[str]] = {}
+        for name, each in shown.items():
+            groups.setdefault((each.method, each.points), []).append(name)
+        sentences = [
+            f"{listed_names(names)}: {method}, from {points} points."
+            for (method, points), names in groups.items()
+        ]
+        if any(len(each.indices) > _MOST_SHARES for each in shown.values()):
+            sentences.append(f"The {_MOST_SHARES} largest of each are drawn.")
         sections.append(
             FigureSection(
-                "What causes the differences", _shares_figure(shown), caption=_methods(shown),
-                means=_SHARES + (_STROKES if _have_intervals(shown) else ""),
+                "What causes the differences", shares_figure, caption=" ".join(sentences),
+                means=_SHARES + (_STROKES if have_intervals else ""),
                 assumed=" ".join(["Axes are independent.", *(f"{r[0].upper()}{r[1:]}." for r in remarks)]),
             )
         )  # fmt: skip
@@ -348,38 +365,6 @@ def sensitivity_sections(content: PageContent) -> list[Section]:
         caption = "Answers for which no share of the variance is given, and why."
         sections.append(TableSection("No sensitivity", ("answer", "reason"), refused, caption=caption))
     return sections
-
-
-def _have_intervals(shown: dict[str, AnswerSensitivity]) -> bool:
-    errors = [
-        error for each in shown.values() for i in each.indices for error in (i.first_error, i.total_error)
-    ]
-    return any(np.isfinite(error) and error > 0.0 for error in errors)
-
-
-def _methods(shown: dict[str, AnswerSensitivity]) -> str:
-    groups: dict[tuple[str, int], list[str]] = {}
-    for name, each in shown.items():
-        groups.setdefault((each.method, each.points), []).append(name)
-    sentences = [
-        f"{listed_names(names)}: {method}, from {points} points."
-        for (method, points), names in groups.items()
-    ]
-    if any(len(each.indices) > _MOST_SHARES for each in shown.values()):
-        sentences.append(f"The {_MOST_SHARES} largest of each are drawn.")
-    return " ".join(sentences)
-
-
-def _shares_figure(shown: dict[str, AnswerSensitivity]) -> Figure:
-    shares = {
-        name: [VarianceShare(i.axis, i.first, i.first_error, i.total, i.total_error) for i in each.indices]
-        for name, each in shown.items()
-    }
-    leading = "; ".join(f"{name}: {each.indices[0].axis}" for name, each in shown.items())
-    return sensitivity_bars(
-        {name: rows[:_MOST_SHARES] for name, rows in shares.items()},
-        words=f"Shares of the variance of the answers by axis. Largest, {leading}.",
-    )
 
 
 MOST_SURFACES = 4
@@ -477,12 +462,9 @@ def _sentence(surface: AnswerSurface | str, answer: ShownColumn, why: str) -> st
             f"the answers {deviation}, so less than a tenth of their variance is predicted, and it is not "
             f"drawn.{outside}"
         )  # fmt: skip
+    # Never rounded up to all of it.
+    share = "more than 99.9 %" if surface.explained > 0.999 else f"{100.0 * surface.explained:.1f} %"
     return (
         f"{head}{surface.method}; error on left-out points {error} rms, with a deviation of the answers of "
-        f"{deviation} ({_share(surface.explained)} of the variance is predicted).{outside}"
+        f"{deviation} ({share} of the variance is predicted).{outside}"
     )  # fmt: skip
-
-
-def _share(value: float) -> str:
-    """Return a share as text that is never rounded up to all of it."""
-    return "more than 99.9 %" if value > 0.999 else f"{100.0 * value:.1f} %"

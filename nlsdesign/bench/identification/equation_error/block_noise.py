@@ -365,7 +365,14 @@ def chosen_filters(
     if usual_pace == 0.0:
         return Filters(0.0, 0.0, shortest)
     if moving and 2.0 * math.pi < _COARSEST * usual_pace * max(r.step for r in records):
-        raise _too_coarse(block, list(seen), usual_pace, records)
+        now = 1.0 / max(r.step for r in records)
+        frequency = usual_pace / (2.0 * math.pi)
+        raise MeasurementError(
+            f"block '{block.name}'",
+            f"the motion of {' and '.join(seen)}, typically {frequency:.3g} Hz, is sampled too coarsely "
+            f"at {now:.3g} Hz",
+            next_step=f"sample at {2.0 * _COARSEST * frequency:.2g} Hz or more, or move more slowly",
+        )
     # Where noise hides the highest derivative, or samples are too few for it, the pace of the rate is kept.
     pace = max(usual_pace, *(pace_by_order[key] for key in seen.items()))
     # A motion that hardly changes its rate, such as a slow ramp, has no pace of its own: its record sets one.
@@ -597,16 +604,3 @@ def _power(
         count += len(rows)
         own += len(rows) * noise**2 * float(weights @ weights)
     return (squares - own) / max(count, 1), own / max(count, 1)
-
-
-def _too_coarse(
-    block: Block, signals: Sequence[str], pace: float, records: Sequence[Record]
-) -> MeasurementError:
-    now = 1.0 / max(r.step for r in records)
-    frequency = pace / (2.0 * math.pi)
-    return MeasurementError(
-        f"block '{block.name}'",
-        f"the motion of {' and '.join(signals)}, typically {frequency:.3g} Hz, is sampled too coarsely at "
-        f"{now:.3g} Hz",
-        next_step=f"sample at {2.0 * _COARSEST * frequency:.2g} Hz or more, or move more slowly",
-    )

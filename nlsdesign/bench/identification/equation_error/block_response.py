@@ -99,7 +99,10 @@ class DrivenBlock:
         self._span = span
         self.free = free_in(block, free)
         self._fixed = block.model.values
-        self._straightened = _places(block, straightened)
+        # The places of some inputs, without those that come late: their slopes say how late.
+        drives = block.drives
+        kept = {name for name in straightened if name in drives and not drives[name].shifted_by}
+        self._straightened = [i for i, v in enumerate(block.model.inputs) if v.name in kept]
         e = _equations(block, self.free, self._straightened)
         self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
         self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
@@ -149,7 +152,9 @@ class DrivenBlock:
             signal = record.at_samples(drive.signal)
             now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
             delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
-            if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
+            # Whether the rate of a signal drives the block too.
+            is_motion = any(d.signal == drive.signal and d.order == 1 for d in self.block.drives.values())
+            if smooth and drive.order == 0 and is_motion:
                 signal = without_rounding(signal, record.step, self._span)
             inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
             if i in self._straightened:
@@ -316,18 +321,6 @@ def _sloped(block: Block) -> list[int]:
     sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
     moved = s.state.numel() and depends(s.derivative, ca.vertcat(*[s.input[i] for i in sloped]))
     return sloped if moved else []
-
-
-def _places(block: Block, inputs: Collection[str]) -> list[int]:
-    """Return the places of some inputs, without those that come late: their slopes say how late."""
-    drives = block.drives
-    kept = {name for name in inputs if name in drives and not drives[name].shifted_by}
-    return [i for i, v in enumerate(block.model.inputs) if v.name in kept]
-
-
-def _is_motion(block: Block, signal: str) -> bool:
-    """Tell whether the rate of a signal drives the block too."""
-    return any(d.signal == signal and d.order == 1 for d in block.drives.values())
 
 
 def _centred(mean: Array) -> Array:

@@ -239,7 +239,13 @@ class Bench:
         """Return every k-th sample unfiltered; with ``whole`` all are simulated and the same are compared."""
         key = block, record.name, whole
         if key not in self._thin:
-            k = self._skip(record)
+            moving = [s for s in self.records.signals if self.noise.rounded[s]] or list(self.records.signals)
+            allowed = _COARSEST
+            for signal in moving:
+                span = max(float(np.ptp(r.trace[signal])) for r in self.records.records)
+                fastest = float(np.max(np.abs(np.gradient(gaussian_filter1d(record.trace[signal], 2.0)))))
+                allowed = min(allowed, int(_COARSE_SHARE * span / max(fastest, 1e-300)))
+            k = max(1, allowed)
             trace = record.trace
             counted = np.flatnonzero(~record.masked_in(trace.signals)[::k])
             raw = self.floors[block, record.name].raw_sigma[::k][counted]
@@ -253,15 +259,6 @@ class Bench:
                 masked = {n: m[::k] for n, m in masked.items()}
             self._thin[key] = replace(record, trace=trace, masked=masked), BlockNoise(one[counted], raw, raw)
         return self._thin[key]
-
-    def _skip(self, record: Record) -> int:
-        moving = [s for s in self.records.signals if self.noise.rounded[s]] or list(self.records.signals)
-        allowed = _COARSEST
-        for signal in moving:
-            span = max(float(np.ptp(r.trace[signal])) for r in self.records.records)
-            fastest = float(np.max(np.abs(np.gradient(gaussian_filter1d(record.trace[signal], 2.0)))))
-            allowed = min(allowed, int(_COARSE_SHARE * span / max(fastest, 1e-300)))
-        return max(1, allowed)
 
 
 def _block_records(bench: Bench, blocks: Sequence[Block]) -> list[BlockRecord]:

@@ -137,7 +137,9 @@ def colour_of(stretches: Sequence[Stretch], duration: float = 0.0) -> Colour | N
     if not np.any(density > 0.0):
         return None
     seen, parts = _fitted(frequency, density, count, step)
-    model = _total(seen, parts, frequency, step)
+    model = seen + sum(
+        (p.variance * _density(p.time, frequency, step) for p in parts), np.zeros_like(frequency)
+    )
     if model.max() < _PLAIN * max(seen, model.min()):
         return Colour(float(np.sum(model * count) / np.sum(count)), ())
     below = _continued(frequency, density - seen, count, duration)
@@ -226,12 +228,6 @@ def _continued(frequency: Array, risen: Array, count: Array, duration: float) ->
     number = math.ceil(math.log(duration * lowest) / math.log(_BAND))
     below = np.geomspace(1.0 / duration, lowest, number + 1)[:-1]
     return below, np.exp(mean - power * (np.log(below / lowest) - middle))
-
-
-def _total(white: float, parts: Sequence[NoisePart], frequency: Array, step: float) -> Array:
-    return white + sum(
-        (p.variance * _density(p.time, frequency, step) for p in parts), np.zeros_like(frequency)
-    )
 
 
 def _density(time: float, frequency: Array, step: float) -> Array:
@@ -438,14 +434,8 @@ def _difference(record: Record, signal: str, rows: slice, lag: int) -> Stretch:
 def _quiet(record: Record, motions: Mapping[str, float]) -> tuple[list[slice], list[tuple[slice, int]]]:
     """Return where all motions rest, and where the record repeats itself after so many samples."""
     counts = [record.trace[name] / quantum for name, quantum in motions.items()]
-    return _rests(counts), _repeats(counts)
-
-
-def _rests(counts: Sequence[Array]) -> list[slice]:
-    """Return the stretches in which no motion leaves its count by more than one, without their first third.
-
-    There rubber still creeps, which would be taken for slow noise.
-    """
+    # The stretches in which no motion leaves its count by more than one, without their first third. There
+    # rubber still creeps, which would be taken for slow noise.
     n = len(counts[0])
     least = max(_LEAST_SAMPLES, n // _MOST_STRETCHES)
     result, first = [], 0
@@ -460,7 +450,7 @@ def _rests(counts: Sequence[Array]) -> list[slice]:
         else:
             # What has moved on since this sample is not at rest at any sample before it left either.
             first += max(1, (behind - first) // 2)
-    return result
+    return result, _repeats(counts)
 
 
 def _repeats(counts: Sequence[Array]) -> list[tuple[slice, int]]:

@@ -164,22 +164,19 @@ def _resampled(channel: Channel, time: Array, step: float) -> tuple[Array, str]:
         )
     even = channel.time if channel.even else np.linspace(channel.time[0], channel.time[-1], len(channel.time))
     values = channel.values if channel.even else np.interp(even, channel.time, channel.values)
-    smooth = _low_pass(channel.name, values, step / float(even[1] - even[0]))
-    change = f"{named} with an anti-alias filter" + ("" if channel.even else ", uneven steps interpolated")
-    return make_interp_spline(even, smooth, k=3)(np.minimum(time, even[-1])), change
-
-
-def _low_pass(name: str, values: Array, ratio: float) -> Array:
+    ratio = step / float(even[1] - even[0])
     half = math.ceil(_HALF_LENGTH * ratio)
     if half >= len(values):
         raise MeasurementError(
-            name, f"is shorter than the anti-alias filter of the new clock ({half} samples to either side)",
+            channel.name,
+            f"is shorter than the anti-alias filter of the new clock ({half} samples to either side)",
             next_step="take a higher rate",
-        )  # fmt: skip
+        )
     taps = scipy.signal.firwin(2 * half + 1, 1.0 / ratio, window=("kaiser", _KAISER))
     padded = np.pad(values, half, mode="reflect", reflect_type="odd")
-    result: Array = scipy.signal.fftconvolve(padded, taps, mode="valid")
-    return result
+    smooth: Array = scipy.signal.fftconvolve(padded, taps, mode="valid")
+    change = f"{named} with an anti-alias filter" + ("" if channel.even else ", uneven steps interpolated")
+    return make_interp_spline(even, smooth, k=3)(np.minimum(time, even[-1])), change
 
 
 def _nearest(time: Array, wanted: Array) -> Indices:

@@ -106,17 +106,14 @@ def signals_for(name: str, unit: str, model: FlatModel) -> tuple[str, ...]:
     if name in everything:
         return (name,)
     for group in ([everything[r.signal] for r in model.readings], list(model.inputs)):
-        fitting = _last_of_chains(model, [v.name for v in group if same_dimension(v.unit, unit)])
+        # Leave out readings that another one of these signals passes on: a bench writes down the last.
+        signals = [v.name for v in group if same_dimension(v.unit, unit)]
+        readings = [r for r in model.readings if r.signal in signals]
+        passed_on = {sensor for r in readings for sensor in r.sensors[1:]}
+        fitting = [s for s in signals if s not in {r.signal for r in readings if r.sensors[0] in passed_on}]
         if fitting:
             return tuple(fitting)
     return ()
-
-
-def _last_of_chains(model: FlatModel, signals: Sequence[str]) -> list[str]:
-    """Leave out readings that another one of these signals passes on: a bench writes down the last."""
-    readings = [r for r in model.readings if r.signal in signals]
-    passed_on = {sensor for r in readings for sensor in r.sensors[1:]}
-    return [s for s in signals if s not in {r.signal for r in readings if r.sensors[0] in passed_on}]
 
 
 def _declared(model: FlatModel, signal: str) -> tuple[float, float]:

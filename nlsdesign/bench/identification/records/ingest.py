@@ -251,9 +251,9 @@ def _check_present(table: RecordTable, heads: list[str]) -> None:
 
 
 def _units(mapping: ColumnMap) -> dict[str, str]:
-    return {c.signal: _si(c.unit) for c in mapping.columns}
-
-
-def _si(unit: str) -> str:
-    known = ("rad", "rad/s", "m", "m/s", "A", "V", "N", "N*m", "Pa", "K", "1", "rad/s^2", "m/s^2")
-    return next((name for name in known if same_dimension(name, unit)), unit)
+    """Return the unit in SI of each signal; its own where that is none of the usual ones."""
+    usual = ("rad", "rad/s", "m", "m/s", "A", "V", "N", "N*m", "Pa", "K", "1", "rad/s^2", "m/s^2")
+    return {
+        c.signal: next((name for name in usual if same_dimension(name, c.unit)), c.unit)
+        for c in mapping.columns
+    }

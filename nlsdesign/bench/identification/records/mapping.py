@@ -176,7 +176,22 @@ def read_mapping(path: Path, joint: str | None = None) -> ColumnMap:
     _check_fields(path.name, tables, known)
     given = table_at(path.name, "columns", tables.get("columns", {}), 'write [columns.<head>] signal = "..."')
     columns = tuple(_mapped(path, head, table) for head, table in given.items())
-    _check_signals_differ(path.name, columns)
+    first: dict[str, str] = {}
+    for column in columns:
+        if column.signal in first:
+            raise MeasurementError(
+                f"{path.name}: columns.{column.name}",
+                f"is mapped to '{column.signal}', as '{first[column.signal]}' is",
+                next_step="map each column to a signal of its own",
+            )
+        first[column.signal] = column.name
+    aligned = tables.get("align", [])
+    if not isinstance(aligned, list) or not all(isinstance(each, dict) for each in aligned):
+        raise MeasurementError(
+            f"{path.name}: align",
+            "is not a list of tables",
+            next_step='write [[align]] column = "...", to = "..."',
+        )
     mapping = ColumnMap(
         _time(path.name, tables["time"]) if "time" in tables else Column("", "time", "s"),
         columns,
@@ -184,22 +199,10 @@ def read_mapping(path: Path, joint: str | None = None) -> ColumnMap:
         globs_at(path.name, "selection", tables.get("selection", [])),
         _seconds(f"{path.name}: held_out_after", tables.get("held_out_after")),
         _rate(path.name, tables.get("resample_Hz")),
-        tuple(_align(f"{path.name}: align", table) for table in _list_of_tables(path.name, tables)),
+        tuple(_align(f"{path.name}: align", table) for table in aligned),
     )
     _check_clock(path.name, mapping)
     return mapping
-
-
-def _check_signals_differ(file: str, columns: Sequence[Column]) -> None:
-    first: dict[str, str] = {}
-    for column in columns:
-        if column.signal in first:
-            raise MeasurementError(
-                f"{file}: columns.{column.name}",
-                f"is mapped to '{column.signal}', as '{first[column.signal]}' is",
-                next_step="map each column to a signal of its own",
-            )
-        first[column.signal] = column.name
 
 
 def _time(file: str, given: Any) -> Column:
@@ -255,17 +258,6 @@ def _rate(file: str, given: Any) -> float | None:
             next_step="write for instance resample_Hz = 500",
         )
     return rate
-
-
-def _list_of_tables(file: str, tables: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    given = tables.get("align", [])
-    if not isinstance(given, list) or not all(isinstance(each, dict) for each in given):
-        raise MeasurementError(
-            f"{file}: align",
-            "is not a list of tables",
-            next_step='write [[align]] column = "...", to = "..."',
-        )
-    return given
 
 
 def _align(where: str, table: Mapping[str, Any]) -> Align:

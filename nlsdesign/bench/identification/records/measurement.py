@@ -60,7 +60,20 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
 
     ``traces``: with the same signals; at least two.
     """
-    marks = _marks(traces)
+    lag = min(float(t.time[-1] - t.time[0]) for t in traces) / _LAGS
+    rows = []
+    for trace in traces:
+        step = float(trace.time[1] - trace.time[0])
+        lag_samples = max(1, round(lag / step))
+        row = [float(np.log(trace.time[-1] - trace.time[0]))]
+        for name in sorted(traces[0].signals):
+            values = trace[name]
+            change = np.abs(values[lag_samples:] - values[:-lag_samples])
+            rate = float(np.sqrt(np.mean(change**2)))
+            form = rate / max(float(np.mean(change)), 1e-300)
+            row += [float(values.min()), float(values.max()), _log(rate), _log(form)]
+        rows.append(row)
+    marks = np.array(rows)
     left = list(range(len(traces)))
     chosen: list[int] = []
     while len(chosen) < (len(traces) + 1) // _SHARE:
@@ -79,24 +92,6 @@ def content_digest(trace: Trace) -> str:
     for name in sorted(trace.signals):
         digest.update(trace.signals[name].tobytes())
     return digest.hexdigest()
-
-
-def _marks(traces: Sequence[Trace]) -> Array:
-    """Return what describes each record, shape (records, marks)."""
-    lag = min(float(t.time[-1] - t.time[0]) for t in traces) / _LAGS
-    rows = []
-    for trace in traces:
-        step = float(trace.time[1] - trace.time[0])
-        apart = max(1, round(lag / step))
-        row = [float(np.log(trace.time[-1] - trace.time[0]))]
-        for name in sorted(traces[0].signals):
-            values = trace[name]
-            change = np.abs(values[apart:] - values[:-apart])
-            rate = float(np.sqrt(np.mean(change**2)))
-            form = rate / max(float(np.mean(change)), 1e-300)
-            row += [float(values.min()), float(values.max()), _log(rate), _log(form)]
-        rows.append(row)
-    return np.array(rows)
 
 
 def _log(value: float) -> float:
@@ -536,7 +531,12 @@ def split(
     ``held_out``.
     """
     if not held_out and len(records) == 1:
-        return _cut_after_two_thirds(records[0])
+        record = records[0]
+        cut = 2 * len(record.trace) // 3
+        return (
+            _part(record, slice(None, cut), "fit", "first two thirds"),
+            _part(record, slice(cut, None), "held_out", "last third"),
+        )
     names = [r.name for r in records]
     compared = {n for g in selection for n in _named_by(g, names)}
     if held_out:
@@ -586,14 +586,6 @@ def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
 def from_sample(record: Record, first: int) -> Record:
     """Return a record from one sample on."""
     return _part(record, slice(first, None), record.role, f"from {record.trace.time[first]:g} s")
-
-
-def _cut_after_two_thirds(record: Record) -> tuple[Record, ...]:
-    cut = 2 * len(record.trace) // 3
-    return (
-        _part(record, slice(None, cut), "fit", "first two thirds"),
-        _part(record, slice(cut, None), "held_out", "last third"),
-    )
 
 
 def _part(record: Record, rows: slice, role: Role, label: str) -> Record:

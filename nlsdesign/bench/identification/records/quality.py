@@ -238,7 +238,27 @@ def faulty_groups(values: Array, around: Surroundings) -> list[Group]:
     scatter = _Scatter(values)
     groups: list[Group] = []
     if len(scatter.edges) <= _BUSY * len(values):
-        groups += _excursions(scatter, around)
+        longest = _COMMAND if around.commanded else LONGEST
+        excursions: list[Group] = []
+        behind = 0
+        for place, edge in enumerate(scatter.edges):
+            first = int(edge) + 1
+            if first < behind:
+                continue
+            for other in scatter.edges[place + 1 :]:
+                if other - edge > longest:
+                    break
+                size = scatter.group(first, int(other) + 1)
+                if size and not _confirmed(first, int(other) + 1, around.others):
+                    behind = int(other) + 1
+                    excursions.append(
+                        Group(first, behind, "spike" if behind == first + 1 else "dropout", size)
+                    )
+                    break
+        excursions = _standing_clear(scatter, excursions)
+        if not around.commanded:
+            excursions += _held(scatter, excursions, around)
+        groups += excursions
     if not around.commanded:
         groups += [g for g in _stuck(values, around) if not _overlaps(g, groups)]
         if around.motion:
@@ -301,7 +321,8 @@ class _Scatter:
         self.values = values
         self.changes = np.diff(values)
         self.jumps = self.changes - median_filter(self.changes, _SLOPE_SPAN, mode="nearest")
-        self.least = _least_scatter(values)
+        low, high = np.percentile(values, (5.0, 95.0))
+        self.least = max(noise_of(values), quantum_of(values), _SHARE_OF_RANGE * float(high - low))
         size = np.abs(self.jumps)
         local = _TO_DEVIATION * median_filter(size, _SCATTER_SPAN, mode="nearest")
         scale = np.maximum(local, self.least)
@@ -330,41 +351,6 @@ class _Scatter:
         largest = float(off.max())
         ends = min(off[0], off[-1]) if both else max(off[0], off[-1])
         return largest if largest > _OFF * scale and ends >= 0.5 * largest else 0.0
-
-
-def _least_scatter(values: Array) -> float:
-    low, high = np.percentile(values, (5.0, 95.0))
-    return max(noise_of(values), quantum_of(values), _SHARE_OF_RANGE * float(high - low))
-
-
-def _count(values: Array) -> float:
-    """Return the usual smallest change: the count, if there is one, also behind a jump by a part of it."""
-    changes = np.abs(np.diff(values))
-    changes = changes[changes > 0.0]
-    return float(np.percentile(changes, 5.0)) if len(changes) else 0.0
-
-
-def _excursions(scatter: _Scatter, around: Surroundings) -> list[Group]:
-    """Return groups that leave the course of a channel and return to it."""
-    longest = _COMMAND if around.commanded else LONGEST
-    groups: list[Group] = []
-    behind = 0
-    for place, edge in enumerate(scatter.edges):
-        first = int(edge) + 1
-        if first < behind:
-            continue
-        for other in scatter.edges[place + 1 :]:
-            if other - edge > longest:
-                break
-            size = scatter.group(first, int(other) + 1)
-            if size and not _confirmed(first, int(other) + 1, around.others):
-                behind = int(other) + 1
-                groups.append(Group(first, behind, "spike" if behind == first + 1 else "dropout", size))
-                break
-    groups = _standing_clear(scatter, groups)
-    if not around.commanded:
-        groups += _held(scatter, groups, around)
-    return groups
 
 
 def _standing_clear(scatter: _Scatter, groups: list[Group]) -> list[Group]:
@@ -402,7 +388,11 @@ def _held(scatter: _Scatter, groups: Sequence[Group], around: Surroundings) -> I
 
 def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
     """Yield runs of equal values in a channel that is noise all around, while other channels go on."""
-    if noise_of(values) < 2.0 * _count(values):
+    # The usual smallest change: the count, if there is one, also behind a jump by a part of it.
+    changes = np.abs(np.diff(values))
+    changes = changes[changes > 0.0]
+    count = float(np.percentile(changes, 5.0)) if len(changes) else 0.0
+    if noise_of(values) < 2.0 * count:
         return
     extremes = float(values.min()), float(values.max())
     abrupt = _JUMP * max(noise_of(values), float(np.median(np.abs(np.diff(values)))))
@@ -516,7 +506,11 @@ def check_channels(file: str, time: Array, columns: Sequence[Sampled], *, first_
         now = values.get(column.head, column.values)
         if np.ptp(now) == 0.0:
             rows = rows_in_words(np.arange(len(now)), first_row)
-            rests = column.shows_input or _all_rest(others)
+            moving = (
+                np.ptp(each.values) > _MOVES * max(noise_of(each.values), quantum_of(each.values))
+                for each in others
+            )
+            rests = column.shows_input or (bool(others) and not any(moving))
             (remarks if rests else findings).append(Finding(f"{place}, {rows}", f"is constant at {now[0]:g}"))
         remarks += _too_coarse(place, column, now, time)
         for finding, suspect in _clipped(place, column, now, others, first_row):
@@ -595,14 +589,6 @@ def _too_coarse(place: str, column: Sampled, values: Array, time: Array) -> Iter
         yield Finding(place, f"{text}: record at {wanted:g} Hz or more")
 
 
-def _all_rest(others: Sequence[Witness]) -> bool:
-    return bool(others) and not any(_moves(each.values) for each in others)
-
-
-def _moves(values: Array) -> bool:
-    return bool(np.ptp(values) > _MOVES * max(noise_of(values), quantum_of(values)))
-
-
 def _clipped(
     place: str, column: Sampled, values: Array, others: Sequence[Witness], first_row: int
 ) -> Iterable[tuple[Finding, bool]]:
@@ -615,7 +601,9 @@ def _clipped(
     if np.ptp(values) == 0.0 or noise_of(values) < 2.0 * quantum_of(values):
         return
     for extreme, which in ((values.max(), "largest"), (values.min(), "smallest")):
-        run = _longest_run(values == extreme)
+        places = np.flatnonzero(values == extreme)
+        runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+        run = max(runs, key=len)
         if len(run) < _CLIPPED_RUN or not _cut_off(values, run):
             continue
         if others and not any(_changes(each.values, run) for each in others):
@@ -646,9 +634,3 @@ def _cut_off(values: Array, run: Indices) -> bool:
     # Peak of the parabola that has this slope half of the approach before the run.
     missing = 0.5 * half**2 * max(slopes, default=0.0) / (half + 0.5 * _APPROACH)
     return missing > _MISSING_COUNTS * max(quantum_of(values), noise_of(values))
-
-
-def _longest_run(mask: Mask) -> Indices:
-    places = np.flatnonzero(mask)
-    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    return max(runs, key=len)

@@ -234,7 +234,10 @@ def read_table(file: Path) -> RecordTable:
     vector under its path, ``group/name``. A log gives ``topic/field``, see :mod:`~.robot_logs`.
     """
     if is_robot_log(file):
-        return _log(file)
+        rosbags, mcap = (_library(name, file, "robots") for name in ("rosbags.highlevel", "mcap.reader"))
+        with _damage_named(file):
+            log = read_robot_log(file, rosbags, mcap)
+        return RecordTable(file.name, log.columns, units=log.units, remarks=log.remarks, behind=log.behind)
     reader = {".csv": _csv, ".parquet": _parquet, ".mat": _mat}.get(file.suffix.lower(), _hdf5)
     with named_if_unreadable(file):
         return reader(file)
@@ -268,13 +271,6 @@ def _parquet(file: Path) -> RecordTable:
                 next_step="give each column a head of its own",
             )
     return RecordTable(file.name, _numeric(dict(zip(names, vectors, strict=True))))
-
-
-def _log(path: Path) -> RecordTable:
-    rosbags, mcap = (_library(name, path, "robots") for name in ("rosbags.highlevel", "mcap.reader"))
-    with _damage_named(path):
-        log = read_robot_log(path, rosbags, mcap)
-    return RecordTable(path.name, log.columns, units=log.units, remarks=log.remarks, behind=log.behind)
 
 
 def _mat(file: Path) -> RecordTable:
@@ -333,31 +329,26 @@ def _hdf5(file: Path) -> RecordTable:
     arrays: dict[str, Any] = {}
 
     def visit(name: str, node: Any) -> None:
-        if isinstance(node, h5py.Dataset) and not name.startswith("#") and _is_vector(node):
-            _check_dataset(f"{file.name}: '{name}'", node)
+        if not isinstance(node, h5py.Dataset) or name.startswith("#"):
+            return
+        if node.dtype.kind in "fiub" and sum(length != 1 for length in node.shape) == 1:
+            # Refuse a column whose numbers stand in other files, or are more than a record can hold.
+            where = f"{file.name}: '{name}'"
+            if node.external or node.is_virtual:
+                raise MeasurementError(
+                    where, "takes its numbers from another file", next_step="write the numbers into this file"
+                )
+            if node.size > _MOST_ROWS:
+                raise MeasurementError(
+                    where,
+                    f"declares {node.size:.3g} numbers; at most {_MOST_ROWS:.3g} are read",
+                    next_step="split the record",
+                )
             arrays[name] = node[()]
 
     with _damage_named(file), h5py.File(file, "r") as stream:
         stream.visititems(visit)
         return RecordTable(file.name, _numeric(arrays))
-
-
-def _is_vector(dataset: Any) -> bool:
-    return dataset.dtype.kind in "fiub" and sum(length != 1 for length in dataset.shape) == 1
-
-
-def _check_dataset(where: str, dataset: Any) -> None:
-    """Refuse a column whose numbers stand in other files, or are more than a record can hold."""
-    if dataset.external or dataset.is_virtual:
-        raise MeasurementError(
-            where, "takes its numbers from another file", next_step="write the numbers into this file"
-        )
-    if dataset.size > _MOST_ROWS:
-        raise MeasurementError(
-            where,
-            f"declares {dataset.size:.3g} numbers; at most {_MOST_ROWS:.3g} are read",
-            next_step="split the record",
-        )
 
 
 def _numeric(arrays: Mapping[str, Any]) -> dict[str, Array]:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError
 from ....model import FlatModel
 from ....model.roles import declared_reading
@@ -57,7 +56,13 @@ def largest_speed(plant: FlatModel) -> float:
     numbers = plant.evaluate(list(plant.start(plant.states))) | dict(plant.values)
     table, turns = stiffness_table(drive), abs(drive.spring_turns_value)
     deflections = table.grid * (turns if drive.spring_seen_at_the_motor else 1.0)
-    torques, held = _over(deflections, table.values[:, 0])
+    # Torque at rest and energy over the deflections of a spring; both are 0 in the middle.
+    results = [table.values[:, 0]]
+    for _ in range(2):
+        cells = (results[-1][1:] + results[-1][:-1]) / 2.0 * np.diff(deflections)
+        summed = np.concatenate([[0.0], np.cumsum(cells)])
+        results.append(summed - np.interp(0.0, deflections, summed))
+    torques, held = results[1], results[2]
     fastest = 0.0
     for way, against in zip((1.0, -1.0), torques_by_current(plant), strict=True):
         allowed = np.flatnonzero(torques >= -against if way > 0.0 else torques <= against)
@@ -70,16 +75,6 @@ def largest_speed(plant: FlatModel) -> float:
         constant = numbers[drive.motor.torque_constant] * (numbers[turned] if turned else 1.0)
         speed = min(speed, numbers[f"{drive.body.name}.voltage_limit"] / constant)
     return speed
-
-
-def _over(deflections: Array, slopes: Array) -> tuple[Array, Array]:
-    """Return torque at rest and energy over the deflections of a spring; both are 0 in the middle."""
-    results = [slopes]
-    for _ in range(2):
-        cells = (results[-1][1:] + results[-1][:-1]) / 2.0 * np.diff(deflections)
-        summed = np.concatenate([[0.0], np.cumsum(cells)])
-        results.append(summed - np.interp(0.0, deflections, summed))
-    return results[1], results[2]
 
 
 def rate_remarks(plant: FlatModel) -> list[str]:

@@ -14,7 +14,6 @@ from typing import ClassVar, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
@@ -363,13 +362,6 @@ class ScheduledTorque(TorqueLaw):
         if table.argument != drive.names.angle:
             writer.input(table.argument, "rad", "measured angle of the spring")
         (slope,) = writer.look_up(table)
-        floor = writer.number(self._floor(table))
-        stiffness = ca.sqrt(slope * slope + floor * floor)
-        name = f"{series_spring(drive.plant).name}.stiffness.scheduled"
-        return writer.signal(name, "N*m/rad", "stiffness that the law divides by", stiffness)
-
-    def _floor(self, table: Table) -> Variable:
-        """Return the floor of the stiffness as a parameter; it is positive where the table has a zero."""
         secant, smallest = _secant(table), int(np.argmin(table.values[:, 0]))
         value = FLOOR_SHARE * secant if self.stiffness_floor is None else self.stiffness_floor
         least = LEAST_FLOOR * secant if table.values[smallest, 0] <= LEAST_FLOOR * secant else 0.0
@@ -381,10 +373,14 @@ class ScheduledTorque(TorqueLaw):
                 next_step=f"give at least {least:.2g} N·m/rad; a fifth of the secant stiffness, "
                 f"{FLOOR_SHARE * secant:.3g} N·m/rad, is the default",
             )
-        return Variable(
+        stiffness_floor = Variable(
             f"{GAIN}.stiffness_floor", "N*m/rad", "torque loop: stiffness that the law takes at least",
             value, value or 1.0, least,
         )  # fmt: skip
+        floor = writer.number(stiffness_floor)
+        stiffness = ca.sqrt(slope * slope + floor * floor)
+        name = f"{series_spring(drive.plant).name}.stiffness.scheduled"
+        return writer.signal(name, "N*m/rad", "stiffness that the law divides by", stiffness)
 
     def _acceleration(self, writer: LawWriter, ahead: Expression) -> Expression:
         """Return the filtered rate of the feedforward part of the speed.
@@ -426,7 +422,11 @@ def stiffness_table(drive: KnownDrive) -> Table:
     offset -= turns * float(plant.variable(body.motion).start)
     # The mean slope of each cell around a grid point, so that the sum over the table is the torque.
     edges = np.concatenate([angles[:1], (angles[1:] + angles[:-1]) / 2.0, angles[-1:]])
-    torques = _rest_torques(plant, spring.effort, (edges - offset) / turns)
+    symbols = plant.symbols()
+    (at_rest,) = evaluate_at(
+        plant, symbols, [named(plant, symbols)[spring.effort]], rest_states(plant, (edges - offset) / turns)
+    )
+    torques = at_rest.ravel()
     slopes = np.maximum(np.diff(torques) / np.diff(edges), 0.0)
     column = Variable(f"{spring.name}.tangent_stiffness", "N*m/rad", f"slope of {spring.effort} at rest")
     if not drive.spring_seen_at_the_motor:
@@ -435,13 +435,6 @@ def stiffness_table(drive: KnownDrive) -> Table:
     order = np.argsort(seen)
     step = float(abs(seen[1] - seen[0]))
     return Table(body.motion, float(np.min(seen)), step, (column,), slopes[order][:, None])
-
-
-def _rest_torques(plant: FlatModel, torque: str, angles: Array) -> Array:
-    """Return a torque at rest at many angles of the motor."""
-    s = plant.symbols()
-    (torques,) = evaluate_at(plant, s, [named(plant, s)[torque]], rest_states(plant, angles))
-    return torques.ravel()
 
 
 def _secant(table: Table) -> float:
