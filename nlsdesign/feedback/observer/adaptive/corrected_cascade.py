@@ -200,7 +200,12 @@ def design_corrected_observer(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
     return corrected(
-        model, cascade, settings=settings or AdaptiveSettings(), grid=grid, estimate=estimate, measured=measured
+        model,
+        cascade,
+        settings=settings or AdaptiveSettings(),
+        grid=grid,
+        estimate=estimate,
+        measured=measured,
     )
 
 

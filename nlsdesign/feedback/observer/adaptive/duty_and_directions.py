@@ -274,7 +274,7 @@ def uncertain_directions(
 
 
 def root_of(covariance: Array) -> Array:
-    """Return R with R·Rᵀ = covariance and a column for each direction that is uncertain, shape (numbers, ξ)."""
+    """Return R with R·Rᵀ = covariance, a column for each uncertain direction, shape (numbers, ξ)."""
     if np.array_equal(covariance, np.diag(np.diag(covariance))):
         # Independent numbers keep their own directions.
         return np.diag(np.sqrt(np.diag(covariance)))
