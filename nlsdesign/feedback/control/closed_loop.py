@@ -409,7 +409,19 @@ class ClosedLoop:
         for name in opened:
             if name not in known:
                 raise unknown_name("input of the loop", name, known)
-        self._check_sources(sources)
+        plant = self.plant
+        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
+        offered = {f"{PLANT}.{v.name}" for group in groups for v in group}
+        offered |= {f"{OBSERVER}.{v.name}" for v in self.observer.outputs}
+        for target, origin in sources.items():
+            if origin in offered or origin == target:
+                continue
+            if target in self.wires:
+                raise unknown_name(f"wire to '{target}' from", origin, offered)
+            raise ArrangementError(
+                f"input '{target}'", "is open: it is neither driven nor wired, and nothing has the same name",
+                next_step="give it in inputs or in wires",
+            )  # fmt: skip
         return SampledSystem(
             plant=self.plant,
             blocks={OBSERVER: self.observer, CONTROLLER: self.controller},
@@ -427,21 +439,6 @@ class ClosedLoop:
             return self.wires[full]
         outputs = {v.name for v in self.observer.outputs}
         return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
-
-    def _check_sources(self, sources: Mapping[str, str]) -> None:
-        plant = self.plant
-        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
-        known = {f"{PLANT}.{v.name}" for group in groups for v in group}
-        known |= {f"{OBSERVER}.{v.name}" for v in self.observer.outputs}
-        for name, source in sources.items():
-            if source in known or source == name:
-                continue
-            if name in self.wires:
-                raise unknown_name(f"wire to '{name}' from", source, known)
-            raise ArrangementError(
-                f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
-                next_step="give it in inputs or in wires",
-            )  # fmt: skip
 
 
 def _record(loop: ClosedLoop, batch: BatchTrace) -> Trace:
