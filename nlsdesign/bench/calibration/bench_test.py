@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from ...components.assembly.changed_copies import law_of_part
 from ...components.assembly.named_parts import Assembly
 from ...components.core.contacts import Regularised, WithFriction
-from ...components.core.element import Tie, tie
+from ...components.core.element import tie
 from ...components.mechanics.bodies import Fixed
 from ...components.mechanics.loads import ConstantLoad
 from ...components.sensing.sensors import TorqueSensor
@@ -179,15 +180,11 @@ def _clamped(actuator: Assembly) -> Assembly:
 
 def _sliding(actuator: Assembly) -> Assembly:
     """Return the machine with dry friction whose sign is that of the measured speed."""
-    rubbing = [path for path, part in actuator.walk() if isinstance(_law(part), WithFriction)]
+    rubbing = [path for path, part in actuator.walk() if isinstance(law_of_part(part), WithFriction)]
     for path in sorted(rubbing, key=lambda p: -p.count(".")):
-        law = _law(actuator[path])
+        law = law_of_part(actuator[path])
         assert isinstance(law, WithFriction)
         unit = law.domain.rate_unit
         speed = quantity(_SLIDING[unit], unit, source="assumed: moving samples alone count")
         actuator = actuator.with_part(path, replace(law, contact=Regularised(creep_speed=speed)))
     return actuator
-
-
-def _law(part: object) -> object:
-    return part.element if isinstance(part, Tie) else part

@@ -116,7 +116,16 @@ def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
     """
     if not (rate > 0.0 and math.isfinite(rate)):
         raise ValueRangeError(f"rate {rate:g} Hz", "must be positive", next_step="give for instance 500")
-    time = _common(channels, rate)
+    begins, ends = max(channels, key=lambda c: c.time[0]), min(channels, key=lambda c: c.time[-1])
+    start, stop = float(begins.time[0]), float(ends.time[-1])
+    count = math.floor((stop - start) * rate + _SAME) + 1
+    if count < _LEAST:
+        raise MeasurementError(
+            f"'{begins.name}' from {start:g} s and '{ends.name}' until {stop:g} s",
+            f"have {max(count, 0)} samples in common at {rate:g} Hz; at least {_LEAST} are needed",
+            next_step="check the units of the clocks, or take a higher rate",
+        )
+    time: Array = np.minimum(start + np.arange(count) / rate, stop)
     values, changes = {}, []
     for each in channels:
         values[each.name], change = _resampled(each, time, 1.0 / rate)
@@ -126,20 +135,6 @@ def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
         if length >= 1.0 / rate:
             changes.append(f"{end} {length:.3g} s left out, where not every channel runs")
     return Resampled(time, values, tuple(changes))
-
-
-def _common(channels: Sequence[Channel], rate: float) -> Array:
-    begins, ends = max(channels, key=lambda c: c.time[0]), min(channels, key=lambda c: c.time[-1])
-    first, last = float(begins.time[0]), float(ends.time[-1])
-    count = math.floor((last - first) * rate + _SAME) + 1
-    if count < _LEAST:
-        raise MeasurementError(
-            f"'{begins.name}' from {first:g} s and '{ends.name}' until {last:g} s",
-            f"have {max(count, 0)} samples in common at {rate:g} Hz; at least {_LEAST} are needed",
-            next_step="check the units of the clocks, or take a higher rate",
-        )
-    grid: Array = np.minimum(first + np.arange(count) / rate, last)
-    return grid
 
 
 def _resampled(channel: Channel, time: Array, step: float) -> tuple[Array, str]:
