@@ -17,7 +17,7 @@ from ...model.origin import common_origin
 from ...model.roles import moved_load, series_spring
 from ...model.transform import with_signal
 from ...simulation import Trace, range_warnings
-from ...simulation.sampled_batch import PLANT, BatchTrace, SampledSystem, run_batch
+from ...simulation.sampled_batch import PLANT, SampledSystem, run_batch
 from .laws.law_writer import GAIN
 from .laws.torque_loop import LoopNames, loop_names
 
@@ -380,7 +380,28 @@ class ClosedLoop:
                 f"plant {self.plant.name} at t = {at:g} s", "a state is not finite",
                 next_step="use more substeps per sample, or check the gains of the loop",
             )  # fmt: skip
-        return _record(self, batch)
+        # The record, with the signals of the plant computed from its states and inputs.
+        plant, time = self.plant, batch.time
+        x, u = (
+            np.array([batch[f"{PLANT}.{v.name}"][0] for v in group]).reshape(len(group), len(time))
+            for group in (plant.states, plant.inputs)
+        )
+        p = np.repeat(plant.start(plant.parameters)[:, None], len(time), axis=1)
+        _, y, s, _ = plant.equations.map(len(time))(time[None, :], x, u, p, np.zeros((0, len(time))))
+        rows = {f"{PLANT}.{v.name}": row for v, row in zip(plant.signals, ca.densify(s).full(), strict=True)}
+        rows |= {f"{PLANT}.{v.name}": row for v, row in zip(plant.outputs, ca.densify(y).full(), strict=True)}
+        signals = rows | {name: values[0] for name, values in batch.signals.items()}
+        owners = {PLANT: plant, OBSERVER: self.observer, CONTROLLER: self.controller}
+        units = {
+            f"{owner}.{v.name}": v.unit
+            for owner, model in owners.items()
+            for v in (*model.signals, *model.states, *model.inputs, *model.outputs)
+        }
+        warnings = range_warnings(plant.signals + plant.states, time, signals, f"{PLANT}.")
+        return Trace(
+            time, signals, {name: units[name] for name in signals}, f"closed loop of {plant.name}",
+            warnings=warnings,
+        )  # fmt: skip
 
     def system(self, opened: Iterable[str]) -> SampledSystem:
         """Return plant, observer and controller as one sampled system, for many runs at once.
@@ -439,31 +460,6 @@ class ClosedLoop:
             return self.wires[full]
         outputs = {v.name for v in self.observer.outputs}
         return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
-
-
-def _record(loop: ClosedLoop, batch: BatchTrace) -> Trace:
-    """Return the record, with the signals of the plant computed from its states and inputs."""
-    plant, time = loop.plant, batch.time
-    x, u = (
-        np.array([batch[f"{PLANT}.{v.name}"][0] for v in group]).reshape(len(group), len(time))
-        for group in (plant.states, plant.inputs)
-    )
-    p = np.repeat(plant.start(plant.parameters)[:, None], len(time), axis=1)
-    _, y, s, _ = plant.equations.map(len(time))(time[None, :], x, u, p, np.zeros((0, len(time))))
-    rows = {f"{PLANT}.{v.name}": row for v, row in zip(plant.signals, ca.densify(s).full(), strict=True)}
-    rows |= {f"{PLANT}.{v.name}": row for v, row in zip(plant.outputs, ca.densify(y).full(), strict=True)}
-    signals = rows | {name: values[0] for name, values in batch.signals.items()}
-    owners = {PLANT: plant, OBSERVER: loop.observer, CONTROLLER: loop.controller}
-    units = {
-        f"{owner}.{v.name}": v.unit
-        for owner, model in owners.items()
-        for v in (*model.signals, *model.states, *model.inputs, *model.outputs)
-    }
-    warnings = range_warnings(plant.signals + plant.states, time, signals, f"{PLANT}.")
-    return Trace(
-        time, signals, {name: units[name] for name in signals}, f"closed loop of {plant.name}",
-        warnings=warnings,
-    )  # fmt: skip
 
 
 DEFLECTION = "measured"
