@@ -244,7 +244,23 @@ def lag_between(delayed: Channel, reference: Channel, *, longest: float | None =
         )  # fmt: skip
     shift = _refined(one, other, float(lags[peak]), step)
     error, residual = _standard_error(one, other, shift)
-    _check_unique(pair, lags, correlations, effective_size(residual))
+    best = float(np.max(correlations))
+    # A second peak of a repeating motion leaves as little unexplained variance as the first.
+    allowed = (1.0 - best**2) * (
+        1.0 + _SIGNIFICANT * math.sqrt(2.0 / max(effective_size(residual), 1.0))
+    ) + 1e-9
+    peaks = [
+        k
+        for k in scipy.signal.find_peaks(correlations)[0]
+        if 1.0 - correlations[k] ** 2 <= allowed and correlations[k] > 0.0
+    ]
+    if len(peaks) > 1:
+        equal = " and ".join(f"{lags[k]:.4g} s" for k in sorted(peaks, key=lambda k: -correlations[k])[:2])
+        raise MeasurementError(
+            f"lag of {pair}",
+            f"is not unique: the motion repeats, so {equal} fit as well",
+            next_step="look for a lag below half a period (longest), or record a motion that does not repeat",
+        )
     return Lag(shift, error, _at(one, other, shift), delayed.name, reference.name)
 
 
@@ -317,21 +333,3 @@ def _standard_error(delayed: Channel, reference: Channel, shift: float) -> tuple
     quiet = np.flatnonzero(rho < 2.0 / math.sqrt(len(score)))
     colour = max(1.0, 1.0 + 2.0 * float(np.sum(rho[: quiet[0]] if len(quiet) else rho)))
     return math.sqrt(len(score) * float(np.mean(score**2)) * colour) / float(own @ own), residual
-
-
-def _check_unique(pair: str, lags: Array, correlations: Array, effective: float) -> None:
-    best = float(np.max(correlations))
-    # A second peak of a repeating motion leaves as little unexplained variance as the first.
-    allowed = (1.0 - best**2) * (1.0 + _SIGNIFICANT * math.sqrt(2.0 / max(effective, 1.0))) + 1e-9
-    peaks = [
-        k
-        for k in scipy.signal.find_peaks(correlations)[0]
-        if 1.0 - correlations[k] ** 2 <= allowed and correlations[k] > 0.0
-    ]
-    if len(peaks) > 1:
-        equal = " and ".join(f"{lags[k]:.4g} s" for k in sorted(peaks, key=lambda k: -correlations[k])[:2])
-        raise MeasurementError(
-            f"lag of {pair}",
-            f"is not unique: the motion repeats, so {equal} fit as well",
-            next_step="look for a lag below half a period (longest), or record a motion that does not repeat",
-        )
