@@ -20,6 +20,7 @@ from nlsdesign.components import (
     GearedMotor,
     LinearElastic,
     Regularised,
+    Spring,
     StrainStiffening,
     TwoSidedCam,
     ViscousMaterial,
@@ -89,6 +90,16 @@ def actuator(
             CoulombFriction(sliding_effort=friction, contact=Regularised(creep_speed=0.02)), "motor"
         )
     return assembly("published", **parts)
+
+
+def linear_actuator(stiffness: float, *, moved: bool = False) -> FlatModel:
+    """Return the actuator with a linear spring in place of cam and rubber; its load held or moved."""
+    parts = dict(actuator().parts) | {
+        "spring": tie(Spring(stiffness=stiffness, domain=ROTATION), "motor", "load")
+    }
+    if moved:
+        parts["load"] = Driven()
+    return flatten(assembly("linear", **parts), outputs=["motor.angle", "spring.torque"])
 
 
 def bench(viscosity: float = PRINTED, **options: float) -> FlatModel:

@@ -32,7 +32,6 @@ from .typed_values import NamedPath, Number
 
 if TYPE_CHECKING:
     from ..bench.calibration import CalibrationPlan
-    from ..bench.discrepancy import Refit
 
 _PARTS = ("plant", "observer", "controller", "torque_loop")
 """What --export writes; the library that does it is not loaded for an option."""
@@ -109,14 +108,6 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
         exported = {} if machine is None else machine.content()
         show_json({**result.to_dict(str(deck)), "report": page, **exported})
         return
-    _show_fit(result)
-    show_lines(machine.findings() if machine else ())
-    click.echo(f"report: {page}")
-    following = next_command("diagnose", "--deck", deck, "--records", records, *as_read(**reading))
-    click.echo(f"written: {file} and {deck}; next: {following}")
-
-
-def _show_fit(result: Refit) -> None:
     numbers = [
         (
             n.name,
@@ -134,6 +125,10 @@ def _show_fit(result: Refit) -> None:
     ]
     show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
     show_lines(result.words())
+    show_lines(machine.findings() if machine else ())
+    click.echo(f"report: {page}")
+    following = next_command("diagnose", "--deck", deck, "--records", records, *as_read(**reading))
+    click.echo(f"written: {file} and {deck}; next: {following}")
 
 
 def as_read(mapping: Path | None, hold_out: Sequence[str], joint: str | None = None) -> list[str]:

@@ -28,7 +28,6 @@ from .typed_values import NamedPath
 
 if TYPE_CHECKING:
     from ..components import Assembly
-    from ..regeneration import Readiness
 
 _file = NamedPath(dir_okay=False, exists=True)
 _LONG_ROW = 8
@@ -120,10 +119,6 @@ def check(deck_name: str, as_json: bool) -> None:
                f"{100 * shares['assumed']:.0f} % of them only assumed")  # fmt: skip
     for remark in remarks:
         click.echo(f"warning: {remark}")
-    _show_readiness(commands)
-
-
-def _show_readiness(commands: list[Readiness]) -> None:
     ready = [shown_command(each.command) for each in commands if each.ready]
     click.echo(f"ready for: {', '.join(ready) or 'no command'}")
     reasons: dict[str, list[str]] = {}

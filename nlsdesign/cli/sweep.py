@@ -92,7 +92,14 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
 
 def _show_result(table: SweepTable, out: Path, page: Path | None, *, as_json: bool) -> None:
     """Show how many points there are, why some failed, and the commands that come next."""
-    file, reasons, following = out / "results.parquet", table.failures(), _following(table, out, page)
+    # The commands that come next, each with what it does.
+    following = {}
+    if page is None:
+        following[next_command("report", out)] = "the page: points, reasons of failures, causes, decks"
+    if not table.done.all():
+        first = int(table.values["point"][~table.done][0])
+        following[next_command("report", out, "--deck-of", first)] = "the deck behind a point that failed"
+    file, reasons = out / "results.parquet", table.failures()
     failed = len(table) - int(table.done.sum())
     if as_json:
         content = {"points": len(table), "failed": failed, "reasons": {r: n for r, n, _ in reasons}}
@@ -111,17 +118,6 @@ def _show_result(table: SweepTable, out: Path, page: Path | None, *, as_json: bo
         click.echo(f"written: {page}")
     for command, what in following.items():
         click.echo(f"next: {command}    # {what}")
-
-
-def _following(table: SweepTable, out: Path, page: Path | None) -> dict[str, str]:
-    """Return the commands that come next, each with what it does."""
-    commands = {}
-    if page is None:
-        commands[next_command("report", out)] = "the page: points, reasons of failures, causes, decks"
-    if not table.done.all():
-        first = int(table.values["point"][~table.done][0])
-        commands[next_command("report", out, "--deck-of", first)] = "the deck behind a point that failed"
-    return commands
 
 
 def _executor(given: dict[str, Any]) -> Executor:

@@ -161,14 +161,6 @@ def place_for(target: Path, draft: Path) -> Path:
     raise ExportError(str(target), "was changed, and there is no free name beside it", next_step="tidy up")
 
 
-def note_written(path: Path) -> None:
-    """Write the name and digest of a written file into the list of its folder, while a command keeps one."""
-    kept = _now.get()
-    if kept is not None and kept.covers(path):
-        writers = {**_writers(path.parent), path.name: kept.command}
-        _write_list(path.parent, {**_listed(path.parent), path.name: _digest(path)}, writers)
-
-
 def discard(path: Path) -> None:
     """Remove what an earlier run has left, unless a command keeps it because somebody changed or brought it.
 
@@ -258,7 +250,11 @@ def draft(target: Path) -> Iterator[Path]:
         os.chmod(name, 0o644)
         place = place_for(target, Path(name))
         os.replace(name, place)
-        note_written(place)
+        # Write the name and digest of a written file into the list of its folder, while a command keeps one.
+        kept = _now.get()
+        if kept is not None and kept.covers(place):
+            writers = {**_writers(place.parent), place.name: kept.command}
+            _write_list(place.parent, {**_listed(place.parent), place.name: _digest(place)}, writers)
     except OSError as error:
         rule = f"cannot be written ({error.strerror or error})"
         raise ExportError(str(target), rule, next_step="name another file or folder") from error

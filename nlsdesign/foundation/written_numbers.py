@@ -41,20 +41,19 @@ def split_number(text: str) -> tuple[float, str]:
         raise UnitError(f"'{text}'", "does not start with a number")
     comma = _COMMA.match(match.group(2))
     if comma is not None:
-        raise _with_comma(text, match.group(1), comma)
+        # The error on a comma, which parts decimals in one country and thousands in another.
+        whole = match.group(1)
+        digits, unit_typed = comma["digits"], comma["unit"]
+        pieces = [f"{whole}.{digits} {unit_typed}".rstrip()]
+        if len(digits) == 3 and whole.strip("-+0"):
+            pieces.append(f"{whole}{digits} {unit_typed}".rstrip())
+        several = any(mark in digits for mark in ",.")
+        step = (
+            "write it without commas" if several else "write " + " or ".join(f"'{each}'" for each in pieces)
+        )
+        raise UnitError(f"'{text}'", "has a comma; decimals are written with a point", next_step=step)
     unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", match.group(2).strip())
     return float(match.group(1)), unit
-
-
-def _with_comma(text: str, whole: str, behind: re.Match[str]) -> UnitError:
-    """Return the error on a comma, which parts decimals in one country and thousands in another."""
-    digits, unit = behind["digits"], behind["unit"]
-    pieces = [f"{whole}.{digits} {unit}".rstrip()]
-    if len(digits) == 3 and whole.strip("-+0"):
-        pieces.append(f"{whole}{digits} {unit}".rstrip())
-    several = any(mark in digits for mark in ",.")
-    step = "write it without commas" if several else "write " + " or ".join(f"'{each}'" for each in pieces)
-    return UnitError(f"'{text}'", "has a comma; decimals are written with a point", next_step=step)
 
 
 _OF_HEADS = {

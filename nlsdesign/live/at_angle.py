@@ -10,7 +10,7 @@ import numpy as np
 
 from ..components.assembly.named_parts import Assembly
 from ..design import Contour
-from ..design.statics.contour import turn
+from ..design.statics.contour import cable_up_to, turn
 from ..feedback.analysis import Observability
 from ..feedback.analysis.rest_points import RestPoints, rest_points
 from ..foundation.arrays import Array
@@ -52,7 +52,8 @@ def mechanism_at(
     guide = min(contour.anchor_distance, _REACH * radius)
     shown = min(rest_length + extensions[0], guide)
     wall = guide + _CLEARANCE + extensions[2] - extensions[0] + shown
-    line, contact, end = _cable(contour, angle, guide, both)
+    line = cable_up_to(contour, angle, guide, from_centre=both)
+    contact, end = line[-2:]
     clamp = np.array([wall - shown - (extensions[1] - extensions[0]), end[1]])
     half = 0.5 * _THICKNESS * float(np.sqrt(rest_length / max(rest_length + extensions[1], 1e-6)))
     up = np.array([0.0, half])
@@ -73,18 +74,6 @@ def mechanism_at(
         extent=(wall + 2e-3, radius + _THICKNESS),
         remark="extension, cam and cable are to scale, the height of the rubber is not" + short,
     )
-
-
-def _cable(contour: Contour, angle: float, guide: float, both: bool) -> tuple[Array, Array, Array]:
-    """Return the line of the cable up to its guide, its contact point and the guide."""
-    touched = contour.points[contour.angles < abs(angle)]
-    side = np.array([1.0, -1.0 if angle < 0.0 else 1.0])
-    contact, anchor = contour.cable(angle)
-    share = min(1.0, (guide - contact[0]) / (anchor[0] - contact[0]))
-    end = contact + share * (anchor - contact)
-    begin = np.zeros((1, 2)) if both else np.zeros((0, 2))
-    wrapped = turn(np.vstack([begin, touched]) * side, angle)
-    return np.vstack([wrapped, contact, end]), contact, end
 
 
 _GRID = 21

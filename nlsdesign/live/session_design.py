@@ -152,7 +152,15 @@ class SessionDesign:
                 self._news.pause()
                 self._send_file()
             elif "server" in message:
-                self._serve(message["server"])
+                asked = message["server"]
+                try:
+                    answer = self._served(asked)
+                except NlsError as error:
+                    answer = {"refused": in_words(str(error))}
+                except Exception as error:
+                    answer = {"refused": f"a fault of the program: {type(error).__name__}: {error}"}
+                if answer is not None:
+                    self._outbox.server({"number": asked["number"], **answer})
             else:
                 self._questions.answer(message["page"])
             if time.monotonic() - last_news >= _NEWS:
@@ -162,16 +170,6 @@ class SessionDesign:
     def _begin(self, live: LiveDesign, trouble: str = "") -> None:
         self._news = SessionNews(live, self._records, self._outbox, trouble=trouble)
         self._questions = PageQuestions(self._news)
-
-    def _serve(self, asked: Mapping[str, Any]) -> None:
-        try:
-            answer = self._served(asked)
-        except NlsError as error:
-            answer = {"refused": in_words(str(error))}
-        except Exception as error:
-            answer = {"refused": f"a fault of the program: {type(error).__name__}: {error}"}
-        if answer is not None:
-            self._outbox.server({"number": asked["number"], **answer})
 
     def _served(self, asked: Mapping[str, Any]) -> dict[str, Any] | None:
         """Return an answer; nothing where it is given when a file is ready."""

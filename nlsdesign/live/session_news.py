@@ -17,7 +17,7 @@ from ..design.optimisation.limits import limit_kinds
 from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
 from ..foundation.rubber_library import materials
-from .answers import AngleAnswer, AnswerSource, DesignView, LiveAnswer, WorkStage, to_json
+from .answers import AnswerSource, DesignView, LiveAnswer, WorkStage, to_json
 from .at_angle import AngleView
 from .background import WorkState
 from .gallery import gallery_cards
@@ -58,16 +58,6 @@ def design_data(design: DesignView | None) -> dict[str, Any] | None:
     ]
     data: dict[str, Any] = to_json(dataclasses.replace(design, columns=(), contour=np.zeros((0, 2))))
     return {**data, "columns": columns}
-
-
-def angle_data(answer: AngleAnswer) -> dict[str, Any]:
-    """Return what holds at an angle as plain data, without the mechanism, which is sent before."""
-    return {
-        "angle": answer.angle,
-        "observability": to_json(answer.observability),
-        "poles": to_json(answer.poles),
-        "loop": to_json(answer.loop),
-    }
 
 
 def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, Any]:
@@ -322,7 +312,14 @@ class SessionNews:
             if self._look_due:
                 self._look_due = False
                 if self.live.shown is not None and self._angle is not None:
-                    at = angle_data(self.live.at(self._angle))
+                    # What holds at an angle as plain data, without the mechanism, which is sent before.
+                    answer = self.live.at(self._angle)
+                    at = {
+                        "angle": answer.angle,
+                        "observability": to_json(answer.observability),
+                        "poles": to_json(answer.poles),
+                        "loop": to_json(answer.loop),
+                    }
                     self._outbox.page({"what": "at", "number": None, "at": at})
             if self._settle_at is not None and time.monotonic() >= self._settle_at:
                 self._settle_at = None

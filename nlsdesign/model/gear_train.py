@@ -90,39 +90,6 @@ def train_motions(
     return motions
 
 
-@dataclass(frozen=True)
-class _Load:
-    """What acts on a train: torque and turns of each body, scopes, and the acceleration that is sought."""
-
-    torques: Mapping[str, Expression]
-    turns: Mapping[str, Expression]
-    scopes: Mapping[str, Scope]
-    speed: Expression
-    acceleration: Expression
-
-    def missing(self, wheel: Wheel, carried: dict[str, tuple[Expression, Expression]]) -> Expression:
-        """Return the torque that a wheel lacks for its acceleration; notes what the gears behind it carry."""
-        scope = self.scopes[wheel.name]
-        lacking = wheel.body.inertia_of(scope) * self.turns[wheel.name] * self.acceleration
-        lacking -= self.torques[wheel.name]
-        for joint in wheel.joints:
-            inside = self.scopes[joint.name]
-            ratio = joint.gear.turns(inside)
-            wanted = self.missing(joint.behind, carried)
-            first = wheel if joint.outward else joint.behind
-            speed = self.turns[first.name] * self.speed
-            if joint.outward:
-                given = wanted / ratio / joint.gear.share(inside, wanted / ratio, speed)
-                carried[joint.name] = given, wanted
-                lacking += given
-            else:
-                given = -wanted
-                got = ratio * given * joint.gear.share(inside, given, speed)
-                carried[joint.name] = given, got
-                lacking -= got
-        return lacking
-
-
 def balance_train(
     root: Wheel,
     scopes: Mapping[str, Scope],
@@ -177,7 +144,29 @@ def _solved(
     stand_ins = {name: symbol(f"{name}.acting") for name in acting}
     unknown, turning = symbol(f"{root.name}.sought"), symbol(f"{root.name}.turning")
     carried: dict[str, tuple[Expression, Expression]] = {}
-    lacking = _Load(stand_ins, turns, scopes, turning, unknown).missing(root, carried)
+
+    def missing(wheel: Wheel) -> Expression:
+        """Return the torque that a wheel lacks for its acceleration; notes what the gears behind it carry."""
+        torque = wheel.body.inertia_of(scopes[wheel.name]) * turns[wheel.name] * unknown
+        torque -= stand_ins[wheel.name]
+        for joint in wheel.joints:
+            inside = scopes[joint.name]
+            ratio = joint.gear.turns(inside)
+            wanted = missing(joint.behind)
+            first = wheel if joint.outward else joint.behind
+            pace = turns[first.name] * turning
+            if joint.outward:
+                given = wanted / ratio / joint.gear.share(inside, wanted / ratio, pace)
+                carried[joint.name] = given, wanted
+                torque += given
+            else:
+                given = -wanted
+                got = ratio * given * joint.gear.share(inside, given, pace)
+                carried[joint.name] = given, got
+                torque -= got
+        return torque
+
+    lacking = missing(root)
     root_of = _root(lacking, unknown)
     rest = ca.vertcat(lacking, *[torque for pair in carried.values() for torque in pair])
     results = ca.vertcat(root_of, ca.substitute(rest, unknown, root_of))

@@ -156,6 +156,22 @@ def _choice(examples: Sequence[str], otherwise: str) -> str:
     return f"name one, for instance {examples[0]}" if examples else otherwise
 
 
+def contour_ends(model: FlatModel, spring: SpringNames | None = None) -> dict[str, float]:
+    """Return the angle in rad at which each cam ends, of one spring or of all; not every cam has an end."""
+    cams = [cam for each in ([spring] if spring else model.springs) for cam in each.cams]
+    return {cam.name: model.values[cam.last_angle] for cam in cams if cam.last_angle}
+
+
+_SAME_ANGLE = 1e-4
+"""Relative: a design finds the end of its contour numerically, and what is said of it has four digits."""
+
+
+def passed_ends(model: FlatModel, furthest: float) -> dict[str, float]:
+    """Return the ends of the cams that an angle in rad lies beyond, where a model goes on and no cam does."""
+    ends = contour_ends(model)
+    return {name: end for name, end in ends.items() if furthest > end * (1.0 + _SAME_ANGLE)}
+
+
 class DeclaredReading(NamedTuple):
     """What is declared of the sensor that shows a motion."""
 

@@ -14,11 +14,9 @@ from ..feedback.observer.scheduling.scheduled import whole_contour
 from ..foundation.errors import NlsError, UnitError
 from ..foundation.quantity import typeset_unit
 from ..model import FlatModel, flatten
-from ..model.roles import measured_motion
+from ..model.roles import measured_motion, passed_ends
 
 _COUNT = 41
-_SAME_ANGLE = 1e-4
-"""Relative: a design finds the end of its contour numerically, and the remark prints four digits."""
 
 
 def range_remarks(
@@ -63,18 +61,11 @@ def usual_last(model: FlatModel) -> float:
 def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
     """Return which cams end before an angle."""
     furthest = max(abs(angle) for angle in angles)
-    ends = {
-        cam.name: model.values[cam.last_angle]
-        for spring in model.springs
-        for cam in spring.cams
-        if cam.last_angle
-    }
     return [
         f"the contour of {name} ends at {math.degrees(end):.4g}°, the "
         f"angles go to {math.degrees(furthest):.4g}°: beyond its end the lever arm stays what it is there -> "
         "stay within it (--to), or declare a longer contour"
-        for name, end in ends.items()
-        if furthest > end * (1.0 + _SAME_ANGLE)
+        for name, end in passed_ends(model, furthest).items()
     ]
 
 

@@ -4,7 +4,6 @@ The report of a sweep and the command import it. It decides no physics: question
 """
 
 from .axes import GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
-from .point_deck import point_deck_text as point_deck_text
 from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
 from .preferences import NotAbove as NotAbove
 from .preferences import Preference as Preference
@@ -20,6 +19,7 @@ from .sweep_file import read_sweep_file as read_sweep_file
 from .sweep_folder import standing_points as standing_points
 from .sweep_question import FunctionQuestion
 from .sweep_table import SweepTable, read_sweep
+from .sweep_table import point_deck_text as point_deck_text
 
 __all__ = [
     "AngleQuestion",

@@ -24,7 +24,7 @@ from ..feedback.control.evaluation.linear_loop import LinearLoop
 from ..feedback.observer import CascadeGain, design_observer, observer_bench, observer_errors
 from ..foundation.errors import ArrangementError, MeasurementError, ValueRangeError, brief, unknown_name
 from ..model import FlatModel, flatten
-from ..model.roles import measured_motion, series_spring
+from ..model.roles import measured_motion, passed_ends, series_spring
 from ..model.transform import with_outputs
 from .axis_values import in_unit, si_unit
 from .changes import ASK
@@ -34,8 +34,6 @@ from .sweep_question import SweepQuestion, answer, worst
 
 _HALF_POWER = math.sqrt(0.5)
 _FREQUENCIES = 200
-_SAME_ANGLE = 1e-4
-"""Relative: a design finds the end of its contour numerically."""
 
 
 def _plant(assembly: Assembly, spring: str, measured: str) -> tuple[FlatModel, str, str]:
@@ -46,16 +44,14 @@ def _plant(assembly: Assembly, spring: str, measured: str) -> tuple[FlatModel, s
 
 
 def _require_contour(model: FlatModel, first: float, last: float) -> None:
-    """Refuse angles beyond the end of a cam, where a model goes on and no cam does."""
+    """Refuse angles beyond the end of a cam."""
     furthest = max(abs(first), abs(last))
-    for cam in (cam for spring in model.springs for cam in spring.cams if cam.last_angle):
-        end = model.values[cam.last_angle or ""]
-        if furthest > end * (1.0 + _SAME_ANGLE):
-            raise ValueRangeError(
-                f"angles to {math.degrees(furthest):.4g}°",
-                f"go beyond the contour of {cam.name}, which ends at {math.degrees(end):.4g}°",
-                next_step="take first and last within it",
-            )  # fmt: skip
+    for name, end in passed_ends(model, furthest).items():
+        raise ValueRangeError(
+            f"angles to {math.degrees(furthest):.4g}°",
+            f"go beyond the contour of {name}, which ends at {math.degrees(end):.4g}°",
+            next_step="take first and last within it",
+        )
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,20 @@ def read_sweep_file(path: Path | str) -> SweepTask:
     for key in [*deck.tables, *(["deck"] if deck.head else [])]:
         if key not in _TABLES:
             raise unknown_name(deck.place(key), key, _TABLES)
-    assemblies = _assemblies(deck, file.parent)
+    if "decks" not in deck.tables:
+        raise DeckError(deck.path.name, "names no deck", next_step='write decks = "..." above the tables')
+    given = deck.tables["decks"]
+    given = [given] if isinstance(given, str) else given
+    if not isinstance(given, list) or not given or not all(isinstance(each, str) for each in given):
+        raise DeckError(deck.place("decks"), f"{brief(given)} is no list of decks", next_step='write ["..."]')
+    assemblies: dict[str, Assembly] = {}
+    for name in given:
+        beside = file.parent / name
+        read = load_deck(beside if name.endswith(".toml") and beside.exists() else name)
+        short = Path(name).stem
+        if short in assemblies:
+            raise DeckError(deck.place("decks"), f"names '{short}' twice", next_step="leave one out")
+        assemblies[short] = declare(read)
     tables = deck.tables.get("axes")
     if not isinstance(tables, list) or not tables:
         raise DeckError(
@@ -87,24 +100,6 @@ def read_sweep_file(path: Path | str) -> SweepTask:
     except NlsError as error:
         raise error.at(deck.place(f"ask.{type(question).__name__}")) from None
     return task
-
-
-def _assemblies(deck: Deck, folder: Path) -> dict[str, Assembly]:
-    if "decks" not in deck.tables:
-        raise DeckError(deck.path.name, "names no deck", next_step='write decks = "..." above the tables')
-    given = deck.tables["decks"]
-    given = [given] if isinstance(given, str) else given
-    if not isinstance(given, list) or not given or not all(isinstance(each, str) for each in given):
-        raise DeckError(deck.place("decks"), f"{brief(given)} is no list of decks", next_step='write ["..."]')
-    made: dict[str, Assembly] = {}
-    for name in given:
-        beside = folder / name
-        read = load_deck(beside if name.endswith(".toml") and beside.exists() else name)
-        short = Path(name).stem
-        if short in made:
-            raise DeckError(deck.place("decks"), f"names '{short}' twice", next_step="leave one out")
-        made[short] = declare(read)
-    return made
 
 
 def _axes(deck: Deck, number: int, given: Any) -> AxisSet:
@@ -150,7 +145,22 @@ def _question(deck: Deck) -> SweepQuestion:
         raise unknown_name(deck.place(f"ask.{name}"), name, _QUESTIONS)
     path = f"ask.{name}"
     if name == DesignQuestion.__name__:
-        return _design(deck, fields)
+        prefix = f"ask.{DesignQuestion.__name__}"
+        if not isinstance(fields, Mapping):
+            raise DeckError(deck.place(prefix), "is no table", next_step=f"write [{prefix}]")
+        job = job_in(Deck(deck.name, "", deck.path, fields, deck.places, stands_in=prefix))
+        if not isinstance(job.target, Target) or any(not isinstance(each, str) for each in job.free or ()):
+            raise DeckError(
+                deck.place(prefix), "has a stock, or a task in place of a target",
+                next_step="make the stock an axis (Listed), and the curve for the task a file",
+            )  # fmt: skip
+        search = fields.get("search", {})
+        settings = dataclasses.replace(
+            QUICK, seed=job.settings.seed, largest_error=job.settings.largest_error,
+            starts=job.settings.starts if "starts" in search else QUICK.starts,
+        )  # fmt: skip
+        free = None if job.free is None else tuple(str(each) for each in job.free)
+        return DesignQuestion(job.target, free, job.keep, job.goals, job.spring or "", settings)
     if isinstance(fields, Mapping) and "gains" in fields and name == LoopQuestion.__name__:
         fields = {**fields, "gains": built(deck, TorqueGains, fields["gains"], deck.place(f"{path}.gains"))}
     made: SweepQuestion = _made(deck, _QUESTIONS[name], _in_si(deck, _QUESTIONS[name], fields), path)
@@ -198,22 +208,3 @@ def _in_si(deck: Deck, kind: type, fields: Any) -> Any:
             raise DeckError(place, f"{brief(value)} is not of the kind of {default!r}")
         values[name] = new
     return values
-
-
-def _design(deck: Deck, fields: Any) -> DesignQuestion:
-    prefix = f"ask.{DesignQuestion.__name__}"
-    if not isinstance(fields, Mapping):
-        raise DeckError(deck.place(prefix), "is no table", next_step=f"write [{prefix}]")
-    job = job_in(Deck(deck.name, "", deck.path, fields, deck.places, stands_in=prefix))
-    if not isinstance(job.target, Target) or any(not isinstance(each, str) for each in job.free or ()):
-        raise DeckError(
-            deck.place(prefix), "has a stock, or a task in place of a target",
-            next_step="make the stock an axis (Listed), and the curve for the task a file",
-        )  # fmt: skip
-    search = fields.get("search", {})
-    settings = dataclasses.replace(
-        QUICK, seed=job.settings.seed, largest_error=job.settings.largest_error,
-        starts=job.settings.starts if "starts" in search else QUICK.starts,
-    )  # fmt: skip
-    free = None if job.free is None else tuple(str(each) for each in job.free)
-    return DesignQuestion(job.target, free, job.keep, job.goals, job.spring or "", settings)

@@ -81,9 +81,6 @@ class Parts:
         )
         self.damaged: list[str] = []
         """Names of parts that could not be read; their points are computed again."""
-        self._drop_damaged()
-
-    def _drop_damaged(self) -> None:
         _, parquet = libraries()
         for path in part_files(self._folder):
             try:
@@ -192,18 +189,16 @@ class _Order:
             taken, places = [], []
             for each in np.unique(part):
                 here = np.flatnonzero(part == each)
-                taken.append(self._table(int(each)).select(names).take(_places(row[here])))
+                number = int(each)
+                if number not in self._open:  # the columns of four parts stay open
+                    while len(self._open) >= 4:
+                        self._open.pop(next(iter(self._open)))
+                    self._open[number] = read_columns(self._files[number])
+                taken.append(self._open[number].select(names).take(_places(row[here])))
                 places.append(here)
             back = np.argsort(np.concatenate(places), kind="stable")
             yield pyarrow.concat_tables(taken).take(_places(back)).combine_chunks()
             give_back()
-
-    def _table(self, number: int) -> Any:
-        if number not in self._open:
-            while len(self._open) >= 4:
-                self._open.pop(next(iter(self._open)))
-            self._open[number] = read_columns(self._files[number])
-        return self._open[number]
 
 
 def _places(rows: NDArray[Any]) -> Any:

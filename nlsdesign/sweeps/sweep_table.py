@@ -1,9 +1,9 @@
-"""The table of a sweep: one row per point, in the order of the points, with what was asked beside it."""
+"""The table of a sweep in the order of the points, with what was asked beside it and the deck behind each."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -11,11 +11,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..components.assembly.deck_writer import declare
+from ..components.assembly.deck_writer import deck_text, declare
 from ..components.assembly.named_parts import Assembly
 from ..foundation.arrays import Mask
 from ..foundation.deck import read_deck
-from ..foundation.errors import DeckError, MeasurementError, unknown_name
+from ..foundation.errors import DeckError, MeasurementError, NlsError, unknown_name
 from ..foundation.text_files import is_there, text_of
 from .changes import changed_assembly
 from .sweep_columns import DONE, RESULTS_FILE, SweepColumn, give_back, libraries, numpy_column, read_columns
@@ -139,14 +139,53 @@ class SweepTable:
             If the decks do not stand beside the table.
         """
         row = self.row_of(point)
-        if not self.decks:
-            raise MeasurementError("sweep", f"has no {DECK_FILE} beside its table",
-                                   next_step="run the sweep again into another folder")  # fmt: skip
-        values = {axis.name: self.values[axis.name][row] for axis in self.axes}
-        return changed_assembly(
-            {name: declare(read_deck(text, Path(f"{name}.toml"))) for name, text in self.decks.items()},
-            values,
-        )
+        return _assembly(self, row, _bases(self))
+
+
+def point_deck_text(table: SweepTable, point: int) -> str:
+    """Return the deck behind a point: the deck that was swept with the numbers and materials of the point.
+
+    Axes that belong to the question and not to the machine, such as a target or a seed, stand above it as
+    comments.
+    """
+    row = table.row_of(point)
+    return _deck_text(table, row, _bases(table))
+
+
+def point_deck_texts(table: SweepTable, points: Iterable[int]) -> Iterator[tuple[int, str | NlsError]]:
+    """Yield the deck behind each point, or why it has none; decks that were swept are read once."""
+    bases: dict[str, Assembly] | NlsError
+    try:
+        bases = _bases(table)
+    except NlsError as error:
+        bases = error
+    for point in points:
+        row = table.row_of(point)
+        try:
+            yield point, bases if isinstance(bases, NlsError) else _deck_text(table, row, bases)
+        except NlsError as error:
+            yield point, error
+
+
+def _bases(table: SweepTable) -> dict[str, Assembly]:
+    if not table.decks:
+        raise MeasurementError("sweep", f"has no {DECK_FILE} beside its table",
+                               next_step="run the sweep again into another folder")  # fmt: skip
+    return {name: declare(read_deck(text, Path(f"{name}.toml"))) for name, text in table.decks.items()}
+
+
+def _assembly(table: SweepTable, row: int, bases: Mapping[str, Assembly]) -> Assembly:
+    return changed_assembly(bases, {axis.name: table.values[axis.name][row] for axis in table.axes})
+
+
+def _deck_text(table: SweepTable, row: int, bases: Mapping[str, Assembly]) -> str:
+    text = deck_text(_assembly(table, row, bases))
+    deck = table.about.get("deck", "a deck")
+    lines = [f"Point {table.values['point'][row]} of a sweep of {deck}; its axes, in SI:"]
+    lines += [f"{axis.name} = {table.values[axis.name][row]} {axis.unit}".rstrip() for axis in table.axes]
+    # Without control characters, which a comment of TOML may not hold.
+    printable = ["".join(each if each.isprintable() else " " for each in line) for line in lines]
+    return "".join(f"# {' '.join(line.split())}\n" for line in printable) + text
 
 
 def about_text(about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> str:

@@ -6,31 +6,20 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from nlsdesign.components import ROTATION, Driven, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.feedback.control import ClosedLoop, TorqueGains, sine_response, torque_controller, zero_torque
 from nlsdesign.feedback.observer import design_observer_with_details
 from nlsdesign.foundation.deck import load_deck
-from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model import flatten
 from tests import observed as ob
 
 MOVED = {"observer.motor.angle": "plant.spring.angle", "controller.motor.angle": "plant.motor.angle"}
 
 
-def linear_actuator(stiffness: float, *, moved: bool) -> FlatModel:
-    parts = dict(ob.actuator().parts) | {
-        "spring": tie(Spring(stiffness=stiffness, domain=ROTATION), "motor", "load")
-    }
-    if moved:
-        parts["load"] = Driven()
-    return flatten(assembly("linear", **parts), outputs=["motor.angle", "spring.torque"])
-
-
 def linear_loop(stiffness: float, gains: TorqueGains, *, moved: bool) -> ClosedLoop:
-    bench = linear_actuator(stiffness, moved=False)
+    bench = ob.linear_actuator(stiffness, moved=False)
     return ClosedLoop(
-        plant=linear_actuator(stiffness, moved=True) if moved else bench,
+        plant=ob.linear_actuator(stiffness, moved=True) if moved else bench,
         observer=design_observer_with_details(bench).model,
         controller=torque_controller(bench, gains=gains),
         wires=MOVED if moved else {},

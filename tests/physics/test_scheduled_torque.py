@@ -10,8 +10,6 @@ import pytest
 from scipy.linalg import expm
 
 import nlsdesign as nls
-from nlsdesign.components import ROTATION, Driven, Spring, tie
-from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.export import export_c, natively
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.control import (
@@ -138,19 +136,10 @@ def test_the_defaults_leave_six_decibel_and_thirty_degrees_at_every_stiffness(st
     assert phase > 30.0
 
 
-def linear_plant(stiffness: float, *, moved: bool = False) -> FlatModel:
-    parts = dict(ob.actuator().parts) | {
-        "spring": tie(Spring(stiffness=stiffness, domain=ROTATION), "motor", "load")
-    }
-    if moved:
-        parts["load"] = Driven()
-    return flatten(assembly("linear", **parts), outputs=["motor.angle", "spring.torque"])
-
-
 def test_the_loop_typed_by_hand_is_the_loop_of_the_controller() -> None:
     """Desired to actual torque in z, with feedforward and acceleration, against a simulated run."""
     stiffness, floor, time, frequencies = 1.7, 1.0, 1e-3, [1.0, 5.0, 12.5]
-    plant = linear_plant(stiffness)
+    plant = ob.linear_actuator(stiffness)
     law = ScheduledTorque(stiffness_floor=floor)
     controller = torque_controller(plant, law=law, velocity=VelocityLoop(friction=None))
     found = ClosedLoop(
@@ -297,7 +286,7 @@ def test_c_gives_the_same_numbers(deck: str, tmp_path) -> None:
 def test_a_moved_load_feels_what_the_bandwidth_lets_through() -> None:
     """Below crossover T = θ̇·k/(2π·f_c): the law is a PID with Kp = 2π·f_c/k."""
     stiffness, frequency, amplitude = 3.4, 0.5, math.radians(10.0)
-    bench, plant = linear_plant(stiffness), linear_plant(stiffness, moved=True)
+    bench, plant = ob.linear_actuator(stiffness), ob.linear_actuator(stiffness, moved=True)
     law = ScheduledTorque(stiffness_floor=0.0)
     found = ClosedLoop(
         plant=plant, observer=nls.design_observer(bench, gain=CascadeGain()),

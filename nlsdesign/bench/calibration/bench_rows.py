@@ -147,7 +147,15 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRo
         bend = float(np.linalg.norm(view.second[0].data))
         variance = (noise.command * narrow) ** 2 + (noise.motion * bend / gain) ** 2
         variance += (stiff[0] * blur / gain) ** 2
-        use = sound & _in_motion(course, noise, view) & np.isfinite(gain)
+        # In which windows every sample moves, in one direction: only there dry friction is known.
+        factor = rate_of(course.motion, course.step, 0.5 * noise.window)[1]
+        least = _MOVING * max(noise.motion, 1e-12) * factor
+        least = max(least, 1e-3 * float(np.max(np.abs(course.rate))))
+        fast = np.where(np.abs(course.rate) > least, np.sign(course.rate), 0.0)
+        inside = view.mean.copy()
+        inside.data = np.ones_like(inside.data)
+        in_motion: Mask = np.abs(np.asarray(inside @ fast)).ravel() >= view.length - 0.5
+        use = sound & in_motion & np.isfinite(gain)
         effort = response.inertia * float(np.median(np.abs(mean[1])))
         parts = (effort * error, effort * np.sqrt(variance), effort * by_x, effort * mean[1])
         rows.append(_row(BALANCE, view.centres, use, *parts, effort * course.command))
@@ -164,15 +172,3 @@ def _row(channel: str, centres: NDArray[np.int64], use: Mask, *parts: Array) -> 
     size = float(np.sqrt(np.mean(compared**2)))
     floor = np.maximum(sigma, 1e-6 * size + 1e-12)
     return BenchRows(channel, centres[use], error[use], floor[use], slope[use], shown[use], size)
-
-
-def _in_motion(course: BenchCourse, noise: SampleNoise, view: SmoothWindows) -> Mask:
-    """Tell in which windows every sample moves, in one direction: only there dry friction is known."""
-    factor = rate_of(course.motion, course.step, 0.5 * noise.window)[1]
-    least = _MOVING * max(noise.motion, 1e-12) * factor
-    least = max(least, 1e-3 * float(np.max(np.abs(course.rate))))
-    fast = np.where(np.abs(course.rate) > least, np.sign(course.rate), 0.0)
-    inside = view.mean.copy()
-    inside.data = np.ones_like(inside.data)
-    result: Mask = np.abs(np.asarray(inside @ fast)).ravel() >= view.length - 0.5
-    return result

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from ...components.assembly.changed_copies import law_of_part
 from ...components.assembly.named_parts import Assembly
 from ...components.core.contacts import Regularised, WithFriction
-from ...components.core.element import Tie, tie
+from ...components.core.element import tie
 from ...components.mechanics.bodies import Fixed
 from ...components.mechanics.loads import ConstantLoad
 from ...components.sensing.sensors import TorqueSensor
@@ -77,7 +78,15 @@ class CalibrationTest(ABC):
         ArrangementError
             If there is no drive, or no spring where one is needed.
         """
-        return self._equipped(_clamped(_sliding(actuator)))
+        # The machine with dry friction whose sign is that of the measured speed.
+        rubbing = [path for path, part in actuator.walk() if isinstance(law_of_part(part), WithFriction)]
+        for path in sorted(rubbing, key=lambda p: -p.count(".")):
+            law = law_of_part(actuator[path])
+            assert isinstance(law, WithFriction)
+            unit = law.domain.rate_unit
+            speed = quantity(_SLIDING[unit], unit, source="assumed: moving samples alone count")
+            actuator = actuator.with_part(path, replace(law, contact=Regularised(creep_speed=speed)))
+        return self._equipped(_clamped(actuator))
 
     @abstractmethod
     def _equipped(self, clamped: Assembly) -> Assembly:
@@ -175,19 +184,3 @@ def _clamped(actuator: Assembly) -> Assembly:
                 clamped = clamped.without_part(name)
         clamped = clamped.with_part(body.name, Fixed(domain=body.domain))
     return clamped
-
-
-def _sliding(actuator: Assembly) -> Assembly:
-    """Return the machine with dry friction whose sign is that of the measured speed."""
-    rubbing = [path for path, part in actuator.walk() if isinstance(_law(part), WithFriction)]
-    for path in sorted(rubbing, key=lambda p: -p.count(".")):
-        law = _law(actuator[path])
-        assert isinstance(law, WithFriction)
-        unit = law.domain.rate_unit
-        speed = quantity(_SLIDING[unit], unit, source="assumed: moving samples alone count")
-        actuator = actuator.with_part(path, replace(law, contact=Regularised(creep_speed=speed)))
-    return actuator
-
-
-def _law(part: object) -> object:
-    return part.element if isinstance(part, Tie) else part

@@ -66,7 +66,24 @@ class CalibratedMachine:
 
     def together(self) -> tuple[str, ...]:
         """Return products and quotients that are known far better than either of their numbers."""
-        return known_together(self.estimate.after, [n.name for n in self.numbers])
+        known = self.estimate.after
+        names = [n.name for n in self.numbers]
+        shown = [first for first in shared_factors(known) if first in names]
+        products = []
+        for i, first in enumerate(shown):
+            for second in shown[i + 1 :]:
+                a, b = (known.deviations[known.place(n)] for n in (first, second))
+                mixed = known.covariance[known.place(first), known.place(second)]
+                for sign, relation in ((1.0, "times"), (-1.0, "over")):
+                    joint = math.sqrt(max(a * a + b * b + 2.0 * sign * mixed, 0.0))
+                    if joint < _TOGETHER * min(a, b):
+                        products.append((joint / min(a, b), first, relation, second, joint, a, b))
+        best_known = sorted(products)[:_LISTED_PRODUCTS]
+        return tuple(
+            f"{first} {relation} {second} is known to {_percent(joint)}, the numbers alone to {_percent(a)} "
+            f"and {_percent(b)}."
+            for _, first, relation, second, joint, a, b in best_known
+        )
 
     def words(self) -> tuple[str, ...]:
         """Return what a table does not say: suspects, misfits, combinations, what the deck cannot hold."""
@@ -193,29 +210,6 @@ def _calibrated_row(
     declared = f"{was} {old.spread_text}: {old.source}"
     value_now = tuple(values) if isinstance(old.value, tuple) else values[0]
     return replace(old.with_value(value_now, f"{how} (declared {declared})"), spread=spread)
-
-
-def known_together(known: Prior, names: Sequence[str]) -> tuple[str, ...]:
-    """Return in words which products and quotients are known far better than either of their numbers.
-
-    ``names``: of the numbers to look at; of those that share one factor the first stands for all.
-    """
-    shown = [first for first in shared_factors(known) if first in names]
-    products = []
-    for i, first in enumerate(shown):
-        for second in shown[i + 1 :]:
-            a, b = (known.deviations[known.place(n)] for n in (first, second))
-            mixed = known.covariance[known.place(first), known.place(second)]
-            for sign, relation in ((1.0, "times"), (-1.0, "over")):
-                joint = math.sqrt(max(a * a + b * b + 2.0 * sign * mixed, 0.0))
-                if joint < _TOGETHER * min(a, b):
-                    products.append((joint / min(a, b), first, relation, second, joint, a, b))
-    best_known = sorted(products)[:_LISTED_PRODUCTS]
-    return tuple(
-        f"{first} {relation} {second} is known to {_percent(joint)}, the numbers alone to {_percent(a)} and "
-        f"{_percent(b)}."
-        for _, first, relation, second, joint, a, b in best_known
-    )
 
 
 def _percent(deviation: float) -> str:

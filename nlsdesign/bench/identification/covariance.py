@@ -49,10 +49,27 @@ def robust_covariance(rows: Sequence[Piece], prior: Array) -> Array:
     ``prior``: slopes of the residuals of the priors, shape (priors, parameters).
     """
     information = sum((r.slope.T @ r.slope for r in rows), start=prior.T @ prior)
-    # In the axes and units in which the information is one.
-    root = _half(inverse_information(information))
+    # In the axes and units in which the information is one: the symmetric root.
+    powers, directions = np.linalg.eigh(inverse_information(information))
+    root: Array = (directions * np.sqrt(np.maximum(powers, 0.0))) @ directions.T
     scatter = root @ (prior.T @ prior) @ root
-    for slope, residual in _segments(rows):
+    # Slopes and residuals of each segment, all blocks of a record together.
+    spans: dict[str, float] = {}
+    for each in rows:
+        if len(each.time):
+            spans[each.record] = max(spans.get(each.record, 0.0), float(each.time[-1]))
+    length = sum(spans.values()) / _SEGMENTS
+    parts: dict[tuple[str, int], tuple[list[Array], list[Array]]] = {}
+    for each in rows:
+        count = max(1, round(spans.get(each.record, 0.0) / length)) if length > 0.0 else 1
+        place = np.minimum(count * each.time / max(spans.get(each.record, 0.0), 1e-300), count - 1)
+        place = place.astype(int)
+        for k in np.unique(place):
+            slopes, residuals = parts.setdefault((each.record, int(k)), ([], []))
+            slopes.append(each.slope[place == k])
+            residuals.append(each.residual[place == k])
+    segments = [(np.vstack(s), np.concatenate(r)) for s, r in parts.values()]
+    for slope, residual in segments:
         scaled = slope @ root
         strength, axes = np.linalg.eigh(scaled.T @ scaled)
         freed = (axes.T @ (scaled.T @ residual)) / (1.0 - np.minimum(strength, _OWN_SHARE))
@@ -90,25 +107,6 @@ def _colour(residuals: Sequence[Array]) -> float:
     return max(1.0, 1.0 + 2.0 * float(np.sum(rho[: quiet[0]] if len(quiet) else rho)))
 
 
-def _segments(rows: Sequence[Piece]) -> list[tuple[Array, Array]]:
-    """Return slopes and residuals of each segment, all blocks of a record together."""
-    spans: dict[str, float] = {}
-    for each in rows:
-        if len(each.time):
-            spans[each.record] = max(spans.get(each.record, 0.0), float(each.time[-1]))
-    length = sum(spans.values()) / _SEGMENTS
-    parts: dict[tuple[str, int], tuple[list[Array], list[Array]]] = {}
-    for each in rows:
-        count = max(1, round(spans.get(each.record, 0.0) / length)) if length > 0.0 else 1
-        place = np.minimum(count * each.time / max(spans.get(each.record, 0.0), 1e-300), count - 1)
-        place = place.astype(int)
-        for k in np.unique(place):
-            slopes, residuals = parts.setdefault((each.record, int(k)), ([], []))
-            slopes.append(each.slope[place == k])
-            residuals.append(each.residual[place == k])
-    return [(np.vstack(s), np.concatenate(r)) for s, r in parts.values()]
-
-
 def inverse_information(information: Array) -> Array:
     """Return the covariance that information gives, if residuals are white noise of unit size.
 
@@ -117,13 +115,6 @@ def inverse_information(information: Array) -> Array:
     # What the records leave open altogether gets a large variance, not an infinite one.
     strength, axes = np.linalg.eigh(information)
     result: Array = np.asarray((axes / np.maximum(strength, _LEAST_INFORMATION)) @ axes.T, dtype=np.float64)
-    return result
-
-
-def _half(matrix: Array) -> Array:
-    """Return the symmetric root of a symmetric matrix."""
-    strength, axes = np.linalg.eigh(matrix)
-    result: Array = (axes * np.sqrt(np.maximum(strength, 0.0))) @ axes.T
     return result
 
 

@@ -75,14 +75,14 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
     sharp = {
         path: part
         for path, part in assembly.walk()
-        if isinstance(law := _law(part), Element) and not law.is_smooth
+        if isinstance(law := law_of_part(part), Element) and not law.is_smooth
     }
     for name in asked:
         if name not in sharp:
             raise unknown_name("element that is not smooth", name, sharp)
     # Innermost parts first: the smooth form of a wrapper keeps the parts inside it.
     for path in sorted(sharp, key=lambda p: -p.count(".")):
-        law = _law(assembly[path])
+        law = law_of_part(assembly[path])
         if isinstance(law, Element):
             assembly = assembly.with_part(path, law.smooth(asked.get(path)))
     return assembly
@@ -103,11 +103,12 @@ def sharpened(assembly: Assembly) -> Assembly:
     """
     # Innermost parts first: a wrapper that is read anew keeps the parts inside it.
     for path, _ in sorted(assembly.walk(), key=lambda each: -each[0].count(".")):
-        law = _law(assembly[path])
+        law = law_of_part(assembly[path])
         if isinstance(law, (WithCorners, WithFriction)) and isinstance(law.contact, (Regularised, Rounded)):
             assembly = assembly.with_part(path, replace(law, contact=Sharp()))
     return assembly
 
 
-def _law(part: Part) -> Part:
+def law_of_part(part: Part) -> Part:
+    """Return the law of a tie, and any other part itself."""
     return part.element if isinstance(part, Tie) else part

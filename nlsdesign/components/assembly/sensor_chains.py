@@ -21,7 +21,16 @@ def sensors_behind(sensors: Mapping[str, Sensor], signal: str) -> tuple[str, tup
     while signal in readings:
         name = readings[signal]
         if name in chain:
-            raise _circle(name, sensors)
+            sensor_of = {f"{other}.reading": other for other in sensors}
+            way, at = [name], sensor_of[sensors[name].of]
+            while at != name:
+                way.append(at)
+                at = sensor_of[sensors[at].of]
+            raise ArrangementError(
+                f"sensor '{name}' reads '{sensors[name].of}'",
+                "which reads itself in a circle: " + " ◁ ".join([*way, name]),
+                next_step="let one of them read a signal of a body, a tie or a gear",
+            )
         chain.append(name)
         signal = sensors[name].of
     return signal, tuple(chain)
@@ -88,16 +97,3 @@ def _signals(path: str, part: Part) -> list[str]:
     if isinstance(inner, Element):
         return [f"{path}.{own}" for own in (inner.domain.effort, inner.domain.motion)]
     return []
-
-
-def _circle(name: str, sensors: Mapping[str, Sensor]) -> ArrangementError:
-    readings = {f"{other}.reading": other for other in sensors}
-    way, at = [name], readings[sensors[name].of]
-    while at != name:
-        way.append(at)
-        at = readings[sensors[at].of]
-    return ArrangementError(
-        f"sensor '{name}' reads '{sensors[name].of}'",
-        "which reads itself in a circle: " + " ◁ ".join([*way, name]),
-        next_step="let one of them read a signal of a body, a tie or a gear",
-    )

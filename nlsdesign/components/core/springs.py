@@ -126,6 +126,11 @@ class StrainStiffening(WithCorners, FittedLaw):
     knot, so a cam designed on it has a radius of curvature of −∞ there. With a rounded one it is C∞,
     σ(0) = 0, and differs by at most w·ln 2·Σkᵢ: design on that. A knot at zero is not rounded, for rubber in
     tension has no corner there. Source: Austin et al. 2015, eq. (1), Table I.
+
+    Raises
+    ------
+    ValueRangeError
+        If a modulus has no knot, or knots do not ascend.
     """
 
     domain: ClassVar[Domain] = MATERIAL
@@ -141,7 +146,19 @@ class StrainStiffening(WithCorners, FittedLaw):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_knots(self.modulus, self.knots)
+        knots = self.knots
+        if len(self.modulus.values) != len(knots.values):
+            raise ValueRangeError(
+                f"knots ({len(knots.values)}) and modulus ({len(self.modulus.values)})",
+                "there must be one knot per modulus",
+            )
+        for left, right in zip(knots.values, knots.values[1:], strict=False):
+            if right < left:
+                raise ValueRangeError(
+                    f"knots {left:g} and {right:g}",
+                    "knots cross",
+                    next_step="sort knots and moduli by strain",
+                )
 
     @property
     def range_of_form(self) -> Range:
@@ -165,17 +182,3 @@ class StrainStiffening(WithCorners, FittedLaw):
         words = f"engages modulus {number}", f"leaves modulus {number}"
         engaged, _ = self.corner.positive_part(scope, motion - at, words, name=f"knot_{number}")
         return engaged - positive_part(-at, scope.parameter("width")) if self.is_smooth else engaged
-
-
-def check_knots(modulus: Quantity, knots: Quantity) -> None:
-    """Check that there is one knot per modulus, in ascending order."""
-    if len(modulus.values) != len(knots.values):
-        raise ValueRangeError(
-            f"knots ({len(knots.values)}) and modulus ({len(modulus.values)})",
-            "there must be one knot per modulus",
-        )
-    for left, right in zip(knots.values, knots.values[1:], strict=False):
-        if right < left:
-            raise ValueRangeError(
-                f"knots {left:g} and {right:g}", "knots cross", next_step="sort knots and moduli by strain"
-            )

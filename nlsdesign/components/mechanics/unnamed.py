@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,14 +17,6 @@ from ..core.part_numbers import one_of, parameter
 
 LEAST = 4
 """Control values of a cubic spline of one span."""
-
-
-def held_table(
-    row: Sequence[Expression], lowest: Expression, highest: Expression, at: Expression
-) -> Expression:
-    """Return a uniform cubic B-spline on [lowest, highest], which keeps its end values outside of it."""
-    inside = ca.fmin(ca.fmax(at, lowest), highest)
-    return uniform_spline(row, 0.0, (highest - lowest) / (len(row) - 3), inside - lowest)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +41,12 @@ class _Tabled(Element):
         return self.lowest.number, self.highest.number
 
     def _table(self, scope: Scope, name: str, motion: Expression) -> Expression:
-        return held_table(scope.row(name), scope.parameter("lowest"), scope.parameter("highest"), motion)
+        # A uniform cubic B-spline on [lowest, highest], which keeps its end values outside of it.
+        row = scope.row(name)
+        lowest = scope.parameter("lowest")
+        highest = scope.parameter("highest")
+        inside = ca.fmin(ca.fmax(motion, lowest), highest)
+        return uniform_spline(row, 0.0, (highest - lowest) / (len(row) - 3), inside - lowest)
 
 
 def _check_count(name: str, row: Quantity) -> None:

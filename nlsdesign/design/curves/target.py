@@ -400,24 +400,21 @@ class PolynomialTorque(Target):
                 f"PolynomialTorque of {len(given)} coefficients", "is zero everywhere",
                 next_step="give c₁, c₂, … in N·m/rad, N·m/rad², …",
             )  # fmt: skip
-        at, lowest = self._lowest()
+        # Where torque per angle is least, and the torque there.
+        per_angle = np.polynomial.Polynomial(self.coefficients)
+        flat = per_angle.deriv().roots()
+        real = np.real(flat[np.abs(np.imag(flat)) < 1e-9])
+        inner = [float(each) for each in real if 0.0 < float(each) < self.last_angle]
+        least_angle = min((0.0, self.last_angle, *inner), key=lambda angle: float(per_angle(angle)))
+        # At zero the torque is zero whatever its slope; a little beyond it has the sign of that slope.
+        at = least_angle or 1e-6 * self.last_angle
+        lowest = float(per_angle(at)) * at
         if lowest < 0.0:
             raise ValueRangeError(
                 f"PolynomialTorque at {at:.4g} rad",
                 f"the torque is {with_unit(f'{lowest:.3g}', 'N*m')}, and must be nowhere negative",
                 next_step="end the curve before that angle, or give a larger c1",
             )
-
-    def _lowest(self) -> tuple[float, float]:
-        """Return where torque per angle is least, and the torque there."""
-        per_angle = np.polynomial.Polynomial(self.coefficients)
-        flat = per_angle.deriv().roots()
-        real = np.real(flat[np.abs(np.imag(flat)) < 1e-9])
-        inner = [float(each) for each in real if 0.0 < float(each) < self.last_angle]
-        at = min((0.0, self.last_angle, *inner), key=lambda angle: float(per_angle(angle)))
-        # At zero the torque is zero whatever its slope; a little beyond it has the sign of that slope.
-        beside = at or 1e-6 * self.last_angle
-        return beside, float(per_angle(beside)) * beside
 
     @property
     def last_angle(self) -> float:

@@ -78,7 +78,18 @@ class Mounting:
         """Yield the process of the part, where nothing carries the torque, and bolts that would."""
         yield f"to be made by: {process_of(self.part)}"
         if self.machined.bolts is not None:
-            yield from self.bolts_too_weak(self.machined.bolts.count)
+            count = self.machined.bolts.count
+            hole = self.part.number("bolt_hole") * (1.0 + 1e-9)
+            screw = next((each for each in reversed(_SCREWS) if each.hole <= hole), None)
+            force = _FACTOR * self.torque / (count * self.part.number("bolt_circle") / 2.0)
+            if screw is None or force > _SHEAR * screw.area:
+                most = "no screw from M1.6 on passes"
+                if screw is not None:
+                    most = f"{screw.name} carries {_SHEAR * screw.area:.3g} N"
+                yield (
+                    f"{count} bolts take {_FACTOR:g} times {self.torque:.3g} N·m with {force:.3g} N each, "
+                    f"{most} in shear (class 8.8, EN 1993-1-8){self.bolts_that_do()}"
+                )
             return
         bore = "neither bore, bolts, key nor clamp"
         if self.machined.hub_bore is not None:
@@ -91,20 +102,6 @@ class Mounting:
             f"nothing carries the largest torque, {self.torque:.3g} N·m, from the part to its shaft: {bore}"
             f"{self.bolts_that_do()}"
         )
-
-    def bolts_too_weak(self, count: int) -> Iterator[str]:
-        """Yield how far bolts of the largest screw that passes their holes fall short."""
-        hole = self.part.number("bolt_hole") * (1.0 + 1e-9)
-        screw = next((each for each in reversed(_SCREWS) if each.hole <= hole), None)
-        force = _FACTOR * self.torque / (count * self.part.number("bolt_circle") / 2.0)
-        if screw is None or force > _SHEAR * screw.area:
-            most = "no screw from M1.6 on passes"
-            if screw is not None:
-                most = f"{screw.name} carries {_SHEAR * screw.area:.3g} N"
-            yield (
-                f"{count} bolts take {_FACTOR:g} times {self.torque:.3g} N·m with {force:.3g} N each, "
-                f"{most} in shear (class 8.8, EN 1993-1-8){self.bolts_that_do()}"
-            )
 
     def bolts_that_do(self) -> str:
         """Return bolts in words that carry the torque in shear and fit the part, each tried; else nothing."""

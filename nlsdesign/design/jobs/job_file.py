@@ -167,7 +167,15 @@ def job_in(deck: Deck) -> DesignJob:
         if name != "largest_error" and given != int(given):
             raise DeckError(place, f"{brief(raw)} is not a whole number")
         values[name] = float(given) if name == "largest_error" else int(given)
-    values["draws"] = _draws(deck)
+    # The number of made springs that the table ``[tolerance]`` asks for.
+    tolerance = _table(deck, "tolerance")
+    for entry in tolerance:
+        if entry != "draws":
+            raise unknown_name(deck.place(f"tolerance.{entry}"), entry, ["draws"])
+    draws = tolerance.get("draws", DRAWS)
+    if not isinstance(draws, int) or isinstance(draws, bool):
+        raise DeckError(deck.place("tolerance.draws"), f"{brief(draws)} is not a whole number")
+    values["draws"] = draws
     return DesignJob(
         path=file,
         target=target,
@@ -281,7 +289,20 @@ def built(deck: Deck, kind: type, given: object, place: str) -> Any:
 def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
     allowed = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
     if isinstance(raw, Mapping):
-        return _of_table(deck, hint, allowed, raw, place)
+        # What a table stands for: an object named in it, or the fields of the one kind allowed.
+        for base in (Goal, TaskGoal, SpringSymmetry):
+            if base in allowed:
+                return next(iter(_of_kinds(deck, place, base, raw)))
+        if Limit in typing.get_args(hint):
+            return tuple(_of_kinds(deck, place, Limit, raw))
+        records = [each for each in allowed if isinstance(each, type) and dataclasses.is_dataclass(each)]
+        named = [each for each in records if each.__name__ in raw]
+        if named:
+            return built(deck, named[0], raw[named[0].__name__], place)
+        others = [each for each in records if each is not Quantity]
+        if len(others) == 1:
+            return built(deck, others[0], raw, place)
+        raise DeckError(place, "is a table where a number or text is wanted")
     if isinstance(raw, list):
         of_items = typing.get_args(hint)[0] if typing.get_args(hint) else Any
         return tuple(_value(deck, of_items, item, place) for item in raw)
@@ -293,23 +314,6 @@ def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
     if isinstance(raw, bool) and bool not in allowed:
         raise DeckError(place, f"is {str(raw).lower()} where a number or text is wanted")
     return _plain(raw, place) if isinstance(raw, float) else raw
-
-
-def _of_table(deck: Deck, hint: Any, allowed: tuple[Any, ...], raw: Mapping[str, Any], place: str) -> Any:
-    """Return what a table stands for: an object named in it, or the fields of the one kind allowed."""
-    for base in (Goal, TaskGoal, SpringSymmetry):
-        if base in allowed:
-            return next(iter(_of_kinds(deck, place, base, raw)))
-    if Limit in typing.get_args(hint):
-        return tuple(_of_kinds(deck, place, Limit, raw))
-    records = [each for each in allowed if isinstance(each, type) and dataclasses.is_dataclass(each)]
-    named = [each for each in records if each.__name__ in raw]
-    if named:
-        return built(deck, named[0], raw[named[0].__name__], place)
-    others = [each for each in records if each is not Quantity]
-    if len(others) == 1:
-        return built(deck, others[0], raw, place)
-    raise DeckError(place, "is a table where a number or text is wanted")
 
 
 def _plain(raw: object, place: str) -> float:
@@ -346,18 +350,6 @@ def _stock(deck: Deck, key: str, table: Mapping[str, Any]) -> Iterator[StockChoi
             continue
         values = tuple(_number(v, place) if isinstance(v, str) else _plain(v, place) for v in given)
         yield _placed(lambda name=name, values=values: Stock(name, values), place)  # type: ignore[misc]
-
-
-def _draws(deck: Deck) -> int:
-    """Return the number of made springs that the table ``[tolerance]`` asks for."""
-    table = _table(deck, "tolerance")
-    for name in table:
-        if name != "draws":
-            raise unknown_name(deck.place(f"tolerance.{name}"), name, ["draws"])
-    given = table.get("draws", DRAWS)
-    if not isinstance(given, int) or isinstance(given, bool):
-        raise DeckError(deck.place("tolerance.draws"), f"{brief(given)} is not a whole number")
-    return given
 
 
 def _names(deck: Deck, key: str) -> tuple[str, ...] | None:

@@ -172,20 +172,15 @@ class Wanted:
         taken = min(solved, key=lambda i: outcomes[i].cost)
         return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
-    def least_work(self, error: float) -> float:
-        """Return the work in J that a spring must do up to the last angle, or miss by more than an error.
-
-        ``error``: rms, relative to the largest torque; it takes at most its product with the angle.
-        """
-        end = self.target.last_angle
-        return float(self.target.energy(end)) - error * self.target.largest * end
-
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
         """Return the best design over all combinations of a stock, with what became of the others."""
         hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
         hasty = replace(hasty, progress=no_progress)
 
-        work = self.least_work(settings.largest_error)
+        # The work in J that a spring must do up to the last angle, or miss by more than the error: that is
+        # rms, relative to the largest torque, and takes at most its product with the angle.
+        end = self.target.last_angle
+        work = float(self.target.energy(end)) - settings.largest_error * self.target.largest * end
         held = settings.defaults is None and not any(isinstance(each, MaximumTravel) for each in self.keep)
 
         def one(number: int) -> tuple[Alternative, NlsError | None]:

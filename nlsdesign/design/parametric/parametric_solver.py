@@ -204,11 +204,8 @@ class ParametricSolver:
 
     def beside_design(self, question: CamQuestion, design: CamDesign) -> ParametricDesign | None:
         """Return the quick design at a finished one, for the next drag to begin from."""
-        return self.beside_values(question, values_of_design(self.program(question), design))
-
-    def beside_values(self, question: CamQuestion, values: dict[str, float]) -> ParametricDesign | None:
-        """Return the quick design at numbers of another; ``None`` where there is none."""
         program = self.program(question)
+        values = values_of_design(program, design)
         outcome = program.from_values(question, program.outputs.scaled_values(values))
         if outcome.state != "solved" or outcome.point is None:
             return None

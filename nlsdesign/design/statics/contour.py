@@ -195,6 +195,23 @@ def turn(points: Array, angle: float) -> Array:
     return result
 
 
+def cable_up_to(contour: Contour, angle: float, guide: float, *, from_centre: bool) -> Array:
+    """Return the line of the right-hand cable up to its guide, shape (n, 2) in m, in the resting frame.
+
+    From the centre or the first point of the lip, along the lip to the contact point, straight to the guide:
+    the last point but one is the contact point, the last lies on the guide, or at the anchor where that is
+    nearer.
+    ``guide``: distance of the guide from the centre in m.
+    """
+    touched = contour.points[contour.angles < abs(angle)]
+    side = np.array([1.0, -1.0 if angle < 0.0 else 1.0])
+    begin = np.zeros((1 if from_centre else 0, 2))
+    contact, anchor = contour.cable(angle)
+    share = min(1.0, (guide - contact[0]) / (anchor[0] - contact[0]))
+    wrapped = turn(np.vstack([begin, touched]) * side, angle)
+    return np.vstack([wrapped, contact, contact + share * (anchor - contact)])
+
+
 def contour_from_curvature(
     nodes: ArrayLike,
     radii_of_curvature: ArrayLike,

@@ -343,7 +343,14 @@ def relaxing_law(model: FlatModel, spring: str | None = None) -> RelaxingLaw:
     ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     cam, symbols = series_cam(model, spring), model.symbols()
-    arm, before = _at_the_cut(model, cam)
+    # Lever arm and extension without pretension at the angle of the cut.
+    cut_arm, cut_extension = cam_function(model, cam.drive)(_ANGLE, model.start(model.parameters))
+    if not abs(float(cut_arm)) > 1e-9:
+        raise ArrangementError(
+            f"cam '{cam.name}'", f"has no lever arm at {_ANGLE:g} rad",
+            next_step="give its lever arm numbers above zero",
+        )  # fmt: skip
+    arm, before = float(cut_arm), float(cut_extension)
     place = {v.name: i for i, v in enumerate(model.parameters)}
     extension, rate = ca.SX.sym("extension"), ca.SX.sym("rate")
     inner = [i for i, v in enumerate(model.states) if v.name in cam.states]
@@ -379,17 +386,6 @@ def _excess(force: Expression, rates: Expression, states: Expression, rate: Expr
     if depends(slopes, moved):
         return force - ca.substitute(force, moved, rest)
     return ca.SX(ca.mtimes(slopes, moved - rest))
-
-
-def _at_the_cut(model: FlatModel, cam: CamNames) -> tuple[float, float]:
-    """Return lever arm and extension without pretension at the angle of the cut."""
-    arm, extension = cam_function(model, cam.drive)(_ANGLE, model.start(model.parameters))
-    if not abs(float(arm)) > 1e-9:
-        raise ArrangementError(
-            f"cam '{cam.name}'", f"has no lever arm at {_ANGLE:g} rad",
-            next_step="give its lever arm numbers above zero",
-        )  # fmt: skip
-    return float(arm), float(extension)
 
 
 def _moved(

@@ -135,6 +135,11 @@ def signature(head: str, *parameters: str) -> str:
     return line if len(line) < 110 else f"{head}(\n    " + ",\n    ".join(parameters) + ")"
 
 
+def cells(name: str, count: int) -> list[str]:
+    """Return the elements of an array of C."""
+    return [f"{name}[{i}]" for i in range(count)]
+
+
 def string(text: str) -> str:
     """Return a C string literal of one line."""
     flat = " ".join(text.split())

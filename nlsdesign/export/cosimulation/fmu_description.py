@@ -44,7 +44,22 @@ def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
     try:
         with zipfile.ZipFile(archive) as opened:
             entries = opened.infolist()
-            _judge(what, entries, needs)
+            if len(entries) > MOST_ENTRIES:
+                raise ExportError(what, f"has {len(entries)} entries, at most {MOST_ENTRIES} are unpacked")
+            size = sum(item.file_size for item in entries)
+            if size > MOST_BYTES:
+                raise ExportError(
+                    what,
+                    f"would unpack to {size / 2**20:.0f} MiB, at most {MOST_BYTES // 2**20} MiB are taken",
+                )
+            names: set[str] = set()
+            for item in entries:
+                objection = _objection(item, names)
+                if objection:
+                    raise ExportError(f"{what}, entry '{fit_to_show(item.filename)}'", objection)
+                names.add(item.filename)
+            if needs not in names:
+                raise ExportError(what, f"has no {needs}")
             for entry in entries:
                 _write(opened, entry, folder)
     except OSError as error:
@@ -55,24 +70,6 @@ def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
             f"is not a valid archive, or damaged: {fit_to_show(error)}",
             next_step="get or export it again",
         ) from error
-
-
-def _judge(what: str, entries: list[zipfile.ZipInfo], needs: str) -> None:
-    if len(entries) > MOST_ENTRIES:
-        raise ExportError(what, f"has {len(entries)} entries, at most {MOST_ENTRIES} are unpacked")
-    size = sum(entry.file_size for entry in entries)
-    if size > MOST_BYTES:
-        raise ExportError(
-            what, f"would unpack to {size / 2**20:.0f} MiB, at most {MOST_BYTES // 2**20} MiB are taken"
-        )
-    names: set[str] = set()
-    for entry in entries:
-        objection = _objection(entry, names)
-        if objection:
-            raise ExportError(f"{what}, entry '{fit_to_show(entry.filename)}'", objection)
-        names.add(entry.filename)
-    if needs not in names:
-        raise ExportError(what, f"has no {needs}")
 
 
 def _objection(entry: zipfile.ZipInfo, names: set[str]) -> str | None:

@@ -184,7 +184,10 @@ class IsolatedWork:
                 )
         if text.endswith(b"\n"):
             return text[:-1]
-        child.ended_within(_GRACE)
+        # Wait for its end, so that its own way to end is known.
+        until = time.monotonic() + _GRACE
+        while not child.ended() and time.monotonic() < until:
+            time.sleep(0.001)
         return None
 
     def _when(self) -> str:
@@ -250,12 +253,6 @@ class _Child:
             if number:
                 self._ended, self.status = True, status
         return self._ended
-
-    def ended_within(self, seconds: float) -> None:
-        """Wait for its end, so that its own way to end is known."""
-        until = time.monotonic() + seconds
-        while not self.ended() and time.monotonic() < until:
-            time.sleep(0.001)
 
     def end(self) -> None:
         """End it and all processes that it started."""

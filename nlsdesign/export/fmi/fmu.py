@@ -214,7 +214,13 @@ def fmu_texts(
         return model_description(variables, version=version, token=token, step=step, authorship=shown)
 
     sources = {f"sources/{name}": text for name, text in fmu_sources(variables, version, _TOKEN).items()}
-    token = _token(sources | {"modelDescription.xml": description(_TOKEN, about.undated())})
+    # A token that identifies this content, a hash of it.
+    content = sources | {"modelDescription.xml": description(_TOKEN, about.undated())}
+    digest = hashlib.sha256()
+    for name, text in sorted(content.items()):
+        digest.update(f"{name}\0{text}\0".encode())
+    hashed = digest.hexdigest()
+    token = f"{{{hashed[:8]}-{hashed[8:12]}-{hashed[12:16]}-{hashed[16:20]}-{hashed[20:32]}}}"
     texts = {path: text.replace(_TOKEN, token) for path, text in sources.items()}
     texts["modelDescription.xml"] = description(token, about)
     texts["documentation/index.html"] = page(variables, about)
@@ -227,15 +233,6 @@ def fmu_texts(
         attached = sorted({each.picture for each in terminals(variables.model)})
         pictures = {f"terminalsAndIcons/{name}.png": icon(name) for name in ("icon", *attached)}
     return {path: text.encode() for path, text in texts.items()} | pictures
-
-
-def _token(texts: Mapping[str, str]) -> str:
-    """Return a token that identifies this content, a hash of it."""
-    digest = hashlib.sha256()
-    for name, text in sorted(texts.items()):
-        digest.update(f"{name}\0{text}\0".encode())
-    text = digest.hexdigest()
-    return f"{{{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:32]}}}"
 
 
 def _binaries(

@@ -8,7 +8,7 @@ import casadi as ca
 
 from ...foundation.errors import ExportError
 from ...model.flat import Symbols
-from ..c.c_text import Real, comment, identifier, string
+from ..c.c_text import Real, cells, comment, identifier, string
 from ..c.controller_code import check_discrete, header_text, source_text
 from ..c.instructions import print_statements
 from ..c.table_lookup import look_up, look_up_slopes
@@ -100,15 +100,15 @@ def _continuous(layout: FmuLayout) -> str:
     jacobian = ca.densify(ca.jacobian(s.derivative, s.state))
     slope = ca.densify(ca.jacobian(s.derivative, s.time))
     results = [s.derivative, y, signals]
-    targets = [_cells(name, e.numel()) for name, e in zip("fys", results, strict=True)]
+    targets = [cells(name, e.numel()) for name, e in zip("fys", results, strict=True)]
     moved = [*results, indicators]
     tangents = [ca.jtimes(e, everything, seed) for e in moved]
-    tangent_targets = [*targets, _cells("z", indicators.numel())]
+    tangent_targets = [*targets, cells("z", indicators.numel())]
     values = {
         "nominal": ", ".join(Real.DOUBLE.literal(abs(v.nominal) or 1.0) for v in model.states) or "1.0",
-        "rates": _statements(s, mode, [s.derivative], [_cells("f", n)]),
+        "rates": _statements(s, mode, [s.derivative], [cells("f", n)]),
         "equations": _statements(s, mode, results, targets),
-        "jacobian": _statements(s, mode, [jacobian, slope], [_table("jacobian", n, n), _cells("slope", n)]),
+        "jacobian": _statements(s, mode, [jacobian, slope], [_table("jacobian", n, n), cells("slope", n)]),
         "directional": _statements(s, mode, tangents, tangent_targets, seed=seed),
     }
     return filled("fmu_continuous.c", values) + (
@@ -143,12 +143,12 @@ def _switched(layout: FmuLayout, s: Symbols, mode: ca.SX, indicators: ca.SX) -> 
     natural = switching.natural.call(given)
     slope = ca.jtimes(indicators, s.state, s.derivative) + ca.jacobian(indicators, s.time)
     follows = switching.landing.call([*given, mode])
-    targets = [_cells("rate", k), _cells("target", k), _cells("leads", k)]
+    targets = [cells("rate", k), cells("target", k), cells("leads", k)]
     targets += [_table("reach", n, k), _table("slope", k, n)]
     values = {
         "holds": ", ".join(str(int(holds)) for holds in switching.holds),
-        "natural": _statements(s, mode, natural, [_cells("m", k)]),
-        "indicators": _statements(s, mode, [indicators, slope], [_cells("z", k), _cells("slope", k)]),
+        "natural": _statements(s, mode, natural, [cells("m", k)]),
+        "indicators": _statements(s, mode, [indicators, slope], [cells("z", k), cells("slope", k)]),
         "landing": _statements(s, mode, follows, targets),
     }
     return filled("fmu_switched.c", values)
@@ -166,10 +166,6 @@ def _own(layout: FmuLayout, s: Symbols) -> tuple[ca.SX, ca.SX]:
     return selected[0], selected[1]
 
 
-def _cells(name: str, count: int) -> list[str]:
-    return [f"{name}[{i}]" for i in range(count)]
-
-
 def _table(name: str, rows: int, columns: int) -> list[str]:
     return [f"{name}[{i}][{j}]" for j in range(columns) for i in range(rows)]
 
@@ -184,7 +180,7 @@ def _statements(
 ) -> list[str]:
     """Return the body of a function of (t, x, u, p, m), and of a direction (dt, dx, du, dp) with a seed."""
     groups, texts = [s.time, s.state, s.input, s.parameter, mode], [["t"]]
-    texts += [_cells(name, e.numel()) for name, e in zip("xupm", groups[1:], strict=True)]
+    texts += [cells(name, e.numel()) for name, e in zip("xupm", groups[1:], strict=True)]
     if seed is not None:
         groups.append(seed)
         texts.append(["dt"] + [f"d{cell}" for group in texts[1:-1] for cell in group])
@@ -223,7 +219,7 @@ def _directional(layout: FmuLayout, c: CWriter) -> tuple[list[str], set[int]]:
         "p": (model.parameters, s.parameter),
     }
     texts = {
-        "x": _cells("x", len(model.states)),
+        "x": cells("x", len(model.states)),
         "u": [f"memory->inputs.{path}" for path in c.paths.inputs],
         "p": [f"memory->parameters.{path}" for path in c.paths.parameters],
     }
@@ -234,9 +230,9 @@ def _directional(layout: FmuLayout, c: CWriter) -> tuple[list[str], set[int]]:
     results = [ca.jtimes(e, ca.vertcat(*of), ca.vertcat(*seeds)) for e in _own(layout, s)]
     function = ca.Function("d", [*of, *seeds], [ca.densify(e) for e in results], {"cse": True})
     given = [*texts.values(), [f"w{i}" for i in range(count)]]
-    given += [_cells(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
+    given += [cells(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
     given.append([f"dw{i}" for i in range(count)])
-    targets = [_cells(name, e.numel()) for name, e in zip(("dy", "ds"), results, strict=True)]
+    targets = [cells(name, e.numel()) for name, e in zip(("dy", "ds"), results, strict=True)]
     statements = print_statements(function, given, targets, real=Real.DOUBLE)
     sloped = named_indices(statements, "dw")
     used = named_indices(statements, "w") | sloped
@@ -261,7 +257,7 @@ def _signals(layout: FmuLayout, c: CWriter) -> tuple[list[str], list[str], set[i
         [f"memory->parameters.{path}" for path in c.paths.parameters],
     ]
     width = [f"w{i}" for i in range(s.table.numel())]
-    statements = print_statements(function, [*names, width], [_cells("s", signals.numel())], real=Real.DOUBLE)
+    statements = print_statements(function, [*names, width], [cells("s", signals.numel())], real=Real.DOUBLE)
     used = named_indices(statements, "w")
     arguments = dict(zip((v.name for v in model.states), names[0], strict=True))
     arguments |= dict(zip((v.name for v in model.inputs), names[1], strict=True))

@@ -60,7 +60,18 @@ def reference_results(model: FlatModel, *, step: float | None = None) -> Referen
         )
     shown = layout(model).model
     time = np.array([length * k for k in range(STEPS + 1)], dtype=np.float64)
-    inputs = _inputs(shown, time)
+    columns = {}
+    for number, v in enumerate(shown.inputs):
+        turn = 2.0 * math.pi * (2 + number) * time / time[-1]
+        columns[v.name] = v.start + 0.25 * v.nominal * np.sin(turn)
+    for body in shown.bodies:
+        if body.prescribed and {body.motion, body.rate} <= columns.keys():
+            speed = 4.0 * math.pi / time[-1]
+            v = shown.variable(body.motion)
+            columns[body.motion] = v.start + 0.125 * v.nominal * (1.0 - np.cos(speed * time))
+            columns[body.rate] = 0.125 * v.nominal * speed * np.sin(speed * time)
+    limited = [np.clip(columns[v.name], v.minimum, v.maximum) for v in shown.inputs]
+    inputs = np.array(limited).reshape(len(shown.inputs), len(time)).T
     important = [v.name for v in shown.outputs]
     if shown.sample_time is None:
         important += [v.name for v in shown.states]
@@ -122,21 +133,6 @@ def write_reference(model: FlatModel, fmu: str | Path, *, step: float | None = N
         texts[place.with_name(f"{place.stem}_in.csv")] = given
     write_all(texts)
     return tuple(texts)
-
-
-def _inputs(model: FlatModel, time: Array) -> Array:
-    columns = {}
-    for number, v in enumerate(model.inputs):
-        turn = 2.0 * math.pi * (2 + number) * time / time[-1]
-        columns[v.name] = v.start + 0.25 * v.nominal * np.sin(turn)
-    for body in model.bodies:
-        if body.prescribed and {body.motion, body.rate} <= columns.keys():
-            speed = 4.0 * math.pi / time[-1]
-            v = model.variable(body.motion)
-            columns[body.motion] = v.start + 0.125 * v.nominal * (1.0 - np.cos(speed * time))
-            columns[body.rate] = 0.125 * v.nominal * speed * np.sin(speed * time)
-    limited = [np.clip(columns[v.name], v.minimum, v.maximum) for v in model.inputs]
-    return np.array(limited).reshape(len(model.inputs), len(time)).T
 
 
 def _continuous(model: FlatModel, time: Array, inputs: Array, names: Sequence[str]) -> Array:

@@ -26,7 +26,6 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...model.flat import FlatModel, Variable
-from ...model.structure import SpringNames
 
 Sizes = dict[str, float]
 
@@ -94,7 +93,12 @@ def _of_machine(model: FlatModel, sizes: Sizes) -> None:
     known = {v.name: v.unit for v in (*model.signals, *model.outputs, *model.states)}
     for spring in model.springs:
         for state in spring.states:
-            alike = [n for n in _inside(spring) if known.get(n) == state_units.get(state)]
+            # The motions and efforts in a spring, and strains and forces of its pieces.
+            names = [spring.motion, spring.effort]
+            for cam in spring.cams:
+                names += [cam.angle, cam.torque, cam.extension, cam.force]
+                names += [name for piece in cam.specimens for name in (piece.strain, piece.force)]
+            alike = [n for n in names if known.get(n) == state_units.get(state)]
             size = max((rest.get(name, 0.0) for name in alike), default=0.0)
             if size > 0.0:
                 sizes.setdefault(state, _rounded(size))
@@ -110,15 +114,6 @@ def _of_balances(model: FlatModel, sizes: Sizes) -> None:
         held = _largest(model, _points(model, {body.motion: 1.0}, only=[body.motion]))
         if driven > 0.0 and held.get(f"der({body.rate})", 0.0) > 0.0:
             sizes[body.motion] = _rounded(driven / held[f"der({body.rate})"])
-
-
-def _inside(spring: SpringNames) -> list[str]:
-    """Return the motions and efforts in a spring, and strains and forces of its pieces."""
-    names = [spring.motion, spring.effort]
-    for cam in spring.cams:
-        names += [cam.angle, cam.torque, cam.extension, cam.force]
-        names += [name for piece in cam.specimens for name in (piece.strain, piece.force)]
-    return names
 
 
 _Point = tuple[Array, Array]

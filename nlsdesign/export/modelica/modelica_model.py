@@ -9,7 +9,7 @@ import re
 import sys
 import textwrap
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -52,24 +52,20 @@ def modelica_equations(model: FlatModel, names: Mapping[str, str]) -> ModelicaEq
             if variable.name not in given and name not in called[results[port, index]]:
                 called[results[port, index]].append(name)
     wanted = {results[port, index] for port, group in enumerate(groups) for index in range(len(group))}
-    reader = _Reader(model, names, called, _uses(steps, wanted))
+    # How often the text of each value is needed; 0 for what only the residuals need.
+    uses = Counter(wanted)
+    for step_number in range(len(steps) - 1, -1, -1):
+        if uses[step_number]:
+            weight = 2 if steps[step_number].operation in WRITTEN_TWICE else 1
+            for operand in steps[step_number].operands:
+                uses[operand] += weight
+    reader = _Reader(model, names, called, uses)
     for number, step in enumerate(steps):
         if reader.uses[number]:
             reader.terms[number] = reader.read(number, step)
     for index, state in enumerate(model.states):
         reader.equations.derivatives[names[state.name]] = _right_side(reader.terms[results[0, index]])
     return reader.equations
-
-
-def _uses(steps: Sequence[Instruction], wanted: set[int]) -> Counter[int]:
-    """Return how often the text of each value is needed; 0 for what only the residuals need."""
-    uses = Counter(wanted)
-    for number in range(len(steps) - 1, -1, -1):
-        if uses[number]:
-            weight = 2 if steps[number].operation in WRITTEN_TWICE else 1
-            for operand in steps[number].operands:
-                uses[operand] += weight
-    return uses
 
 
 def _right_side(value: Term) -> str:

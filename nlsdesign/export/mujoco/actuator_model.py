@@ -19,7 +19,7 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...foundation.quantity import same_dimension
 from ...model.flat import FlatModel, Variable
-from ..c.c_text import Real, comment, identifier, string
+from ..c.c_text import Real, cells, comment, identifier, string
 from ..c.instructions import print_statements
 from ..c.provenance import number_lines, origin_lines, origin_macros, stamped
 from ..files import filled, write_all
@@ -289,14 +289,10 @@ class _Writer:
         order = [name for b in model.bodies for name in (b.motion, b.rate)] + [v.name for v in self.inner]
         texts = [
             ["t"], [f"x[{order.index(v.name)}]" for v in model.states],
-            *(_cells(letter, len(group)) for letter, group in (("u", model.inputs), ("p", model.parameters))),
+            *(cells(letter, len(group)) for letter, group in (("u", model.inputs), ("p", model.parameters))),
         ]  # fmt: skip
-        targets = [_cells("effort", len(efforts)), _cells("rate", len(rates)), _cells("y", s.output.numel())]
+        targets = [cells("effort", len(efforts)), cells("rate", len(rates)), cells("y", s.output.numel())]
         return print_statements(function, texts, targets, real=Real.DOUBLE)
-
-
-def _cells(name: str, count: int) -> list[str]:
-    return [f"{name}[{i}]" for i in range(count)]
 
 
 def _xml_comment(text: str) -> str:

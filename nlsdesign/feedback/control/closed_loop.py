@@ -17,7 +17,7 @@ from ...model.origin import common_origin
 from ...model.roles import moved_load, series_spring
 from ...model.transform import with_signal
 from ...simulation import Trace, range_warnings
-from ...simulation.sampled_batch import PLANT, BatchTrace, SampledSystem, run_batch
+from ...simulation.sampled_batch import PLANT, SampledSystem, run_batch
 from .laws.law_writer import GAIN
 from .laws.torque_loop import LoopNames, loop_names
 
@@ -380,7 +380,28 @@ class ClosedLoop:
                 f"plant {self.plant.name} at t = {at:g} s", "a state is not finite",
                 next_step="use more substeps per sample, or check the gains of the loop",
             )  # fmt: skip
-        return _record(self, batch)
+        # The record, with the signals of the plant computed from its states and inputs.
+        plant, time = self.plant, batch.time
+        x, u = (
+            np.array([batch[f"{PLANT}.{v.name}"][0] for v in group]).reshape(len(group), len(time))
+            for group in (plant.states, plant.inputs)
+        )
+        p = np.repeat(plant.start(plant.parameters)[:, None], len(time), axis=1)
+        _, y, s, _ = plant.equations.map(len(time))(time[None, :], x, u, p, np.zeros((0, len(time))))
+        rows = {f"{PLANT}.{v.name}": row for v, row in zip(plant.signals, ca.densify(s).full(), strict=True)}
+        rows |= {f"{PLANT}.{v.name}": row for v, row in zip(plant.outputs, ca.densify(y).full(), strict=True)}
+        signals = rows | {name: values[0] for name, values in batch.signals.items()}
+        owners = {PLANT: plant, OBSERVER: self.observer, CONTROLLER: self.controller}
+        units = {
+            f"{owner}.{v.name}": v.unit
+            for owner, model in owners.items()
+            for v in (*model.signals, *model.states, *model.inputs, *model.outputs)
+        }
+        warnings = range_warnings(plant.signals + plant.states, time, signals, f"{PLANT}.")
+        return Trace(
+            time, signals, {name: units[name] for name in signals}, f"closed loop of {plant.name}",
+            warnings=warnings,
+        )  # fmt: skip
 
     def system(self, opened: Iterable[str]) -> SampledSystem:
         """Return plant, observer and controller as one sampled system, for many runs at once.
@@ -409,7 +430,19 @@ class ClosedLoop:
         for name in opened:
             if name not in known:
                 raise unknown_name("input of the loop", name, known)
-        self._check_sources(sources)
+        plant = self.plant
+        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
+        offered = {f"{PLANT}.{v.name}" for group in groups for v in group}
+        offered |= {f"{OBSERVER}.{v.name}" for v in self.observer.outputs}
+        for target, origin in sources.items():
+            if origin in offered or origin == target:
+                continue
+            if target in self.wires:
+                raise unknown_name(f"wire to '{target}' from", origin, offered)
+            raise ArrangementError(
+                f"input '{target}'", "is open: it is neither driven nor wired, and nothing has the same name",
+                next_step="give it in inputs or in wires",
+            )  # fmt: skip
         return SampledSystem(
             plant=self.plant,
             blocks={OBSERVER: self.observer, CONTROLLER: self.controller},
@@ -427,46 +460,6 @@ class ClosedLoop:
             return self.wires[full]
         outputs = {v.name for v in self.observer.outputs}
         return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
-
-    def _check_sources(self, sources: Mapping[str, str]) -> None:
-        plant = self.plant
-        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
-        known = {f"{PLANT}.{v.name}" for group in groups for v in group}
-        known |= {f"{OBSERVER}.{v.name}" for v in self.observer.outputs}
-        for name, source in sources.items():
-            if source in known or source == name:
-                continue
-            if name in self.wires:
-                raise unknown_name(f"wire to '{name}' from", source, known)
-            raise ArrangementError(
-                f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
-                next_step="give it in inputs or in wires",
-            )  # fmt: skip
-
-
-def _record(loop: ClosedLoop, batch: BatchTrace) -> Trace:
-    """Return the record, with the signals of the plant computed from its states and inputs."""
-    plant, time = loop.plant, batch.time
-    x, u = (
-        np.array([batch[f"{PLANT}.{v.name}"][0] for v in group]).reshape(len(group), len(time))
-        for group in (plant.states, plant.inputs)
-    )
-    p = np.repeat(plant.start(plant.parameters)[:, None], len(time), axis=1)
-    _, y, s, _ = plant.equations.map(len(time))(time[None, :], x, u, p, np.zeros((0, len(time))))
-    rows = {f"{PLANT}.{v.name}": row for v, row in zip(plant.signals, ca.densify(s).full(), strict=True)}
-    rows |= {f"{PLANT}.{v.name}": row for v, row in zip(plant.outputs, ca.densify(y).full(), strict=True)}
-    signals = rows | {name: values[0] for name, values in batch.signals.items()}
-    owners = {PLANT: plant, OBSERVER: loop.observer, CONTROLLER: loop.controller}
-    units = {
-        f"{owner}.{v.name}": v.unit
-        for owner, model in owners.items()
-        for v in (*model.signals, *model.states, *model.inputs, *model.outputs)
-    }
-    warnings = range_warnings(plant.signals + plant.states, time, signals, f"{PLANT}.")
-    return Trace(
-        time, signals, {name: units[name] for name in signals}, f"closed loop of {plant.name}",
-        warnings=warnings,
-    )  # fmt: skip
 
 
 DEFLECTION = "measured"

@@ -11,11 +11,11 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError, ValueRangeError
 from ...simulation.buffered import Translate, as_it_is
-from ...simulation.prior import declared_prior
 from .closed_loop import ClosedLoop
 from .evaluation.margins import loop_margins, output_impedance
 from .evaluation.onset import checked_gains
 from .evaluation.responses import sine_response
+from .evaluation.spread_margins import on_drawn_machines
 
 _TRIED = 9
 
@@ -100,7 +100,7 @@ def largest_gain(
     """
     low, high = checked_gains(loop, gain, between)
     limits, at = limits or LoopLimits(), np.asarray(angles, dtype=float)
-    plants = [loop, *_drawn(loop, draws)]
+    plants = on_drawn_machines(loop, draws)
 
     def broken(value: float) -> str:
         return _broken([_with_gain(each, gain, value) for each in plants], at, limits, translate)
@@ -127,17 +127,6 @@ def largest_gain(
         breaks = broken(middle)
         low, high, words = (low, middle, breaks) if breaks else (middle, high, words)
     return TunedLoop(_with_gain(loop, gain, low), gain, low, words)
-
-
-def _drawn(loop: ClosedLoop, draws: int) -> list[ClosedLoop]:
-    """Return the loop with plants drawn from the spread of the deck."""
-    if not draws:
-        return []
-    drawn = declared_prior(loop.plant).draws(draws, 1)
-    return [
-        replace(loop, plant=loop.plant.with_values({n: float(v[k]) for n, v in drawn.items()}))
-        for k in range(draws)
-    ]
 
 
 def _with_gain(loop: ClosedLoop, gain: str, value: float) -> ClosedLoop:

@@ -52,10 +52,6 @@ class CodeIdentity:
     def __str__(self) -> str:
         return f"nlsdesign {self.version} (code {self.digest[:_SHOWN_DIGITS]})"
 
-    def without_files(self) -> CodeIdentity:
-        """Return the same identity without the list of files, for workers."""
-        return CodeIdentity(self.version, self.digest)
-
 
 @functools.cache
 def code_identity(package: Path = _PACKAGE) -> CodeIdentity:
@@ -73,7 +69,8 @@ def code_identity(package: Path = _PACKAGE) -> CodeIdentity:
 
 def own_identity() -> CodeIdentity:
     """Return the identity of this process without its list of files, as a worker is asked for it."""
-    return code_identity().without_files()
+    self = code_identity()
+    return CodeIdentity(self.version, self.digest)
 
 
 def _digests(package: Path) -> Iterator[tuple[str, str]]:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
 from ...design import Contour, elastic_law
-from ...design.statics.contour import turn
+from ...design.statics.contour import cable_up_to, turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, typeset_number
@@ -118,19 +118,12 @@ class CamMotion:
         return int(np.argmin(np.abs(self.angles - angle)))
 
     def cable(self, index: int) -> Array:
-        """Return the right-hand cable from the centre of the cam to the guide, in the resting frame.
+        """Return the right-hand cable from the centre of the cam, through the channel and over the lip.
 
-        Through the channel to the lip, along the lip to the contact point, straight to the guide. The
-        left-hand cable is the same turned by half a turn. Shape (n, 2) in m; the last point but one is the
-        contact point.
+        The left-hand cable is the same turned by half a turn. Shape (n, 2) in m; the last point but one is
+        the contact point, the last lies at the guide.
         """
-        angle = float(self.angles[index])
-        touched = self.contour.points[self.contour.angles < abs(angle)]
-        side = np.array([1.0, -1.0 if angle < 0.0 else 1.0])
-        wrapped = turn(np.vstack([[0.0, 0.0], touched]) * side, angle)
-        contact, anchor = self.contour.cable(angle)
-        share = min(1.0, (self.guide - contact[0]) / (anchor[0] - contact[0]))
-        return np.vstack([wrapped, contact, contact + share * (anchor - contact)])
+        return cable_up_to(self.contour, float(self.angles[index]), self.guide, from_centre=True)
 
 
 def cam_motion(

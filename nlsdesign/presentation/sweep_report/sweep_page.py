@@ -13,9 +13,9 @@ from ...foundation.command_words import typed_command
 from ...foundation.errors import MissingLibraryError, NlsError, visible
 from ...foundation.text_files import write_table, write_text
 from ...sweeps import SweepTable
-from ...sweeps.point_deck import point_deck_texts
 from ...sweeps.preferences import NotBelow, Preference, RankedPoints, Requirement, rank_points
 from ...sweeps.sensitivity import AnswerSensitivity, sensitivity
+from ...sweeps.sweep_table import point_deck_texts
 from ..report import FileSection, Section, TableSection, TextSection, write_report
 from ..report.tables import PointTableSection
 from .shown_points import PageContent, named_columns, point_rows, shown_column, shown_points

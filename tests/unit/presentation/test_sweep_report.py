@@ -19,9 +19,8 @@ from nlsdesign.presentation.sweep_report import write_sweep_report
 from nlsdesign.presentation.sweep_report.shown_points import MOST_KEPT, MOST_OTHERS, shown_points
 from nlsdesign.presentation.sweep_report.sweep_page import SweepPage, usual_requirements
 from nlsdesign.sweeps import SmallerIsBetter
-from nlsdesign.sweeps.point_deck import point_deck_text, point_deck_texts
 from nlsdesign.sweeps.preferences import NotAbove, nondominated, rank_points
-from nlsdesign.sweeps.sweep_table import SweepTable
+from nlsdesign.sweeps.sweep_table import SweepTable, point_deck_text, point_deck_texts
 from tests.sweep_tables import AREA, HOSTILE, INERTIA, RUBBER, spread_table, table_of
 
 pytest.importorskip("SALib")

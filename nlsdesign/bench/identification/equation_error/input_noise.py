@@ -66,7 +66,9 @@ def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[SeenB
         if noise.rounded[signal] or noise.parts.get(signal):
             continue
         read = _Signal(signal, noise, tuple(records.deciding))
-        shown = read.shown_above_motion(counts)
+        # The bands above all motion of each record in which they show a colour.
+        above = {record.name: read.above_motion(record, counts) for record in read.records}
+        shown = {name: bands for name, bands in above.items() if bands}
         for each in seen if shown else ():
             colours = read.colours(each, shown)
             if colours:
@@ -90,11 +92,6 @@ class _Signal(NamedTuple):
     name: str
     noise: Noise
     records: tuple[Record, ...]
-
-    def shown_above_motion(self, counts: Mapping[str, float]) -> dict[str, list[Band]]:
-        """Return the bands above all motion of each record in which they show a colour."""
-        above = {record.name: self.above_motion(record, counts) for record in self.records}
-        return {name: bands for name, bands in above.items() if bands}
 
     def lengths(self, names: Collection[str]) -> list[float]:
         """Return how long these records are, in s."""

@@ -116,7 +116,16 @@ def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
     """
     if not (rate > 0.0 and math.isfinite(rate)):
         raise ValueRangeError(f"rate {rate:g} Hz", "must be positive", next_step="give for instance 500")
-    time = _common(channels, rate)
+    begins, ends = max(channels, key=lambda c: c.time[0]), min(channels, key=lambda c: c.time[-1])
+    start, stop = float(begins.time[0]), float(ends.time[-1])
+    count = math.floor((stop - start) * rate + _SAME) + 1
+    if count < _LEAST:
+        raise MeasurementError(
+            f"'{begins.name}' from {start:g} s and '{ends.name}' until {stop:g} s",
+            f"have {max(count, 0)} samples in common at {rate:g} Hz; at least {_LEAST} are needed",
+            next_step="check the units of the clocks, or take a higher rate",
+        )
+    time: Array = np.minimum(start + np.arange(count) / rate, stop)
     values, changes = {}, []
     for each in channels:
         values[each.name], change = _resampled(each, time, 1.0 / rate)
@@ -126,20 +135,6 @@ def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
         if length >= 1.0 / rate:
             changes.append(f"{end} {length:.3g} s left out, where not every channel runs")
     return Resampled(time, values, tuple(changes))
-
-
-def _common(channels: Sequence[Channel], rate: float) -> Array:
-    begins, ends = max(channels, key=lambda c: c.time[0]), min(channels, key=lambda c: c.time[-1])
-    first, last = float(begins.time[0]), float(ends.time[-1])
-    count = math.floor((last - first) * rate + _SAME) + 1
-    if count < _LEAST:
-        raise MeasurementError(
-            f"'{begins.name}' from {first:g} s and '{ends.name}' until {last:g} s",
-            f"have {max(count, 0)} samples in common at {rate:g} Hz; at least {_LEAST} are needed",
-            next_step="check the units of the clocks, or take a higher rate",
-        )
-    grid: Array = np.minimum(first + np.arange(count) / rate, last)
-    return grid
 
 
 def _resampled(channel: Channel, time: Array, step: float) -> tuple[Array, str]:
@@ -249,7 +244,23 @@ def lag_between(delayed: Channel, reference: Channel, *, longest: float | None =
         )  # fmt: skip
     shift = _refined(one, other, float(lags[peak]), step)
     error, residual = _standard_error(one, other, shift)
-    _check_unique(pair, lags, correlations, effective_size(residual))
+    best = float(np.max(correlations))
+    # A second peak of a repeating motion leaves as little unexplained variance as the first.
+    allowed = (1.0 - best**2) * (
+        1.0 + _SIGNIFICANT * math.sqrt(2.0 / max(effective_size(residual), 1.0))
+    ) + 1e-9
+    peaks = [
+        k
+        for k in scipy.signal.find_peaks(correlations)[0]
+        if 1.0 - correlations[k] ** 2 <= allowed and correlations[k] > 0.0
+    ]
+    if len(peaks) > 1:
+        equal = " and ".join(f"{lags[k]:.4g} s" for k in sorted(peaks, key=lambda k: -correlations[k])[:2])
+        raise MeasurementError(
+            f"lag of {pair}",
+            f"is not unique: the motion repeats, so {equal} fit as well",
+            next_step="look for a lag below half a period (longest), or record a motion that does not repeat",
+        )
     return Lag(shift, error, _at(one, other, shift), delayed.name, reference.name)
 
 
@@ -322,21 +333,3 @@ def _standard_error(delayed: Channel, reference: Channel, shift: float) -> tuple
     quiet = np.flatnonzero(rho < 2.0 / math.sqrt(len(score)))
     colour = max(1.0, 1.0 + 2.0 * float(np.sum(rho[: quiet[0]] if len(quiet) else rho)))
     return math.sqrt(len(score) * float(np.mean(score**2)) * colour) / float(own @ own), residual
-
-
-def _check_unique(pair: str, lags: Array, correlations: Array, effective: float) -> None:
-    best = float(np.max(correlations))
-    # A second peak of a repeating motion leaves as little unexplained variance as the first.
-    allowed = (1.0 - best**2) * (1.0 + _SIGNIFICANT * math.sqrt(2.0 / max(effective, 1.0))) + 1e-9
-    peaks = [
-        k
-        for k in scipy.signal.find_peaks(correlations)[0]
-        if 1.0 - correlations[k] ** 2 <= allowed and correlations[k] > 0.0
-    ]
-    if len(peaks) > 1:
-        equal = " and ".join(f"{lags[k]:.4g} s" for k in sorted(peaks, key=lambda k: -correlations[k])[:2])
-        raise MeasurementError(
-            f"lag of {pair}",
-            f"is not unique: the motion repeats, so {equal} fit as well",
-            next_step="look for a lag below half a period (longest), or record a motion that does not repeat",
-        )

@@ -111,7 +111,7 @@ def margins_alone(loop: ClosedLoop, gain: str, *, last: float) -> SpreadMargins:
     has no stiffness the loop hardly acts and its phase says nothing.
     """
     angles = np.linspace(0.05, 1.0, 11) * last
-    plants = _machines(loop)
+    plants = on_drawn_machines(loop, DRAWS)
     value = loop.controller.values[gain]
     worst = _worst(loop, plants, angles)
     enough = value
@@ -129,13 +129,13 @@ def margins_alone(loop: ClosedLoop, gain: str, *, last: float) -> SpreadMargins:
     return SpreadMargins(gain, value, least, _kept_by_most(worst), enough, None)
 
 
-def _machines(loop: ClosedLoop) -> list[ClosedLoop]:
-    """Return the loop as declared, and on drawn machines."""
+def on_drawn_machines(loop: ClosedLoop, draws: int) -> list[ClosedLoop]:
+    """Return the loop as declared, and on machines drawn from the spread of the deck, if it has one."""
     known = declared_prior(loop.plant)
-    if not known.names:
+    if not known.names or not draws:
         return [loop]
-    drawn = known.draws(DRAWS, 1)
-    changed = [{n: float(v[k]) for n, v in drawn.items()} for k in range(DRAWS)]
+    drawn = known.draws(draws, 1)
+    changed = [{n: float(v[k]) for n, v in drawn.items()} for k in range(draws)]
     return [loop, *(replace(loop, plant=loop.plant.with_values(numbers)) for numbers in changed)]
 
 

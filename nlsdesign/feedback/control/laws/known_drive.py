@@ -15,7 +15,7 @@ from ....foundation.symbolic import Expression, depends
 from ....model import FlatModel
 from ....model.flat import Symbols
 from ....model.linear import rest_state
-from ....model.roles import motor_of, series_spring
+from ....model.roles import contour_ends, motor_of, series_spring
 from ....model.structure import MotorNames, MovingBody
 from ....model.transform import cut, named
 from .law_writer import LawWriter, LoopNames, loop_names
@@ -280,13 +280,8 @@ def only_side(plant: FlatModel) -> float:
     ``plant``: continuous, load fixed or prescribed; friction in its smooth form.
     """
     drive = KnownDrive(plant)
-    spring = series_spring(plant)
-    ends = [plant.values[cam.last_angle] for cam in spring.cams if cam.last_angle]
-    angle = (min(ends) if ends else _SMALL_TURN) / abs(drive.spring_turns_value)
-    torques = []
-    for way in (1.0, -1.0):
-        state = rest_state(plant, {drive.body.motion: way * angle, drive.body.rate: 0.0})
-        torques.append(plant.evaluate(list(state))[spring.effort])
+    end = min(contour_ends(plant, series_spring(plant)).values(), default=_SMALL_TURN)
+    torques = [_torque_at_rest(drive, way * end) for way in (1.0, -1.0)]
     strongest = max(torques, key=abs)
     if min(map(abs, torques)) > _NOTHING * abs(strongest) or strongest == 0.0:
         return 0.0
@@ -370,10 +365,11 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
 
 def _by_contour(drive: KnownDrive, way: float) -> float:
     """Return the size of the torque at rest at the end of the contour; infinite without a cam."""
-    plant, spring = drive.plant, series_spring(drive.plant)
-    ends = [plant.values[cam.last_angle] for cam in spring.cams if cam.last_angle]
-    if not ends:
-        return math.inf
-    angle = way * min(ends) / abs(drive.spring_turns_value)
-    state = rest_state(plant, {drive.body.motion: angle, drive.body.rate: 0.0})
-    return abs(plant.evaluate(list(state))[spring.effort])
+    ends = contour_ends(drive.plant, series_spring(drive.plant)).values()
+    return abs(_torque_at_rest(drive, way * min(ends))) if ends else math.inf
+
+
+def _torque_at_rest(drive: KnownDrive, angle: float) -> float:
+    """Return the torque of the spring at rest at an angle of the spring in rad."""
+    turned = {drive.body.motion: angle / abs(drive.spring_turns_value), drive.body.rate: 0.0}
+    return drive.plant.evaluate(list(rest_state(drive.plant, turned)))[series_spring(drive.plant).effort]

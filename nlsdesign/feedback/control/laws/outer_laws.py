@@ -17,7 +17,7 @@ import numpy as np
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import FlatModel, Table, Variable
-from ....model.roles import series_spring
+from ....model.roles import contour_ends, series_spring
 from ....model.transform import named
 from ...analysis.rest import evaluate_at, rest_states
 from .known_drive import KnownDrive
@@ -362,7 +362,12 @@ class ScheduledTorque(TorqueLaw):
         if table.argument != drive.names.angle:
             writer.input(table.argument, "rad", "measured angle of the spring")
         (slope,) = writer.look_up(table)
-        secant, smallest = _secant(table), int(np.argmin(table.values[:, 0]))
+        # The torque at the stiffer end of the table over the angle there, in N·m/rad. A mean of the slopes,
+        # so that a corner of the law at one angle does not decide.
+        stiffnesses = table.values[:, 0]
+        sides = [(table.grid >= 0.0), (table.grid <= 0.0)]
+        secant = max(float(np.mean(stiffnesses[side])) for side in sides if np.any(side))
+        smallest = int(np.argmin(stiffnesses))
         value = FLOOR_SHARE * secant if self.stiffness_floor is None else self.stiffness_floor
         least = LEAST_FLOOR * secant if table.values[smallest, 0] <= LEAST_FLOOR * secant else 0.0
         angle = round(float(table.grid[smallest]), 9) + 0.0
@@ -415,8 +420,7 @@ def stiffness_table(drive: KnownDrive) -> Table:
     plant, body = drive.plant, drive.body
     _check_held(plant, body.name)
     spring, turns = series_spring(plant), drive.spring_turns_value
-    ends = [plant.values[cam.last_angle] for cam in spring.cams if cam.last_angle]
-    end = min(ends, default=math.pi / 2.0)
+    end = min(contour_ends(plant, spring).values(), default=math.pi / 2.0)
     angles = np.linspace(-end, end, POINTS)
     offset = plant.evaluate(list(plant.start(plant.states)))[spring.motion]
     offset -= turns * float(plant.variable(body.motion).start)
@@ -435,17 +439,6 @@ def stiffness_table(drive: KnownDrive) -> Table:
     order = np.argsort(seen)
     step = float(abs(seen[1] - seen[0]))
     return Table(body.motion, float(np.min(seen)), step, (column,), slopes[order][:, None])
-
-
-def _secant(table: Table) -> float:
-    """Return the torque at the stiffer end of the table over the angle there, in N·m/rad.
-
-    A mean of the slopes, so that a corner of the law at one angle does not decide.
-    """
-    grid = table.grid
-    slope = table.values[:, 0]
-    sides = [(grid >= 0.0), (grid <= 0.0)]
-    return max(float(np.mean(slope[side])) for side in sides if np.any(side))
 
 
 def _check_held(plant: FlatModel, motor: str) -> None:
