@@ -426,8 +426,7 @@ def measured_inputs(block: Block, record: Record, span: float) -> Array:
     for i, variable in enumerate(model.inputs):
         if variable.name in block.drives:
             drive = block.drives[variable.name]
-            signal = record.at_samples(drive.signal)
-            inputs[i] = derivative(signal, record.step, order=drive.order, span=span)
+            inputs[i] = record.derived(drive.signal, drive.order, span)
     return inputs
 
 

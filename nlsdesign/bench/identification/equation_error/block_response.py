@@ -146,16 +146,16 @@ class DrivenBlock:
             drive = self.block.drives.get(variable.name)
             if drive is None:
                 continue
-            signal = record.at_samples(drive.signal)
-            now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
-            delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
+            inputs[i] = record.derived(drive.signal, drive.order, self._span)
             if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
-                signal = without_rounding(signal, record.step, self._span)
-            inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
+                inputs[i] = without_rounding(inputs[i], record.step, self._span)
             if i in self._straightened:
+                signal = record.at_samples(drive.signal) if drive.order else inputs[i]
                 even = smoothed(signal, record.step, order=drive.order, span=self._span)
                 inputs[i], rates[i] = even, inputs[i] - even
             if drive.shifted_by:
+                now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
+                delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
                 inputs[i], rates[i] = advanced(record.trace.time, inputs[i], delay)
             if set(drive.stretched_by) & set(self._late):
                 rates[i] = rates[i] * since  # what a change of the rate shifts grows with time
