@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
-from ..filters import Smoothing, blurred, derivative, difference, filter_weights, filtered, kernel, smoothing
+from ..filters import Smoothing, blurred, difference, filter_weights, filtered, kernel, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
 from .batch import ColumnFunction

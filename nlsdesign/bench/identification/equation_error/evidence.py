@@ -68,7 +68,9 @@ class Evidence:
         return (self.floor.filter @ error) / self.floor.sigma
 
     def _samples(self, values: Mapping[str, float]) -> Samples:
-        return self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
+        if not self.driven.needs_new_samples:
+            return self.samples
+        return self.driven.samples(self.record, values, self.samples)
 
 
 class Bench:
