@@ -240,7 +240,7 @@ class DrivenBlock:
         """Return the functions of a step, with short implicit steps for what is faster than a sample."""
         p = _vector(values, (*self.free, *self._late))
         stretches = np.zeros(len(self._stages))
-        for record in records:
+        for record in () if all(stage.linear for stage in self._stages) else records:
             stretches = np.maximum(stretches, self._stretches(record, values, p))
         stiff = [
             not stage.linear and bool(size > STIFF)
@@ -298,7 +298,10 @@ def _rest(block: Block, rate_at: PointFunction, begin: Array, p: Array) -> Array
         rate, slope = rate_at(x, begin, p)
         if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
             raise ConvergenceError(f"block '{block.name}'", "has no state of rest at the first sample")
-        x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+        later = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+        if np.array_equal(later, x):
+            break  # it would stay there
+        x = later
     return x
 
 
