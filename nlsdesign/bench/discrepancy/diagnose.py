@@ -381,9 +381,10 @@ def _furthest(names: Sequence[str], excesses: Excesses) -> str:
 
 
 def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[Any, ...], ...]:
-    """Return what was tried first: identifier, share that it explains alone, why it is not named, numbers."""
+    """Return what explains something alone: identifier, share, why it is not named, numbers."""
     named = {step.effect for step in steps}
-    first = sorted(outcome.tried, key=lambda each: each.candidate.effect not in named)[:_RUNNERS_UP]
+    tried = [each for each in outcome.tried if each.share > 0.0]
+    first = sorted(tried, key=lambda each: each.candidate.effect not in named)[:_RUNNERS_UP]
     return tuple(
         (
             each.candidate.effect,

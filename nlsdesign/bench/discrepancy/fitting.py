@@ -26,7 +26,7 @@ from ...foundation.errors import ConvergenceError
 from ...model import flatten
 from ..identification.equation_error.evidence import Bench, Evidence
 from ..identification.filters import derivative
-from ..identification.least_squares import Fit, Promise, fit, promised_costs
+from ..identification.least_squares import Fit, Promise, fit, gauss_newton_step, promised_costs
 from ..identification.parameters import Parameter
 from ..identification.residuals import rmse
 from .tearing import blocks_of
@@ -175,6 +175,9 @@ class Budget:
 
 
 BUDGET = Budget()
+_NOTHING, _FEW_STARTS = 0.005, 4
+"""Share of the excess over the noise within which the linearised problem ends at what was left before, from
+each of so few starts: more is not asked of what then explains nothing. Others take twice the time to ask."""
 _HELD = 1e-4
 """Share by which a number that is held may move, because a fit needs an interval."""
 
@@ -404,6 +407,28 @@ def refusal(problem: FitProblem) -> str:
 def method_for(problem: FitProblem) -> Method:
     """Return how a group of blocks is fitted."""
     return RobustOverFreeFlight() if problem.has_free_flight else Smooth()
+
+
+def fit_of_nothing(problem: FitProblem) -> Fit | None:
+    """Return where a Gauss-Newton step leads, if from each start it ends at what was left without the effect.
+
+    It is the score test of an effect beside what is there already (Rao 1948), taken from where the fits would
+    begin: none of them promises to gain, and none is at a place that is far worse than no effect at all.
+    """
+    keys = [(e.driven.block.name, e.record.name) for e in problem.predictable]
+    if len(problem.starts) > _FEW_STARTS or not problem.before.keys() >= set(keys):
+        return None
+    left = [problem.before[key] for key in keys]
+    declared = [p for p in problem.starts[0] if math.isfinite(p.sigma)]
+    prior = sum(((p.inward(p.start) - p.inward(p.centre)) / p.sigma) ** 2 for p in declared)
+    now, noise = 0.5 * (prior + sum(t.squares for t in left)), 0.5 * sum(t.rows for t in left)
+    try:
+        steps = [gauss_newton_step(problem.predictable, start) for start in problem.starts]
+    except ConvergenceError:
+        return None
+    if max(abs(cost - now) for cost, _ in steps) >= _NOTHING * (now - noise):
+        return None
+    return fit(problem.predictable, min(steps, key=lambda step: step[0])[1], evaluations=0)
 
 
 def best_fit(

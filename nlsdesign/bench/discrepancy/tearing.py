@@ -234,7 +234,9 @@ def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
     drives, efforts = used.drives, used.efforts
     opened = cut(model, [e.shown for e in efforts], keep=True) if efforts else model
     acting = _acting(model, drives, efforts)
-    fed = cut(model, [e.shown for e in acting], keep=True) if acting else model
+    fed = (
+        opened if acting == efforts else cut(model, [e.shown for e in acting], keep=True) if acting else model
+    )
     blocks = [_reading_block(fed, target, [*drives, *acting]) for target in (*efforts, *used.targets)]
     blocks += [
         _balance_block(opened, lead, used.accelerations.get(lead.body.name), [*drives, *efforts])

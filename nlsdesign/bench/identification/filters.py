@@ -165,15 +165,15 @@ class Smoothing:
         if len(self.weights) == 1:
             result: Array = self.weights[0] * signal[self.places]
             return result
-        # Sample by sample of the kernel over all rows at once: no array of rows times kernel is made.
-        first = int(self.places[0]) - len(self.weights) // 2
-        count = (int(self.places[-1]) - int(self.places[0])) // self.stride + 1
-        behind = first + (count - 1) * self.stride + 1
-        rows = np.zeros_like(signal[first : behind : self.stride], dtype=np.float64)
-        for k, weight in enumerate(self.weights[::-1]):
-            rows += weight * signal[first + k : behind + k : self.stride]
-        picked: Array = rows[(self.places - self.places[0]) // self.stride]
-        return picked
+        # SciPy convolves for the samples that are kept alone: those that are a multiple of the stride behind
+        # the first. So that the rows are, as many zeros stand before the signal as that takes.
+        reach = len(self.weights) - 1
+        first, behind = int(self.places[0]) - reach // 2, int(self.places[-1]) + reach // 2 + 1
+        missing = -reach % self.stride
+        longer = np.concatenate([np.zeros((missing, *signal.shape[1:])), signal[first:behind]])
+        every_row = scipy.signal.upfirdn(self.weights, longer, 1, self.stride, axis=0)
+        rows: Array = every_row[(self.places - self.places[0] + reach + missing) // self.stride]
+        return rows
 
     def touched_by(self, mask: Mask) -> Mask:
         """Tell for each row whether a sample of a mask is among those that it is made of."""

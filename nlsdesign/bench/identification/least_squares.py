@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -436,6 +436,20 @@ def promised_costs(
     bounds = (low - start)[free] * size[free], (high - start)[free] * size[free]
     bounded = lsq_linear(slope[:, free] / size[free], -residual, bounds, method="bvls")
     return Promise(float(bounded.cost), far)
+
+
+def gauss_newton_step(
+    evidence: Sequence[Evidence], parameters: Sequence[Parameter]
+) -> tuple[float, tuple[Parameter, ...]]:
+    """Return the least cost of the linearised problem inside the bounds, and the parameters that reach it."""
+    low, high, start = box(parameters)
+    residual, slope = StackedRows(evidence, parameters)(start)
+    size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+    bounds = np.minimum((low - start) * size, -1e-12), np.maximum((high - start) * size, 1e-12)
+    bounded = lsq_linear(slope / size, -residual, bounds, method="bvls")
+    end = np.clip(start + bounded.x / size, low, high)
+    moved = (replace(p, start=p.outward(value)) for p, value in zip(parameters, end, strict=True))
+    return float(bounded.cost), tuple(moved)
 
 
 class StackedRows:

@@ -27,7 +27,17 @@ from ...identification.parameters import Parameter, declared_parameter, free_par
 from ...identification.records.measurement import Record
 from ..effects.effect import Candidate, Unknown
 from ..effects.friction import with_resolved_signs
-from ..fitting import FitProblem, Key, Plain, Start, Tally, explains_enough, method_for, refusal
+from ..fitting import (
+    FitProblem,
+    Key,
+    Plain,
+    Start,
+    Tally,
+    explains_enough,
+    fit_of_nothing,
+    method_for,
+    refusal,
+)
 from ..tearing import blocks_of, measured_signals
 from .cross_validation import Folds, by_pieces, by_records, tallies_of
 from .hypothesis import Hypothesis
@@ -78,6 +88,10 @@ class HypothesisFit:
             )
         method, strategy = method_for(problem), hypothesis.newest.strategy if new else Plain()
         try:
+            screened = bool(new) and problem.coarse and not problem.has_free_flight
+            if screened and (none := fit_of_nothing(problem)):
+                left = {key: tally for key, tally in problem.before.items() if key[0] in problem.blocks}
+                return GroupFit(none, left, False, method.set_aside(problem, none, left))
             best = method.fit(problem, strategy)
             tallies = _tallies(problem, best, exact=not new or explains_enough(problem, best.misfit))
             aside = method.set_aside(problem, best, tallies)

@@ -28,10 +28,15 @@ class ColumnFunction:
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._rows, graph = function.numel_out(0), read_graph(function)
+        self._function, self._rows = function, function.numel_out(0)
+        self._results: list[tuple[int, int]] = []
         self._constants: list[float] = []
         self._inputs: list[tuple[int, int, int]] = []
         self._operations: list[tuple[int, Callable[..., Any], tuple[int, ...]]] = []
+
+    def _read(self) -> None:
+        """Read the instructions, which costs more than many a function is ever asked for."""
+        graph = read_graph(self._function)
         # A place is taken again after the last use of what stands there; inputs and constants keep theirs.
         places: dict[int, int] = {}
         for number, (operation, operands, extra) in enumerate(graph.steps):
@@ -51,13 +56,15 @@ class ColumnFunction:
                     places[number], many = many, many + 1
                 self._operations.append((places[number], ON_COLUMNS[operation], into))
         self._constants += [0.0] * (many - len(self._constants))
-        self._results = [(row, places[number]) for (_, row), number in graph.results.items()]
+        self._results += [(row, places[number]) for (_, row), number in graph.results.items()]
 
     def __call__(self, count: int, arrays: Sequence[Array]) -> Array:
         """Return the outputs, shape (rows, count).
 
         ``arrays``: one for each input, shape (rows, count); a column, shape (rows,), is the same for all.
         """
+        if not self._results:
+            self._read()
         result = np.zeros((self._rows, count))
         pieces = max(1, -(-count // _COLUMNS))
         ends = [count * k // pieces for k in range(pieces + 1)]

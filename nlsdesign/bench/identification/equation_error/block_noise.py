@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
-from ..filters import Smoothing, blurred, derivative, difference, filter_weights, filtered, kernel, smoothing
+from ..filters import Smoothing, blurred, difference, filter_weights, filtered, kernel, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
 from .batch import ColumnFunction
@@ -433,8 +433,7 @@ def measured_inputs(block: Block, record: Record, span: float) -> Array:
     for i, variable in enumerate(model.inputs):
         if variable.name in block.drives:
             drive = block.drives[variable.name]
-            signal = record.at_samples(drive.signal)
-            inputs[i] = derivative(signal, record.step, order=drive.order, span=span)
+            inputs[i] = record.derived(drive.signal, drive.order, span)
     return inputs
 
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....foundation.arrays import Array
+from ....foundation.arrays import Array, Indices
 from ....foundation.errors import ConvergenceError, unknown_name
-from ....foundation.symbolic import Expression, depends
-from ..filters import derivative, smoothed, without_rounding
+from ....foundation.symbolic import Expression, dependence, depends
+from ..filters import smoothed, without_rounding
 from ..records.measurement import Record
 from .batch import ChainFunction, ColumnFunction, PointFunction
 from .block import Block, advanced, free_delay, late_drives
@@ -70,6 +70,8 @@ class _Equations(NamedTuple):
     derivative: Expression
     output: Expression
     digest: ca.Function
+    shifted: Indices  # which of v come from an input that a free delay shifts
+    digest_shifted: ca.Function  # these alone
 
 
 class DrivenBlock:
@@ -105,6 +107,7 @@ class DrivenBlock:
         self._straightened = [i for i, v in enumerate(block.model.inputs) if v.name in kept]
         e = _equations(block, self.free, self._straightened)
         self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
+        self._shifted, self._digest_shifted = e.shifted, ColumnFunction(e.digest_shifted)
         self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
         self._output, self._plain_output = (ColumnFunction(each) for each in _output_functions(e))
         self._equations = e
@@ -119,22 +122,28 @@ class DrivenBlock:
             self._steepness = ColumnFunction(ca.Function("steepness", arguments, [ca.vec(slope)]))
             self._walk = self._made_walk(records, {**self._fixed, **(values or {})})
 
-    def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
+    def samples(self, record: Record, values: Mapping[str, float], known: Samples | None = None) -> Samples:
         """Return the inputs of the block from a record.
 
-        ``values``: free parameters by name; a late signal is advanced by what stands there.
+        ``values``: free parameters by name; a late signal is advanced by what stands there. ``known``: those
+        at other values, where there are any; what no free delay shifts is that of these.
         """
         inputs, rates = self._inputs(record, values, smooth=self.stiff)
-        at = self._digest(inputs.shape[1], [inputs, rates])
+        at = self._digested(inputs, rates, known and known.at)
         corners = _corners(self.block, self._sloped, inputs, record.step)
         if corners is None:
             return Samples(at, at[:, :-1], at[:, 1:], record.step)
-        count = inputs.shape[1] - 1
-        begin, end = (
-            self._digest(count, [corners[0], rates[:, :-1]]),
-            self._digest(count, [corners[1], rates[:, 1:]]),
-        )
+        begin = self._digested(corners[0], rates[:, :-1], known and known.begin)
+        end = self._digested(corners[1], rates[:, 1:], known and known.end)
         return Samples(at, begin, end, record.step)
+
+    def _digested(self, inputs: Array, rates: Array, known: Array | None) -> Array:
+        """Return what neither states nor free parameters enter; what nothing shifts may be known."""
+        if known is None:
+            return self._digest(inputs.shape[1], [inputs, rates])
+        result = known.copy()
+        result[self._shifted] = self._digest_shifted(inputs.shape[1], [inputs, rates])
+        return result
 
     def _inputs(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> tuple[Array, Array]:
         """Return the inputs of the model, and the slopes by which late ones change with their delay.
@@ -149,18 +158,18 @@ class DrivenBlock:
             drive = self.block.drives.get(variable.name)
             if drive is None:
                 continue
-            signal = record.at_samples(drive.signal)
-            now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
-            delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
+            inputs[i] = record.derived(drive.signal, drive.order, self._span)
             # Whether the rate of a signal drives the block too.
             is_motion = any(d.signal == drive.signal and d.order == 1 for d in self.block.drives.values())
             if smooth and drive.order == 0 and is_motion:
-                signal = without_rounding(signal, record.step, self._span)
-            inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
+                inputs[i] = without_rounding(inputs[i], record.step, self._span)
             if i in self._straightened:
+                signal = record.at_samples(drive.signal) if drive.order else inputs[i]
                 even = smoothed(signal, record.step, order=drive.order, span=self._span)
                 inputs[i], rates[i] = even, inputs[i] - even
             if drive.shifted_by:
+                now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
+                delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
                 inputs[i], rates[i] = advanced(record.trace.time, inputs[i], delay)
             if set(drive.stretched_by) & set(self._late):
                 rates[i] = rates[i] * since  # what a change of the rate shifts grows with time
@@ -236,7 +245,7 @@ class DrivenBlock:
         """Return the functions of a step, with short implicit steps for what is faster than a sample."""
         p = _vector(values, (*self.free, *self._late))
         stretches = np.zeros(len(self._stages))
-        for record in records:
+        for record in () if all(stage.linear for stage in self._stages) else records:
             stretches = np.maximum(stretches, self._stretches(record, values, p))
         stiff = [
             not stage.linear and bool(size > STIFF)
@@ -294,7 +303,10 @@ def _rest(block: Block, rate_at: PointFunction, begin: Array, p: Array) -> Array
         rate, slope = rate_at(x, begin, p)
         if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
             raise ConvergenceError(f"block '{block.name}'", "has no state of rest at the first sample")
-        x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+        later = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+        if np.array_equal(later, x):
+            break  # it would stay there
+        x = later
     return x
 
 
@@ -352,7 +364,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     p = ca.SX(ca.vertcat(*[s.parameter[i] for i in place]))
     rates = ca.SX.sym("rate", s.input.shape)
     late = late_drives(block, free)
-    now = ca.SX.sym("now", len(late))
+    now, moved = ca.SX.sym("now", len(late)), list[Expression]()
     together = ca.vertcat(s.derivative, s.output) if s.state.numel() else s.output
     fixed = ca.vertcat(*[s.parameter[i] for i in rest])
     together = ca.substitute(together, fixed, ca.DM(model.start(model.parameters)[rest]))
@@ -360,7 +372,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
         drive = block.drives.get(variable.name)
         if drive in late:
             # The samples were advanced by the present delay; its derivative is that of the signal.
-            k = late.index(drive)
+            k, moved = late.index(drive), [*moved, s.input[i], rates[i]]
             shift = (p[list(free).index(free_delay(drive, free))] - now[k]) * rates[i]
             together = ca.substitute(together, s.input[i], s.input[i] + shift)
     if straightened:
@@ -378,12 +390,14 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     aliases = [ca.SX.sym(f"bare_{k}") for k in range(len(bare))]
     core = ca.substitute(core, ca.vertcat(*bare), ca.vertcat(*aliases)) if bare else core
     symbols, parts = [*symbols, *aliases], [*parts, *bare]
-    digest = ca.Function(
-        "digest", [s.input, rates], [ca.densify(ca.vertcat(*parts)) if parts else ca.SX(0, 1)]
+    column = ca.densify(ca.vertcat(*parts)) if parts else ca.SX(0, 1)
+    shifted = np.flatnonzero(dependence(column, ca.vertcat(*moved)).any(axis=1))
+    digest, digest_shifted = (
+        ca.Function("digest", [s.input, rates], [each]) for each in (column, column[shifted.tolist()])
     )
     n = s.state.numel()
     digested = ca.SX(ca.vertcat(*symbols)) if symbols else ca.SX(0, 1)
-    return _Equations(s.state, digested, p, now, core[:n], core[n:], digest)
+    return _Equations(s.state, digested, p, now, core[:n], core[n:], digest, shifted, digest_shifted)
 
 
 def _output_functions(e: _Equations) -> tuple[ca.Function, ca.Function]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -29,6 +29,8 @@ _SPARSE = 0.5
 """Share of the power of a motion in the rows of a block, below which a remark says so: most is not judged."""
 _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
+_REMEMBERED = 4
+"""Last answers of a record that are kept: a fit ends a few steps that failed before its last."""
 
 
 def _on_clock(floor: BlockNoise, width: float, times: int) -> BlockNoise:
@@ -48,11 +50,19 @@ class Evidence:
     record: Record
     floor: BlockNoise
     samples: Samples
+    # asked: last answers, by the free numbers: a fit begins and is judged where it was asked before
+    asked: dict[tuple[float, ...], tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def residual(self, values: Mapping[str, float]) -> tuple[Array, Array]:
         """Return measured minus predicted over the noise floor, and its derivatives."""
-        response, sigma = self.driven.respond(self._samples(values), values), self.floor.sigma
-        return self._left(response.output), -(self.floor.filter @ response.slope) / sigma[:, None]
+        key = tuple(values[name] for name in self.driven.free)
+        if key not in self.asked:
+            response, sigma = self.driven.respond(self._samples(values), values), self.floor.sigma
+            answer = self._left(response.output), -(self.floor.filter @ response.slope) / sigma[:, None]
+            if len(self.asked) == _REMEMBERED:
+                del self.asked[next(iter(self.asked))]
+            self.asked[key] = answer
+        return self.asked[key]
 
     def left(self, values: Mapping[str, float]) -> Array:
         """Return measured minus predicted over the noise floor alone, for a fraction of the work."""
@@ -68,7 +78,9 @@ class Evidence:
         return (self.floor.filter @ error) / self.floor.sigma
 
     def _samples(self, values: Mapping[str, float]) -> Samples:
-        return self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
+        if not self.driven.needs_new_samples:
+            return self.samples
+        return self.driven.samples(self.record, values, self.samples)
 
 
 class Bench:

@@ -183,13 +183,17 @@ def _asked(
         left = [each for each in left if not known & set(_free(each))]
     forms = [{signal: form} for form in _FORMS]
     try:
-        plain, sharper = (
-            _likelihood([rows_of(each, records.deciding, forms, terms) for each in asked]) if asked else None
-            for terms in (plain_terms, missing)
-        )
+        rows = [rows_of(each, records.deciding, forms, plain_terms) for each in asked]
     except ConvergenceError:
         return None  # a fit tells that the declared numbers give no response
-    return sharper if plain and sharper and plain.allows(sharper.shift) else plain
+    plain = _likelihood(rows) if rows else None
+    if plain is None or missing is plain_terms:
+        return plain
+    others = zip(asked, rows, strict=True)
+    sharper = _likelihood(
+        [own._replace(own=terms_of(each, records.deciding, missing)) for each, own in others]
+    )
+    return sharper if sharper and plain.allows(sharper.shift) else plain
 
 
 def _free(seen: SeenBlock) -> tuple[str, ...]:
@@ -281,7 +285,7 @@ def rows_of(
     block, filters, free = seen.block, seen.filters, _free(seen)
     chosen = [r for r in records if r.name in seen.floors]
     driven = DrivenBlock(block, free, records=chosen, span=filters.span, straightened=filters.straightened)
-    residuals, slopes, terms = [], [], []
+    residuals, slopes = [], []
     for record in chosen:
         floor = seen.floors[record.name]
         values, rows = block.model.values, []
@@ -293,10 +297,19 @@ def rows_of(
         residuals.append(np.array(rows))
         # The slopes of the last form stand for all: they differ by a sample at most.
         slopes.append((floor.filter @ response.slope) / floor.sigma[:, None])
-        own = [(floor.filter @ term) / floor.sigma for term in missing(block, record, filters.span)]
-        terms.append(np.reshape(own, (len(own), len(floor.sigma))).T)
     parts = np.vstack(slopes) * [values[name] or 1.0 for name in free]
-    return BlockRows(np.hstack(residuals), dict(zip(free, parts.T, strict=True)), np.vstack(terms))
+    numbers = dict(zip(free, parts.T, strict=True))
+    return BlockRows(np.hstack(residuals), numbers, terms_of(seen, records, missing))
+
+
+def terms_of(seen: SeenBlock, records: Sequence[Record], missing: Missing) -> Array:
+    """Return what a block may lack on the records that it sees, shape (rows, terms)."""
+    terms = []
+    for record in (r for r in records if r.name in seen.floors):
+        floor = seen.floors[record.name]
+        own = [(floor.filter @ term) / floor.sigma for term in missing(seen.block, record, seen.filters.span)]
+        terms.append(np.reshape(own, (len(own), len(floor.sigma))).T)
+    return np.vstack(terms)
 
 
 def no_terms(_block: Block, _record: Record, _span: float) -> Iterator[Array]:

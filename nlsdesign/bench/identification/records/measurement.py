@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ....foundation.errors import MeasurementError, nearest, unknown_name, visib
 from ....foundation.quantity import parse_unit
 from ....model import FlatModel
 from ....simulation import Trace
+from ..filters import derivative
 from ..residuals import noise_beside, noise_of, quantum_of
 from .clocks import Resolution
 from .column_heads import default_mapping, times_among, times_without_unit
@@ -127,6 +129,9 @@ def _extent(marks: Array, row: int) -> float:
 
 Role = Literal["fit", "selection", "held_out"]
 
+_derived: WeakKeyDictionary[Trace, dict[tuple[str, Sampling, int, float], Array]] = WeakKeyDictionary()
+"""Derivatives of the signals of a trace, by signal, by how it is read, by order and span."""
+
 
 @dataclass(frozen=True, eq=False)
 class Record:
@@ -188,6 +193,29 @@ class Record:
             Full name.
         """
         return self.sampling_of(signal).at_samples(self.trace[signal])
+
+    def derived(self, signal: str, order: int, span: float) -> Array:
+        """Return a signal at the samples, or its rate or second derivative there, shape (n,), read-only.
+
+        Every hypothesis asks for the same ones: each is taken once, as :func:`~.filters.derivative` does.
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        order
+            0 for the signal itself.
+        span
+            Time in s over which a rate is taken.
+        """
+        if order == 0:
+            return self.at_samples(signal)
+        known = _derived.setdefault(self.trace, {})
+        key = signal, self.sampling_of(signal), order, span
+        if key not in known:
+            known[key] = derivative(self.at_samples(signal), self.step, order=order, span=span)
+            known[key].flags.writeable = False
+        return known[key]
 
     def as_computed(self, signal: str) -> Array:
         """Return what a prediction of a measured signal must equal at the samples, shape (n,).

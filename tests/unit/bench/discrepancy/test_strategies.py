@@ -26,6 +26,7 @@ from nlsdesign.bench.discrepancy.fitting import (
     Strategy,
     Tally,
     best_fit,
+    fit_of_nothing,
     method_for,
     refusal,
 )
@@ -58,6 +59,7 @@ class Notebook:
 
     costs: Mapping[float, float] = field(default_factory=dict)
     near: Mapping[float, float] = field(default_factory=dict)
+    steps: Mapping[float, float] = field(default_factory=dict)
     held: list[Collection[str]] = field(default_factory=list)
     fits: list[dict[str, Any]] = field(default_factory=list)
 
@@ -80,12 +82,20 @@ class Notebook:
         far = self.costs.get(begin, 1.0)
         return Promise(self.near.get(begin, far), far)
 
+    def step(self, evidence: Sequence[Evidence], parameters: Start) -> tuple[float, Start]:
+        """Lead to a hundredth of where a fit would begin, with the cost that a table promises there."""
+        begin = parameters[0].start
+        if begin not in self.steps:
+            raise ConvergenceError("block 'spring'", "its response is not finite", next_step="give up")
+        return self.steps[begin], tuple(replace(p, start=0.01 * p.start) for p in parameters)
+
 
 @pytest.fixture
 def notebook(monkeypatch: pytest.MonkeyPatch) -> Notebook:
     written = Notebook()
     monkeypatch.setattr(strategies, "fit", written.fit)
     monkeypatch.setattr(strategies, "promised_costs", written.promised_costs)
+    monkeypatch.setattr(strategies, "gauss_newton_step", written.step)
     return written
 
 
@@ -292,6 +302,55 @@ def test_a_block_that_lacks_nothing_does_not_ask_for_the_whole_effect() -> None:
 
 
 # --- one group of a hypothesis --------------------------------------------------------------------
+
+
+# Four records with 2,100 squares in 100 rows: half a sum of 4,200, of which 4,000 lie over the noise.
+@pytest.mark.parametrize(
+    ("promised", "nothing"),
+    [
+        ({0.1: 4199.0, 0.5: 4181.0}, True),
+        ({0.1: 4179.0, 0.5: 4199.0}, False),  # one start promises more than half a hundredth of that
+        ({0.1: 4199.0, 0.5: 4221.0}, False),  # or begins where slopes say little of the place without it
+        ({0.1: 4199.0}, False),  # or has no response
+    ],
+)
+def test_what_no_start_promises_to_explain_is_not_fitted(
+    notebook: Notebook, promised: Mapping[float, float], nothing: bool
+) -> None:
+    notebook.steps = promised
+    ended = fit_of_nothing(problem())
+    assert (ended is not None) == nothing
+    assert [(each["start"], each["evaluations"]) for each in notebook.fits] == [(0.005, 0)] * nothing
+
+
+def test_what_declared_numbers_have_cost_before_counts_in_the_score_test(notebook: Notebook) -> None:
+    notebook.steps = {0.1: 4199.0, 0.5: 4199.0}
+    declared = Parameter("motor.inertia", "1", 3.0, 0.0, 0.3, -9.0, 9.0, "linear")
+    moved = tuple((*each, declared) for each in problem().starts)
+    assert fit_of_nothing(problem(starts=moved)) is None
+    notebook.steps = {0.1: 4249.0, 0.5: 4249.0}
+    assert fit_of_nothing(problem(starts=moved)) is not None
+
+
+def test_many_starts_and_blocks_that_were_not_judged_before_are_fitted(notebook: Notebook) -> None:
+    notebook.steps = dict.fromkeys((0.1, 0.2, 0.3, 0.4, 0.5), 4200.0)
+    starts = tuple(start(begin) for begin in notebook.steps)
+    assert fit_of_nothing(problem(starts=starts[:4])) is not None
+    assert fit_of_nothing(problem(starts=starts)) is None
+    assert fit_of_nothing(problem(before={})) is None
+
+
+def test_a_first_look_leaves_what_was_left_where_an_effect_promises_nothing(notebook: Notebook) -> None:
+    before = Tally(900.0, 2, 2.0, (450.0, 450.0))
+    notebook.steps = {2.0: 450.0}
+    hypothesis = Hypothesis(BLANK, (candidate(GAP, SIZE),), tallies={("spring", "a"): before}, coarse=True)
+    fits = HypothesisFit(cast(Bench, BenchOfOne()), {})
+    result = fits.fitted(hypothesis, group(), (GAP, SIZE))
+    assert isinstance(result, GroupFit)
+    assert result.tallies == {("spring", "a"): before}
+    polished = fits.fitted(replace(hypothesis, coarse=False), group(), (GAP, SIZE))
+    assert isinstance(polished, GroupFit)
+    assert polished.tallies["spring", "a"].squares == 25.0
 
 
 class BenchOfOne:

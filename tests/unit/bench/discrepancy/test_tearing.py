@@ -152,6 +152,23 @@ def test_two_delays_on_one_line_that_are_both_free_cannot_be_told_apart(rig: Ass
     assert DrivenBlock(motor, ["bus.delay"], records=[]).needs_new_samples
 
 
+def test_what_no_delay_shifts_is_worked_out_once(rig: Assembly) -> None:
+    """A late force leaves the motion of the motor as it is, and moves all that it enters itself."""
+    late = rig.with_part("log", TransportDelay(of="force_sensor.reading", delay=0.002))
+    signals = ("motor_encoder.reading", "current_sensor.reading", "log.reading")
+    record = simulated(late, signals)
+    (motor,) = (block for block in blocks_of(flatten(late), signals) if block.target is None)
+    driven = DrivenBlock(motor, ["log.delay"], records=[record])
+    first, anew = (driven.samples(record, {"log.delay": delay}) for delay in (0.002, 0.005))
+    moved = (first.at != anew.at).any(axis=1)
+    assert moved.any()
+    assert not moved.all()
+    for known, expected in zip(driven.samples(record, {"log.delay": 0.005}, first), anew, strict=True):
+        np.testing.assert_array_equal(known, expected)
+    spoiled = first._replace(at=np.where(moved[:, None], np.nan, first.at))
+    np.testing.assert_array_equal(driven.samples(record, {"log.delay": 0.005}, spoiled).at, anew.at)
+
+
 def remaining(block: Block, record: Record) -> float:
     """Root mean square of what a block leaves over of a record, filtered."""
     driven = DrivenBlock(block, [], records=[record])

@@ -22,6 +22,7 @@ from nlsdesign.bench.identification.least_squares import (
     Parameter,
     declared_parameter,
     fit,
+    gauss_newton_step,
     minimise,
     promised_costs,
 )
@@ -291,11 +292,16 @@ def test_a_look_ahead_equals_the_fit_of_a_linear_problem() -> None:
     promise = promised_costs(evidence, parameters)
     assert promise.far == pytest.approx(fit(evidence, parameters).cost, rel=1e-4)
     assert promise.near == pytest.approx(promise.far, rel=1e-6)
+    cost, ended = gauss_newton_step(evidence, parameters)
+    assert cost == pytest.approx(promise.far, rel=1e-6)
+    for number in ended:
+        assert number.start == pytest.approx(fit(evidence, parameters).values[number.name], rel=1e-3)
     held = promised_costs(evidence, parameters, {names[1]})
     assert held.far == promise.far
     fixed = [parameters[0], replace(parameters[1], lower=1e6 - 1.0, upper=1e6 + 1.0)]
     assert held.near == pytest.approx(fit(evidence, fixed).cost, rel=1e-4)
     assert held.near > 2.0 * held.far
+    assert gauss_newton_step(evidence, fixed)[0] == pytest.approx(held.near, rel=1e-4), "inside the bounds"
 
 
 def test_least_squares_meets_bounds_like_a_solver_for_linear_problems() -> None:

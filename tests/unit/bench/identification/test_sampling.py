@@ -17,6 +17,8 @@ from nlsdesign.bench.discrepancy import Verdict, diagnose
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.filters import derivative
+from nlsdesign.bench.identification.records.measurement import Record
 from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.changed_copies import smoothed
@@ -25,6 +27,7 @@ from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
+from nlsdesign.simulation import Trace
 
 _FINE = 20
 """Steps of the simulation in a period of the controller."""
@@ -259,3 +262,17 @@ def test_a_motion_that_is_held_is_refused(tmp_path: Path) -> None:
     (tmp_path / "records.toml").write_text(spoilt.replace('= "held"', '= "holds"'), encoding="utf-8")
     with pytest.raises(MeasurementError, match="no way to run between samples"):
         load_records(tmp_path, flatten(smoothed(declare(load_deck(str(tmp_path / "deck.toml"))))))
+
+
+def test_a_derivative_is_taken_once_for_each_way_to_read_a_trace() -> None:
+    time = np.arange(400) * 0.002
+    trace = Trace(time, {"a": np.sin(9.0 * time), "i": np.cos(9.0 * time)}, {"a": "rad", "i": "A"})
+    record, held = Record("r", trace), Record("other", trace, sampling={"i": HELD})
+    for signal, order in (("a", 0), ("a", 1), ("a", 2), ("i", 1)):
+        expected = derivative(held.at_samples(signal), 0.002, order=order, span=0.04)
+        np.testing.assert_array_equal(held.derived(signal, order, 0.04), expected)
+    assert record.derived("a", 1, 0.04) is held.derived("a", 1, 0.04)
+    assert not np.array_equal(record.derived("i", 1, 0.04), held.derived("i", 1, 0.04))
+    assert not np.array_equal(record.derived("a", 1, 0.04), record.derived("a", 1, 0.06))
+    with pytest.raises(ValueError, match="read-only"):
+        record.derived("a", 1, 0.04)[0] = 1.0
