@@ -34,7 +34,8 @@ from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation.sampled_batch import run_batch
-from tests.physics.test_control_torque import linear_actuator, sampled_response
+from tests.observed import linear_actuator
+from tests.physics.test_control_torque import sampled_response
 from tests.renamed import SCHEMES, renamed
 
 OUTPUTS = ["motor.angle", "spring.torque"]

@@ -43,6 +43,24 @@ def in_si(
     return value
 
 
+def hold_in_si(
+    owner: object,
+    name: str,
+    unit: str,
+    *,
+    minimum: float = 0.0,
+    maximum: float = float("inf"),
+    with_class: bool = False,
+) -> None:
+    """Hold a field of a frozen object as a number in SI, checked; for ``__post_init__``.
+
+    ``with_class``: whether the class stands before the name where it is refused.
+    """
+    what = f"{type(owner).__name__}: {name}" if with_class else name
+    value = in_si(what, getattr(owner, name), unit, minimum=minimum, maximum=maximum)
+    object.__setattr__(owner, name, value)
+
+
 def _slip(value: float, unit: str, minimum: float, maximum: float) -> str | None:
     if unit == "rad" and minimum <= degrees(value) <= maximum:
         return f"were degrees meant? degrees({value:g}) is in the range"

@@ -18,7 +18,7 @@ from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity, with_unit
 from ...foundation.symbolic import Expression
-from .numbers import in_si, plain
+from .numbers import hold_in_si, in_si, plain
 
 EXACT = 1e-9
 """Work given beyond what was taken up, relative to the largest work, that is but rounding."""
@@ -37,7 +37,7 @@ class Target(ABC):
     tolerance: Quantity | float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tolerance", in_si("tolerance", self.tolerance, "N*m", maximum=1e6))
+        hold_in_si(self, "tolerance", "N*m", maximum=1e6)
 
     @property
     @abstractmethod
@@ -171,9 +171,9 @@ class ExponentialTorque(Target):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "maximum", in_si("maximum", self.maximum, "N*m", minimum=1e-6, maximum=1e6))
-        object.__setattr__(self, "angle", in_si("angle", self.angle, "rad", minimum=1e-3, maximum=6.3))
-        object.__setattr__(self, "shape", in_si("shape", self.shape, "1", minimum=-50.0, maximum=50.0))
+        hold_in_si(self, "maximum", "N*m", minimum=1e-6, maximum=1e6)
+        hold_in_si(self, "angle", "rad", minimum=1e-3, maximum=6.3)
+        hold_in_si(self, "shape", "1", minimum=-50.0, maximum=50.0)
         if abs(plain(self.shape)) < 1e-6:
             raise ValueRangeError(
                 "shape = 0", "the curve would be a straight line",
@@ -222,9 +222,9 @@ class PowerTorque(Target):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "coefficient", in_si("coefficient", self.coefficient, "1", minimum=1e-9))
-        object.__setattr__(self, "exponent", in_si("exponent", self.exponent, "1", minimum=1.0, maximum=20.0))
-        object.__setattr__(self, "angle", in_si("angle", self.angle, "rad", minimum=1e-3, maximum=6.3))
+        hold_in_si(self, "coefficient", "1", minimum=1e-9)
+        hold_in_si(self, "exponent", "1", minimum=1.0, maximum=20.0)
+        hold_in_si(self, "angle", "rad", minimum=1e-3, maximum=6.3)
 
     @property
     def last_angle(self) -> float:
@@ -394,7 +394,7 @@ class PolynomialTorque(Target):
             for number, each in enumerate(self.coefficients, start=1)
         )
         object.__setattr__(self, "coefficients", given)
-        object.__setattr__(self, "angle", in_si("angle", self.angle, "rad", minimum=1e-3, maximum=6.3))
+        hold_in_si(self, "angle", "rad", minimum=1e-3, maximum=6.3)
         if not any(each != 0.0 for each in given):
             raise ValueRangeError(
                 f"PolynomialTorque of {len(given)} coefficients", "is zero everywhere",

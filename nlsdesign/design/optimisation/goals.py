@@ -12,7 +12,7 @@ import casadi as ca
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
-from ..curves.numbers import in_si, plain
+from ..curves.numbers import hold_in_si, in_si, plain
 from .design_point import DesignPoint
 from .steady_cycle import steady_cycle
 
@@ -141,12 +141,6 @@ _POWER = 32
 """Of the mean that stands for the largest radius; it is at most 12 % above the largest of 41 equal ones."""
 
 
-def _store(goal: Goal, name: str, unit: str, minimum: float, maximum: float) -> None:
-    given = getattr(goal, name)
-    value = in_si(f"{type(goal).__name__}: {name}", given, unit, minimum=minimum, maximum=maximum)
-    object.__setattr__(goal, name, value)
-
-
 @dataclass(frozen=True)
 class LeastSize(Goal):
     """Radius of the cam: the largest distance of its contour from the centre.
@@ -160,7 +154,7 @@ class LeastSize(Goal):
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        _store(self, "weight", "1", 0.0, 1e9)
+        hold_in_si(self, "weight", "1", minimum=0.0, maximum=1e9, with_class=True)
 
     def cost(self, design: DesignPoint) -> Expression:
         """Return weight · radius / 10 mm; a power mean of the nodes stands for the largest of them."""
@@ -197,10 +191,10 @@ class LeastMass(Goal):
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        _store(self, "rubber_density", "kg/m^3", 100.0, 5e3)
-        _store(self, "plate_thickness", "m", 1e-5, 0.2)
-        _store(self, "plate_density", "kg/m^3", 100.0, 3e4)
-        _store(self, "weight", "1", 0.0, 1e9)
+        hold_in_si(self, "rubber_density", "kg/m^3", minimum=100.0, maximum=5e3, with_class=True)
+        hold_in_si(self, "plate_thickness", "m", minimum=1e-5, maximum=0.2, with_class=True)
+        hold_in_si(self, "plate_density", "kg/m^3", minimum=100.0, maximum=3e4, with_class=True)
+        hold_in_si(self, "weight", "1", minimum=0.0, maximum=1e9, with_class=True)
 
     def cost(self, design: DesignPoint) -> Expression:
         """Return weight · mass / 100 g."""
@@ -234,7 +228,7 @@ class InsensitiveStiffness(SquaredTorqueGoal):
     deviation: float = 0.1
 
     def __post_init__(self) -> None:
-        _store(self, "deviation", "1", 1e-6, 1.0)
+        hold_in_si(self, "deviation", "1", minimum=1e-6, maximum=1.0, with_class=True)
 
     def mean_square(self, design: DesignPoint) -> Expression:
         """Return the mean square error by the deviation."""

@@ -12,7 +12,7 @@ import casadi as ca
 from ...foundation.errors import UnitError, ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity, same_dimension, typeset_unit
 from ...foundation.symbolic import Expression
-from ..curves.numbers import in_si, in_unit, plain
+from ..curves.numbers import hold_in_si, in_unit, plain
 from ..curves.target import TorqueBand
 from ..statics.roller_contour import STRAIGHT
 from .design_point import DesignPoint, anchor_of
@@ -113,10 +113,7 @@ class Limit(ABC):
         NlsError
             If it is in another unit, or out of range.
         """
-        what = f"{type(self).__name__}: {name}"
-        object.__setattr__(
-            self, name, in_si(what, getattr(self, name), unit, minimum=minimum, maximum=maximum)
-        )
+        hold_in_si(self, name, unit, minimum=minimum, maximum=maximum, with_class=True)
 
     def bound(
         self,
@@ -577,9 +574,7 @@ class OverTravel(Limit):
     limits: tuple[Limit, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "angle", in_si("OverTravel: angle", self.angle, "rad", minimum=0.0, maximum=3.2)
-        )
+        hold_in_si(self, "angle", "rad", maximum=3.2, with_class=True)
         object.__setattr__(self, "limits", tuple(self.limits))
         allowed = (MaximumStrain, MaximumStress, MaximumCableTension)
         if not self.limits or not all(isinstance(limit, allowed) for limit in self.limits):

@@ -229,6 +229,14 @@ def refused(refusal: WorkerRefusal) -> WorkSharingError:
     )
 
 
+def outcomes_in(answer: bytes | WorkerRefusal) -> list[Any]:
+    """Return the outcomes of a chunk that came from elsewhere; those of other code are refused."""
+    if isinstance(answer, WorkerRefusal):
+        raise refused(answer)
+    outcomes: list[Any] = pickle.loads(answer)
+    return outcomes
+
+
 def sendable(work: Callable[[Any], Any]) -> bytes:
     """Return work as bytes for another machine; functions of a script or notebook go with their code."""
     try:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
-import pickle
 import queue
 import time
 from collections.abc import Callable, Iterator
@@ -29,6 +28,7 @@ from .chunks import (
     CodeIdentity,
     WorkerRefusal,
     computed_elsewhere,
+    outcomes_in,
     own_identity,
     reason_of,
     refused,
@@ -281,7 +281,4 @@ def _outcome(future: Any) -> list[Any] | ChunkLoss:
                 next_step="make sure that they can import whatever the question uses",
             ) from None  # fmt: skip
         return ChunkLoss(reason_of(error), deaths=0)
-    if isinstance(answer, WorkerRefusal):
-        raise refused(answer)
-    outcomes: list[Any] = pickle.loads(answer)
-    return outcomes
+    return outcomes_in(answer)

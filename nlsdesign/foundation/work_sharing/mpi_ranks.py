@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import concurrent.futures
-import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,9 +14,9 @@ from .chunks import (
     ChunkLoss,
     WorkerRefusal,
     computed_elsewhere,
+    outcomes_in,
     own_identity,
     reason_of,
-    refused,
     sendable,
 )
 from .teams import Finished, Team
@@ -91,7 +90,4 @@ def _outcome(future: concurrent.futures.Future[bytes | WorkerRefusal]) -> list[A
         raise WorkSharingError(
             "workers", f"are gone: {reason_of(error)}", next_step="run the same command again: it resumes"
         ) from None
-    if isinstance(answer, WorkerRefusal):
-        raise refused(answer)
-    outcomes: list[Any] = pickle.loads(answer)
-    return outcomes
+    return outcomes_in(answer)
