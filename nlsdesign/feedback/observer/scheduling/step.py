@@ -302,7 +302,8 @@ class PolePlacement:
         Raises
         ------
         ValueRangeError
-            If there is not one stable pole per state, or one is beyond half the sample rate.
+            If there is not one stable pole per state, one is beyond half the sample rate, or complex ones are
+            not in pairs.
         """
         return self.with_slopes(plant)[0]
 
@@ -310,6 +311,11 @@ class PolePlacement:
         """Return M, and its slopes by each pole that is placed through the angle, shape (k, n, r).
 
         Those by a pair of complex poles are complex; what the pair does together is real.
+
+        Raises
+        ------
+        ValueRangeError
+            As :meth:`correction`.
         """
         self._check(plant)
         output, time = plant.output_matrix, plant.sample_time
@@ -325,8 +331,8 @@ class PolePlacement:
             moved.remove(min(real, key=lambda k: abs(poles[k] - eigenvalue)))
         if abs(np.sum(poles[moved].imag)) > 0.0:
             raise ValueRangeError(
-                f"poles {self.poles}", f"cannot be placed at {plant.angle:g} rad, where a state is not seen",
-                next_step="let one of them be real",
+                f"poles {self.poles}", f"are not in pairs of what is seen at {plant.angle:g} rad",
+                next_step="give complex poles in pairs, and a real one for each state that may not be seen",
             )  # fmt: skip
         step = expm(seen.T @ a @ seen * time) - np.eye(len(moved))
         placed, slopes = _ackermann(step, c @ seen, np.expm1(poles[moved] * time))
