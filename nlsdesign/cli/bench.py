@@ -18,9 +18,11 @@ from .options import (
     DECK_HELP,
     deck_option,
     export_option,
+    hold_out_option,
     joint_option,
     json_option,
     machine_of,
+    mapping_option,
     measured_option,
     sample_time_option,
     spring_option,
@@ -37,13 +39,6 @@ _PARTS = ("plant", "observer", "controller", "torque_loop")
 """What --export writes; the library that does it is not loaded for an option."""
 CALIBRATIONS = ("hung_weight", "load_cell", "free_run")
 """As :data:`nlsdesign.bench.calibration.KINDS`, which is not loaded for an option."""
-
-_mapping = click.option(
-    "--mapping", type=NamedPath(dir_okay=False), default=None, help="TOML that maps columns to signals."
-)
-_hold_out = click.option(
-    "--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable."
-)
 
 
 def _part_files(parts: Sequence[str]) -> list[str]:
@@ -63,8 +58,8 @@ def _part_files(parts: Sequence[str]) -> list[str]:
 )
 @deck_option
 @click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of records.")
-@_hold_out
-@_mapping
+@hold_out_option
+@mapping_option
 @joint_option
 @click.option("--window", type=Number("s", above=0.0), default=None,
               help="Simulate the whole model over windows instead, for instance '1 s'.")  # fmt: skip
@@ -183,8 +178,8 @@ def _questions(deck: str | None, joints: Sequence[str], out: Path) -> list[tuple
 )
 @click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of tables or logs.")
-@_hold_out
-@_mapping
+@hold_out_option
+@mapping_option
 @click.option("--joint", "joints", multiple=True, metavar="NAME[=DECK]",
               help="Joint of a log of a robot: read only its columns; with its deck repeatable.")  # fmt: skip
 @click.option(

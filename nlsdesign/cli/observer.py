@@ -17,8 +17,10 @@ from .options import (
     CERTIFIED,
     DECK_HELP,
     deck_option,
+    hold_out_option,
     json_option,
     kind_option,
+    mapping_option,
     measured_option,
     real_option,
     sample_time_option,
@@ -31,9 +33,12 @@ from .typed_values import NamedPath, Number
 if TYPE_CHECKING:
     from ..feedback.observer import SpreadErrors
     from ..model import FlatModel
+    from ..regeneration import FittedPoles
 
 CERTIFICATE = "certificate.json"
 """File that is announced; the library is not loaded for it."""
+SEARCHES = ("gradient", "cma")
+"""As :data:`nlsdesign.regeneration.fitted_poles.SEARCHES`, which is not loaded for an option."""
 
 
 def range_options(command: Any) -> Any:
@@ -71,6 +76,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
         "nlsdesign observer --deck austin2015_figure_consistent",
         "nlsdesign observer --deck austin2015_figure_consistent --kind cascade --real float --json",
         "nlsdesign observer --deck austin2015_figure_consistent --errors --draws 32",
+        "nlsdesign observer --deck my.toml --kind published --fit-poles bench",
     ),
 )
 @click.pass_context
@@ -85,6 +91,12 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
               "bench: over the spread, with exact numbers, by cause.")  # fmt: skip
 @click.option("--draws", type=click.IntRange(min=4), default=16, show_default=True,
               help="Machines drawn for --errors.")  # fmt: skip
+@click.option("--fit-poles", "records", type=NamedPath(example="bench"), default=None,
+              help="Folder of records to which the poles of --kind published are fitted.")  # fmt: skip
+@click.option("--fit-poles-by", "by", type=click.Choice(SEARCHES), default=SEARCHES[0], show_default=True,
+              help="Exact slopes, or CMA-ES as a yardstick.")  # fmt: skip
+@hold_out_option
+@mapping_option
 @json_option
 @click.option("--certificate", "certified", is_flag=True, help="Also write what is proved of it.")
 @click.option("--decay", type=float, metavar="PER_SECOND", help="Design one certified gain with this decay.")
@@ -122,7 +134,10 @@ def observer(
     sample_time, real = options["sample_time"], options["real"]
     steps = Steps()
     with steps.step("observer"):
-        chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
+        fitted = _fitted(plant, {**options, "sample_time": sample_time})
+        chosen = fitted.observer if fitted else designed_observer(
+            plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles
+        )  # fmt: skip
         text = (deck.name, deck.path.read_text(encoding="utf-8-sig"))
         proved = None if wanted is None else chosen.certify(plant, deck=text, **wanted)
     errors = None
@@ -148,9 +163,12 @@ def observer(
             "description": model.description, "statement": list(statement),
             "certified": proved is not None, "warnings": remarks, "files": files,
         }  # fmt: skip
+        content |= {} if fitted is None else {"fitted_poles": fitted.content()}
         show_json(content | ({} if errors is None else {"errors": errors.content()}))
         return
     show_lines(sentences)
+    if fitted is not None:
+        show_table(*fitted.shown())
     if proved is None:
         click.echo("not certified; --kind certified or --certificate proves what can be proved")
     if errors is not None:
@@ -166,6 +184,12 @@ def _what_is_asked(
     """Return the kind of observer, and what is to be proved of it; nothing by default."""
     ranges = given_ranges(options)
     kind, decay, with_spread = options["kind"], options["decay"], options["with_spread"]
+    if options["records"] is not None and kind != "published":
+        raise click.UsageError("--fit-poles belongs to --kind published", ctx=context)
+    if options["records"] is None and (
+        options["mapping"] or options["hold_out"] or options["by"] != SEARCHES[0]
+    ):
+        raise click.UsageError("--fit-poles-by, --mapping and --hold-out belong to --fit-poles", ctx=context)
     if not (options["certified"] or kind == CERTIFIED):
         if decay is not None or with_spread or ranges:
             words = "--decay, --with-spread, --angles, --speed and --angle-error belong to --certificate"
@@ -180,6 +204,19 @@ def _what_is_asked(
         raise click.UsageError(f"--decay belongs to --kind {CERTIFIED}", ctx=context)
     kind = kind or (CASCADE if decay is None else CERTIFIED)
     return kind, {"decay": decay, "with_spread": with_spread, "real": options["real"], "ranges": ranges}
+
+
+def _fitted(plant: FlatModel, options: Mapping[str, Any]) -> FittedPoles | None:
+    """Return the published observer with poles fitted to records; nothing where none are named."""
+    from ..bench.identification import load_records
+    from ..regeneration import ObserverChoice, fit_poles
+
+    if options["records"] is None:
+        return None
+    reading = {name: options[name] for name in ("mapping", "hold_out")}
+    choice = ObserverChoice(**{name: options[name] for name in ("sample_time", "spring", "measured")})
+    records = load_records(options["records"], plant, **reading)
+    return fit_poles(plant, records, choice=choice, by=options["by"])
 
 
 def _refuse_misplaced(context: click.Context) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from .typed_values import Bytes, Number
+from .typed_values import Bytes, NamedPath, Number
 
 if TYPE_CHECKING:
     from ..components import Assembly
@@ -30,6 +30,12 @@ measured_option = click.option(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 DECK_HELP = "Deck file, or the name of one that comes with the project."
 deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK", help=DECK_HELP)
+mapping_option = click.option(
+    "--mapping", type=NamedPath(dir_okay=False), default=None, help="TOML that maps columns to signals."
+)
+hold_out_option = click.option(
+    "--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable."
+)
 joint_option = click.option(
     "--joint", default=None, metavar="NAME", help="Joint of a log of a robot: read only its columns."
 )
@@ -63,7 +69,7 @@ kind_option = click.option(
     "know. cascade: rubber driven by the measured angle, at the declared numbers. certified: "
     "the same structure with one gain that is proved for every angle. kalman: steady-state Kalman filter at "
     "each angle, with noise from the deck's sensors and assumed disturbances. published: states of Austin et "
-    "al. 2015, with the gain of the cascade.",
+    "al. 2015, with the gain of the cascade or, by --fit-poles, with poles fitted to records.",
 )
 
 

@@ -1,12 +1,14 @@
 """What takes several rooms: from one declared machine to everything that runs it.
 
 Which commands a deck is ready for, observers that keep a size of flash, the observer designed again from the
-better model of a diagnosis, and all files of a machine. Presentation and commands may import it; it decides
-nothing that a room below can decide alone.
+better model of a diagnosis, the published observer with poles from records, and all files of a machine.
+Presentation and commands may import it; it decides nothing that a room below can decide alone.
 """
 
 from .exported_machine import MACHINE as MACHINE
 from .exported_machine import export_machine
+from .fitted_poles import FittedPoles as FittedPoles
+from .fitted_poles import fit_poles
 from .flash import require_flash as require_flash
 from .flash import sized_observer
 from .loadable_code import CodeRecipe, SameTable, block_for
@@ -17,7 +19,8 @@ from .range_remarks import usual_last as usual_last
 from .readiness import Readiness as Readiness
 from .readiness import errors_while_running as errors_while_running
 from .readiness import readiness
-from .regenerated_observer import ObserverChoice, Regeneration, regenerate, write_regeneration
+from .regenerated_observer import Regeneration, regenerate, write_regeneration
+from .watched_records import ObserverChoice
 
 __all__ = [
     "CodeRecipe",
@@ -26,6 +29,7 @@ __all__ = [
     "SameTable",
     "block_for",
     "export_machine",
+    "fit_poles",
     "range_remarks",
     "readiness",
     "regenerate",

@@ -15,11 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 
-from ..bench.discrepancy.block_prediction import shown_values
-from ..bench.identification import Record, RecordSet
+from ..bench.identification import RecordSet
 from ..bench.identification.least_squares import Fit
 from ..feedback.observer import (
     CorrectedDesign,
@@ -28,45 +26,23 @@ from ..feedback.observer import (
     ObserverDesign,
     design_corrected_observer,
     design_observer_with_details,
-    observe,
 )
 from ..feedback.observer.scheduling.scheduled import whole_contour
 from ..foundation.arrays import Array
-from ..foundation.errors import MeasurementError, NlsError
+from ..foundation.errors import NlsError
 from ..foundation.quantity import three_digits, with_unit
 from ..foundation.text_files import write_text
 from ..foundation.work_sharing import parallel_map
 from ..model import FlatModel
-from ..model.readings import reading_of
 from ..model.roles import measured_motion, series_spring
-from ..model.structure import SpringNames
-from ..simulation import Trace, declared_prior
+from ..simulation import declared_prior
+from .watched_records import ObserverChoice, WatchedRecord
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
 _POINTS = 257
 """Grid points of the observers of the draws, whose tables need no finer error bound than the spread."""
-"""Points of a row of numbers beyond which it is the table of a shape, drawn with one common factor."""
 _SEED = 0
-
-
-@dataclass(frozen=True)
-class ObserverChoice:
-    """What is to be estimated, from what, and how often.
-
-    Parameters
-    ----------
-    sample_time
-        In s.
-    spring
-        Path of the spring whose torque is estimated; decided from the structure if it is ``None``.
-    measured
-        State that is measured; decided from the structure if it is ``None``.
-    """
-
-    sample_time: float = 1e-3
-    spring: str | None = None
-    measured: str | None = None
 
 
 class ObserverTorqueError(NamedTuple):
@@ -226,7 +202,7 @@ def regenerate(
     known: dict[str, Any] = {"quantity": spring.effort, "unit": better.variable(spring.effort).unit}
     try:
         before = _designed(declared, choice)
-        seen = {r.name: _Watched.of(better, spring, r, choice) for r in records.records}
+        seen = {r.name: WatchedRecord.of(better, spring, r, choice) for r in records.records}
     except NlsError as error:
         return Regeneration(better, after.model, (f"the observers are not compared: {error}",), **known)
     runs = [seen[r.name] for r in records.of("held_out") or records.records]
@@ -284,7 +260,7 @@ def _learning(model: FlatModel, choice: ObserverChoice) -> CorrectedDesign | str
 
 
 def _compared(
-    learned: Sequence[CorrectedDesign | str], runs: Sequence[_Watched]
+    learned: Sequence[CorrectedDesign | str], runs: Sequence[WatchedRecord]
 ) -> tuple[tuple[ObserverTorqueError, ...], tuple[str, ...]]:
     """Return the errors of the corrected observers, before and after, or why there are none."""
     words = "the corrected observer is not compared: "
@@ -307,7 +283,7 @@ def _compared(
 def _generated(
     cascades: tuple[ObserverDesign, ObserverDesign],
     corrected: Sequence[CorrectedDesign],
-    deciding: Sequence[_Watched],
+    deciding: Sequence[WatchedRecord],
 ) -> tuple[ObserverDesign | CorrectedDesign, str]:
     """Return the observer that errs least on the records that decide, and why in words.
 
@@ -337,90 +313,6 @@ def _generated(
     return design, f"{name}: it errs less on the records that decide ({roles}) than the other"
 
 
-@dataclass(frozen=True, eq=False)
-class _Watched:
-    """A record at the sample time of the observers, with the torque that it shows."""
-
-    record: Record
-    trace: Trace
-    torque: Array
-    readings: Mapping[str, str]
-    motion: str
-    silent: tuple[str, ...]
-
-    @classmethod
-    def of(cls, model: FlatModel, spring: SpringNames, record: Record, choice: ObserverChoice) -> _Watched:
-        """Return a record as an observer sees it, and the torque behind its readings."""
-        motion = measured_motion(model, choice.measured)
-        shown = {reading_of(model.readings, signal).measured: signal for signal in record.trace.signals}
-        if motion not in shown:
-            raise MeasurementError(f"record '{record.name}'", f"does not measure '{motion}'")
-        torque = _shown_torque(model, spring, record, shown)
-        time = np.arange(record.trace.time[0], record.trace.time[-1], choice.sample_time)
-        silent = {v.name: np.full(len(record.trace), v.start) for v in model.inputs if v.name not in shown}
-        trace = record.trace.with_signals({**silent, _TORQUE: torque}, dict.fromkeys([*silent, _TORQUE], "1"))
-        even = trace.at(time)
-        return cls(
-            record, even, even[_TORQUE], {n: s for n, s in shown.items() if n != s}, motion, (*silent,)
-        )
-
-    @property
-    def size(self) -> float:
-        """Root mean square of the torque."""
-        return float(np.sqrt(np.mean(self.torque**2)))
-
-    def lacks(self, design: ObserverDesign | CorrectedDesign) -> list[str]:
-        """Return inputs of an observer that the record does not measure."""
-        return [v.name for v in design.model.inputs if v.name in self.silent]
-
-    def estimate(self, design: ObserverDesign | CorrectedDesign) -> Array:
-        """Return what an observer makes of the record, begun at rest at its first angle."""
-        inputs = {v.name for v in design.model.inputs}
-        wires = {name: signal for name, signal in self.readings.items() if name in inputs}
-        first = float(self.trace[self.readings.get(self.motion, self.motion)][0])
-        run = observe(design.model, self.trace, readings=wires, start=design.start(first))
-        return run[design.step.plant.estimate.name]
-
-    def error(self, estimate: Array) -> float:
-        """Return the root mean square error of an estimate."""
-        return float(np.sqrt(np.mean((estimate - self.torque) ** 2)))
-
-
-_TORQUE = "torque behind the readings"
-
-
-def _shown_torque(model: FlatModel, spring: SpringNames, record: Record, shown: Mapping[str, str]) -> Array:
-    """Return the torque that a record shows: as measured, or a measured force times the lever arm."""
-    if spring.effort in shown:
-        return shown_values(model, record, shown[spring.effort])
-    for cam in spring.cams:
-        force = next((n for n in shown if n == cam.force or n.startswith(f"{cam.element}.")), None)
-        if force is not None and model.variable(force).unit == "N":
-            # A signal of the model along the measured states and inputs of a record.
-            s, count = model.symbols(), len(record.trace)
-            groups = []
-            for variables in (model.states, model.inputs):
-                values = np.repeat(model.start(variables)[:, None], count, axis=1)
-                for place, variable in enumerate(variables):
-                    if variable.name in shown:
-                        values[place] = shown_values(model, record, shown[variable.name])
-                groups.append(values)
-            place = next(i for i, v in enumerate(model.signals) if v.name == cam.lever_arm)
-            wanted = ca.Function("wanted", [s.state, s.input, s.parameter, s.table], [s.signal[place]])
-            states, inputs = groups
-            result: Array = wanted.map(count)(
-                states, inputs, model.start(model.parameters), np.zeros(0)
-            ).full()
-            arm = result.ravel()
-            elements = model.values[cam.elements]
-            return elements * arm * shown_values(model, record, shown[force])
-    raise MeasurementError(
-        f"record '{record.name}'",
-        f"measures neither the torque '{spring.effort}' nor a force behind its cam",
-        next_step="measure one of them to know the error of the observer",
-    )
-
-
 def _draws(model: FlatModel, fits: Sequence[Fit]) -> list[dict[str, float]]:
     """Return draws of the numbers: from the covariance of fits, all others from their declared spreads."""
     random = np.random.default_rng(_SEED)
@@ -441,7 +333,7 @@ def _draws(model: FlatModel, fits: Sequence[Fit]) -> list[dict[str, float]]:
 
 
 def _drawn_error(
-    model: FlatModel, values: Mapping[str, float], runs: Sequence[_Watched], choice: ObserverChoice
+    model: FlatModel, values: Mapping[str, float], runs: Sequence[WatchedRecord], choice: ObserverChoice
 ) -> float:
     """Return the error over all records of the observer with other numbers; not a number if there is none."""
     drawn = model.with_values(values)

@@ -12,7 +12,7 @@ needs no derivatives but many simulations, is the yardstick.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -317,10 +317,6 @@ def fit_by_cma(
     windows must be apart, since nothing here joins them. ``seed``: of the random numbers; the same seed gives
     the same result.
     """
-    try:
-        cma = importlib.import_module("cma")
-    except ModuleNotFoundError:
-        raise missing_library("a fit by CMA-ES", "cma", "cma") from None
     if shots.joined:
         raise ConvergenceError(
             "a fit by CMA-ES", "cannot join windows", next_step="use Shots(length, joined=False)"
@@ -328,17 +324,32 @@ def fit_by_cma(
     problem = SimulationError(model, records, parameters, shots=shots, weights=weights, slopes=False)
     starts = problem.start().starts
 
-    def cost(x: np.ndarray) -> float:
+    def cost(x: Array) -> float:
         try:
             residual = problem.residual(Point(x, starts))
         except ConvergenceError:
             return _FAILED
         return 0.5 * float(residual @ residual)
 
-    low, high, first = box(parameters)
+    best, least, count = least_by_cma(cost, box(parameters), seed=seed, simulations=simulations)
+    return Evolved(problem.values(best), least, count)
+
+
+def least_by_cma(
+    cost: Callable[[Array], float], within: tuple[Array, Array, Array], *, seed: int, simulations: int
+) -> tuple[Array, float, int]:
+    """Return where CMA-ES ends, the cost there, and how often it was asked for.
+
+    ``within``: lower ends, upper ends, first point.
+    """
+    try:
+        cma = importlib.import_module("cma")
+    except ModuleNotFoundError:
+        raise missing_library("a fit by CMA-ES", "cma", "cma") from None
+    low, high, first = within
     options = {"bounds": [list(low), list(high)], "seed": seed, "maxfevals": simulations, "verbose": -9}
     best, strategy = cma.fmin2(cost, first, _STEP, options)
     least = float(strategy.result.fbest)
     if not least < _FAILED:
         raise ConvergenceError("a fit by CMA-ES", "no simulation was finite", next_step="narrow the bounds")
-    return Evolved(problem.values(np.asarray(best)), least, int(strategy.result.evaluations))
+    return np.asarray(best), least, int(strategy.result.evaluations)

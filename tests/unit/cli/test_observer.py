@@ -9,12 +9,16 @@ from pathlib import Path
 
 import pytest
 
+from nlsdesign.cli.observer import SEARCHES
 from nlsdesign.cli.options import KINDS
+from nlsdesign.components import CurrentSensor, ForceSensor
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.feedback.observer import choose_observer, designed_observer
 from nlsdesign.feedback.observer.spread import choice
 from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
+from nlsdesign.regeneration import fitted_poles
 from tests.command_line import Run, run
 
 __all__ = ["run"]
@@ -61,6 +65,45 @@ def test_every_kind_is_written(run: Run, tmp_path: Path, kind: str) -> None:
         assert found["statement"][0] in head
         folder = str(tmp_path / "o")
         assert run("observer", "verify", f"{folder}/certificate.json", "--c", folder)[0] == 0
+
+
+def test_poles_are_fitted_to_records(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On two records of the study, one of them held out; few steps, for what is printed is looked at."""
+    monkeypatch.setattr(fitted_poles, "GRID_POINTS", 41)
+    monkeypatch.setattr(fitted_poles, "_STEPS", 3)
+    bench = Path(__file__).parents[3] / "studies" / "austin2015_bench"
+    (tmp_path / "bench").mkdir()
+    mapping = (bench / "records.toml").read_text("utf-8").replace('["hold", "sine_2.0Hz"]', '["sine_2.0Hz"]')
+    (tmp_path / "bench" / "records.toml").write_text(mapping, "utf-8")
+    for name in ("sine_2.0Hz.csv", "sine_5.0Hz.csv"):
+        (tmp_path / "bench" / name).write_text((bench / name).read_text("utf-8"), "utf-8")
+    noise = [Quantity(value, unit, "rig") for value, unit in ((0.04, "A"), (0.3, "N"))]
+    actuator = declare(load_deck("austin2015_figure_consistent"))
+    sensed = actuator.with_part("ammeter", CurrentSensor(of="motor.current", noise=noise[0])).with_part(
+        "load_cell", ForceSensor(of="spring.rubber.force", noise=noise[1])
+    )
+    write_deck(sensed, tmp_path / "d.toml")
+    asked = ("observer", "--deck", "d.toml", "--kind", "published", "--fit-poles", "bench", "--out", "o")
+    status, out, err = run(*asked)
+    assert status == 0, err
+    assert "fitted by gradient; at a standing angle the error decays with at least" in out
+    assert "average relative error, %" in out
+    assert "held out" in out
+    head = (tmp_path / "o" / "observer.h").read_text("utf-8").splitlines()[0]
+    assert "poles at" in head
+    assert "not certified" in head
+    for wrong in (
+        asked[:3] + asked[5:],
+        (*asked[:5], "--fit-poles-by", "cma"),
+        (*asked[:5], "--mapping", "d.toml"),
+    ):
+        status, _, err = run(*wrong)
+        assert status == 2
+        assert "--fit-poles" in err
+
+
+def test_the_searches_of_the_option_are_those_of_the_fit() -> None:
+    assert SEARCHES == fitted_poles.SEARCHES
 
 
 def test_the_option_offers_the_kinds_that_can_be_designed() -> None:

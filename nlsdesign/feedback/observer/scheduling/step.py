@@ -17,12 +17,11 @@ from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import casadi as ca
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from ....foundation.arrays import Array
-from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
+from ....foundation.errors import ValueRangeError, unknown_name
 from ....foundation.symbolic import Expression
 from ....model import Variable
 from ...analysis.kalman import discrete_noise, steady_state_kalman
@@ -274,8 +273,11 @@ class SteadyStateKalman:
 class PolePlacement:
     """The published rule: the same poles at every angle, by a gain that is computed anew for each.
 
-    Where the plant is not observable (at zero angle), it is decomposed as in the paper: the poles of the
-    part that is seen are placed, the part that is not keeps its own and gets no correction.
+    A state that is measured besides the angle has a pole of its own, and its innovation takes from the others
+    what they would inherit of its error. Of the rest the angle is the one output, so its gain is unique and
+    follows from Ackermann's formula. Where that rest is not observable (at zero angle), it is decomposed as
+    in the paper: the poles of the part that is seen are placed, the part that is not keeps its own and gets
+    no correction.
 
     Notes
     -----
@@ -285,7 +287,8 @@ class PolePlacement:
     Parameters
     ----------
     poles
-        One per state, continuous time, in 1/s, with negative real part; complex ones in pairs.
+        One per state, continuous time, in 1/s, with negative real part; complex ones in pairs. The last ones
+        are those of what is measured besides the angle.
     condition_limit
         Scaled condition of the observability matrix beyond which a direction counts as not seen.
     """
@@ -299,15 +302,60 @@ class PolePlacement:
         Raises
         ------
         ValueRangeError
-            If there is not one stable pole per state, one is beyond half the sample rate, or they cannot be
-            placed.
+            If there is not one stable pole per state, one is beyond half the sample rate, or complex ones are
+            not in pairs.
         """
-        n = len(plant.a)
+        return self.with_slopes(plant)[0]
+
+    def with_slopes(self, plant: SampledPlant) -> tuple[Array, Spectrum]:
+        """Return M, and its slopes by each pole that is placed through the angle, shape (k, n, r).
+
+        Those by a pair of complex poles are complex; what the pair does together is real.
+
+        Raises
+        ------
+        ValueRangeError
+            As :meth:`correction`.
+        """
+        self._check(plant)
+        output, time = plant.output_matrix, plant.sample_time
+        beside = [int(np.argmax(row)) for row in output[1:]]
+        chain = [i for i in range(len(plant.a)) if i not in beside]
         poles: Spectrum = np.array(self.poles, dtype=np.complex128)
-        if len(poles) != n or np.any(poles.real >= 0.0):
+        scale = plant.sizes[chain]
+        a, c = plant.a[np.ix_(chain, chain)] * scale / scale[:, None], output[0, chain] * scale
+        seen, hidden = _decomposed(a * time, c[None, :], self.condition_limit)
+        moved = list(range(len(chain)))
+        for eigenvalue in np.linalg.eigvals(hidden.T @ a @ hidden):
+            real = [k for k in moved if not poles[k].imag] or moved
+            moved.remove(min(real, key=lambda k: abs(poles[k] - eigenvalue)))
+        if abs(np.sum(poles[moved].imag)) > 0.0:
+            raise ValueRangeError(
+                f"poles {self.poles}", f"are not in pairs of what is seen at {plant.angle:g} rad",
+                next_step="give complex poles in pairs, and a real one for each state that may not be seen",
+            )  # fmt: skip
+        step = expm(seen.T @ a @ seen * time) - np.eye(len(moved))
+        placed, slopes = _ackermann(step, c @ seen, np.expm1(poles[moved] * time))
+        gain: Spectrum = np.zeros((1 + len(chain), *output.T.shape), dtype=np.complex128)
+        gain[np.ix_([0], chain, [0])] = (scale * (seen @ placed))[None, :, None]
+        paces = time * np.exp(poles[moved] * time)
+        for k, pace, slope in zip(moved, paces, slopes, strict=True):
+            gain[1 + k, chain, 0] = scale * (seen @ (pace * slope))
+        for column, (state, pole) in enumerate(zip(beside, poles[len(chain) :], strict=True), start=1):
+            gain[0, :, column] = plant.transition[:, state]
+            gain[0, state, column] -= np.exp(pole * time)
+        # The gain of the prediction, L = Φ M, is what is placed.
+        both: Spectrum = np.asarray(np.linalg.solve(plant.transition, gain), dtype=np.complex128)
+        return both[0].real, both[1:]
+
+    def _check(self, plant: SampledPlant) -> None:
+        """Refuse poles that are not one per state, not stable, or faster than the sample rate carries."""
+        poles = np.array(self.poles)
+        if len(poles) != len(plant.a) or np.any(poles.real >= 0.0):
             raise ValueRangeError(
                 f"poles {self.poles}",
-                f"needs {n} poles with negative real part, one per state: {', '.join(plant.names)}",
+                f"needs {len(plant.a)} poles with negative real part, one per state: "
+                f"{', '.join(plant.names)}",
             )
         fastest = math.pi / plant.sample_time
         if np.max(np.abs(poles)) > fastest:
@@ -317,20 +365,6 @@ class PolePlacement:
                 f"{plant.sample_time:g} s",
                 next_step=f"ask for poles within {fastest:.3g} 1/s, or sample faster",
             )
-        scale = plant.sizes
-        a = plant.a * scale[None, :] / scale[:, None]
-        c = plant.output_matrix * scale[None, :]
-        seen, hidden = _decomposed(a * plant.sample_time, c, self.condition_limit)
-        if hidden.shape[1]:
-            own = np.linalg.eigvals(hidden.T @ a @ hidden).astype(complex)
-            left = list(poles)
-            for eigenvalue in own:
-                left.pop(int(np.argmin([abs(pole - eigenvalue) for pole in left])))
-            poles = np.array(left)
-        inner: Array = expm(seen.T @ a @ seen * plant.sample_time)
-        gain = seen @ _placed(inner, c @ seen, np.exp(poles * plant.sample_time))
-        # The gain of the prediction, L = Φ M, is what is placed.
-        return np.asarray(np.linalg.solve(plant.transition, gain * scale[:, None]), dtype=np.float64)
 
 
 def _decomposed(a: Array, c: Array, limit: float) -> tuple[Array, Array]:
@@ -343,24 +377,21 @@ def _decomposed(a: Array, c: Array, limit: float) -> tuple[Array, Array]:
     return directions[:rank].T, directions[rank:].T
 
 
-def _placed(a: Array, c: Array, poles: Spectrum) -> Array:
-    # Both methods place the poles exactly; their iterations only seek well-conditioned eigenvectors.
-    method = "YT" if np.any(poles.imag) else "KNV0"
-    try:
-        placed = scipy.signal.place_poles(
-            a.T, c.T, poles if method == "YT" else poles.real, method=method, maxiter=10, rtol=1e-2
-        )
-    except ValueError as error:
-        raise ValueRangeError(
-            f"poles {np.round(np.asarray(poles), 6)}",
-            f"cannot be placed: {error}",
-            next_step="keep the poles apart",
-        ) from error
-    gain: Array = np.asarray(np.real(placed.gain_matrix).T, dtype=np.float64)
-    reached = np.sort_complex(np.linalg.eigvals(a - gain @ c))
-    if np.max(np.abs(reached - np.sort_complex(np.asarray(poles)))) > 1e-3:
-        raise ConvergenceError("pole placement", f"reached {reached} instead of {poles}")
-    return gain
+def _ackermann(a: Array, c: Array, poles: Spectrum) -> tuple[Array, list[Spectrum]]:
+    """Return the gain that gives A − L·c these eigenvalues, and its slopes by each of them."""
+    rows = [c]
+    for _ in range(len(a) - 1):
+        rows.append(rows[-1] @ a)
+    last = np.linalg.solve(np.array(rows), np.eye(len(a))[-1]).astype(np.complex128)
+
+    def factored(factors: Spectrum) -> Spectrum:
+        """Return Π (A − μᵢ)·q over some eigenvalues."""
+        value = last
+        for eigenvalue in factors:
+            value = a @ value - eigenvalue * value
+        return value
+
+    return np.real(factored(poles)), [-factored(np.delete(poles, k)) for k in range(len(poles))]
 
 
 class _Titles(NamedTuple):
@@ -388,25 +419,20 @@ class ObserverStep:
 
     def matrices(self, angles: Array) -> dict[str, Array]:
         """Return the matrices of the step at many angles."""
-        plant, c = self.plant, self.plant.at(angles)
-        transition, _, _ = linear(c.a, self.sample_time)
-        correction = [self._correction(*row) for row in zip(angles, c.a, transition, strict=True)]
-        return {**without_correction(plant, self.sample_time, angles), "correction": np.array(correction)}
+        correction = np.array([self.gain.correction(plant) for plant in self.sampled(angles)])
+        return {**without_correction(self.plant, self.sample_time, angles), "correction": correction}
 
-    def _correction(self, angle: float, a: Array, transition: Array) -> Array:
-        plant = self.plant
-        return self.gain.correction(
+    def sampled(self, angles: Array) -> list[SampledPlant]:
+        """Return the plant at each angle, for which a gain is chosen."""
+        plant, a = self.plant, self.plant.at(angles).a
+        transition, time = linear(a, self.sample_time)[0], self.sample_time
+        return [
             SampledPlant(
-                float(angle),
-                a,
-                transition,
-                plant.output_matrix,
-                plant.names,
-                plant.sizes,
-                self.sample_time,
+                float(angles[k]), a[k], transition[k], plant.output_matrix, plant.names, plant.sizes, time,
                 plant.speed,
             )
-        )
+            for k in range(len(angles))
+        ]  # fmt: skip
 
     def factors(self) -> dict[str, Array]:
         """Return the typical size of what the columns of each matrix multiply."""

@@ -70,6 +70,12 @@ def test_poles_are_placed() -> None:
     assert np.sort(found.real) == pytest.approx(np.sort(np.exp(np.array(four) * TIME)), rel=1e-6)
 
 
+def test_equal_poles_are_placed() -> None:
+    found = error_matrix(minimal(5e-3), PolePlacement((-50.0, -50.0, -50.0)))
+    wanted = np.poly(np.full(3, np.exp(-50.0 * TIME)))
+    assert np.poly(found) == pytest.approx(wanted, rel=1e-9)
+
+
 def test_at_zero_angle_only_what_is_seen_is_placed() -> None:
     """The paper's decomposition: the force keeps −k/η and gets no correction."""
     plant = published(0.0)
@@ -120,8 +126,10 @@ def test_settings_are_checked() -> None:
         PolePlacement((-1.0, -2.0)).correction(minimal(5e-3))
     with pytest.raises(ValueRangeError, match="negative real part"):
         PolePlacement((-1.0, -2.0, 3.0)).correction(minimal(5e-3))
-    with pytest.raises(ValueRangeError, match="keep the poles apart"):
-        PolePlacement((-50.0, -50.0, -50.0)).correction(minimal(5e-3))
+    with pytest.raises(ValueRangeError, match=r"are not in pairs .* -> give complex poles in pairs"):
+        PolePlacement((-50.0, -50.0 + 9.0j, -60.0)).correction(minimal(5e-3))
+    swinging = (-50.0 + 9.0j, -50.0 - 9.0j, -60.0)
+    PolePlacement(swinging).correction(minimal(0.0))  # the real one is that of what is not seen
     with pytest.raises(ValueRangeError, match="bandwidth"):
         CascadeGain(bandwidth=0.0)
     with pytest.raises(UnknownNameError, match=r"did you mean 'motor\.speed'"):

@@ -1,0 +1,415 @@
+"""Poles of the published observer, fitted to the torque that records show, as its authors did.
+
+The gain is a polynomial of the poles, so the slopes of the estimate by them are exact: CasADi differentiates
+the step of the observer along the whole record; the derivative of the gain is written out.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..bench.identification import RecordSet, agreement, rmse
+from ..bench.identification.multiple_shooting import least_by_cma
+from ..feedback.observer import (
+    DesignedObserver,
+    FixedGrid,
+    ObserverDesign,
+    PaperForm,
+    PolePlacement,
+    design_observer_with_details,
+)
+from ..feedback.observer.scheduling.angle_form import AngleScheduledPlant
+from ..feedback.observer.scheduling.scheduled import check_stability, whole_contour
+from ..feedback.observer.scheduling.table import ColumnPlace, Compact, Draft, Entries, linearly
+from ..foundation.arrays import Array
+from ..foundation.errors import ConvergenceError, MeasurementError, unknown_name
+from ..foundation.quantity import three_digits, typeset_unit
+from ..foundation.written_numbers import shared_prefix
+from ..model import FlatModel
+from ..model.roles import measured_motion, series_spring
+from .watched_records import ObserverChoice, WatchedRecord
+
+SEARCHES = ("gradient", "cma")
+"""Ways to the best poles by name: exact slopes, or the evolution strategy of the authors."""
+GRID_POINTS = 161
+"""Of the table, zero angle among them, where the observer is decomposed."""
+SLOWEST = 0.1
+"""Least size of a pole in 1/s: an error that is gone in half a minute."""
+DAMPING = (0.1, 10.0)
+"""Damping of the pair of poles: two real poles apart by 400, or a pair that swings for some periods."""
+_SHARES, _NEARLY = ((0.01, 0.012, 0.3, 0.06), (0.1, 0.15, 0.2, 0.06)), 0.999
+"""First poles as shares of the fastest that the sample rate carries: slow but for one, and fast; the last
+is that of the extension. And the share up to which a search may go."""
+_FREE = 3
+"""Poles of force, angle and speed."""
+_STEPS, _ENOUGH, _SIMULATIONS, _SEED = 40, 1e-5, 400, 1
+_AT_ONCE = 500
+"""Samples in one call; a function for a whole record takes longer to make than to run."""
+
+
+class PoleError(NamedTuple):
+    """Error of the estimated torque on one record: rms in its unit, and average percent relative error."""
+
+    record: str
+    role: str
+    # before, after: with the gain of the cascade, and with the fitted poles
+    before: float
+    after: float
+    percent_before: float
+    percent_after: float
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPoles:
+    """The published observer with poles that were fitted to records.
+
+    Parameters
+    ----------
+    design
+        With table and start values.
+    poles
+        In 1/s, in the order of the states that are seen through the angle; the last is that of the extension.
+    worst
+        Angle in rad, at or between the points of the table, at which the error decays most slowly, and the
+        spectral radius there.
+    errors
+        By record; those that were held out decided nothing.
+    deciding
+        Role of the records by which one of several fits was taken.
+    evaluations
+        How often all records of the fit were simulated.
+    by
+        How the poles were sought; one of :data:`SEARCHES`.
+    """
+
+    design: ObserverDesign
+    poles: tuple[complex, ...]
+    worst: tuple[float, float]
+    errors: tuple[PoleError, ...]
+    deciding: str
+    evaluations: int
+    by: str
+
+    @property
+    def margin(self) -> float:
+        """Least decay of the error at a standing angle, in 1/s."""
+        return -math.log(self.worst[1]) / self.design.step.sample_time
+
+    @property
+    def reason(self) -> str:
+        """The poles and their margin in a sentence."""
+        names = self.design.step.plant.names
+        order = [
+            *(n for n in names if n not in self.design.step.plant.measured),
+            *self.design.step.plant.measured,
+        ]
+        placed = ", ".join(f"{p:.4g}" for p in self.poles)
+        return (
+            f"poles at {placed} 1/s for {', '.join(order)}, fitted by {self.by}; at a standing angle the "
+            f"error decays with at least {self.margin:.3g} 1/s (spectral radius {self.worst[1]:.5f} at "
+            f"{self.worst[0]:.3g} rad), of a moving one nothing is proved"
+        )
+
+    @property
+    def observer(self) -> DesignedObserver:
+        """The observer as commands write it."""
+        return DesignedObserver("published", self.design, self.reason)
+
+    def shown(self) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
+        """Return title, heads and rows of the table of errors."""
+        unit = typeset_unit(self.design.step.plant.estimate.unit)
+        factor, prefixed = shared_prefix([e.after for e in self.errors], unit)
+        heads = ("record", "role", f"{prefixed} rms", "fitted", "average relative error, %", "fitted")
+        rows = [
+            (e.record, e.role.replace("_", " "), *(three_digits(factor * v) for v in e[2:4]),
+             *(three_digits(v) for v in e[4:]))
+            for e in self.errors
+        ]  # fmt: skip
+        return "Torque error, with the gain of the cascade and with fitted poles", heads, rows
+
+    def content(self) -> dict[str, Any]:
+        """Return everything as JSON has it."""
+        return {
+            "poles": [[complex(p).real, complex(p).imag] for p in self.poles],
+            "by": self.by, "decided_by": self.deciding,
+            "least_decay": self.margin, "spectral_radius": self.worst[1], "at_angle": self.worst[0],
+            "simulations": self.evaluations, "errors": [error._asdict() for error in self.errors],
+        }  # fmt: skip
+
+
+def fit_poles(
+    model: FlatModel,
+    records: RecordSet,
+    *,
+    choice: ObserverChoice | None = None,
+    first: Sequence[complex] | None = None,
+    by: str = "gradient",
+) -> FittedPoles:
+    """Fit the poles of the published observer to the torque that records show.
+
+    Least squares of the torque error over the records of the role ``fit``, all begun at rest at their first
+    angle. Searches from several first poles end at several fits; the one that errs least on the records of
+    the role ``selection`` is taken, or on those of the fit where there are none. The pole of the extension
+    moves no torque and stays. Poles are real.
+
+    Parameters
+    ----------
+    model
+        Continuous; its spring has a cam.
+    records
+        With the measured angle, the inputs of the model, and the torque or a force behind the cam.
+    choice
+        What is estimated; by default the torque of the series spring, every millisecond.
+    first
+        Poles at which the search begins, in 1/s, one per state, negative; several sets by default.
+    by
+        ``"gradient"`` for Gauss–Newton steps with exact slopes, or ``"cma"`` for CMA-ES.
+
+    Returns
+    -------
+    FittedPoles
+        The observer, how far its error is from unstable, and its errors before and after, by record.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such search.
+    MeasurementError
+        If no record may be fitted, or a record lacks a signal; it is named.
+    ValueRangeError
+        If the first poles are not one per state, not stable, or faster than the sample rate carries.
+    ArrangementError
+        If the spring has no cam, or there is no observer over one angle.
+    ConvergenceError
+        If no simulation is finite, or every fit is unstable between two points of the table.
+    MissingLibraryError
+        If CMA-ES is not installed.
+    """
+    if by not in SEARCHES:
+        raise unknown_name("search", by, SEARCHES)
+    choice = choice or ObserverChoice()
+    spring = series_spring(model, choice.spring)
+    names = _Question(model, spring.effort, measured_motion(model, choice.measured), choice.sample_time)
+    published = names.designed(None)
+    runs = [WatchedRecord.of(model, spring, record, choice) for record in records.records]
+    for run in runs:
+        if lacking := run.lacks(published):
+            raise MeasurementError(
+                f"record '{run.record.name}'", f"does not measure {', '.join(lacking)}",
+                next_step="map these columns, or leave the record out: the published observer reads them",
+            )  # fmt: skip
+    of = {role: [run for run in runs if run.record.role == role] for role in ("fit", "selection")}
+    if not of["fit"]:
+        raise MeasurementError(
+            "records", "none has the role 'fit'", next_step="hold out fewer of them, so that one is fitted"
+        )
+    search = _Search(names, published.step.plant, of["fit"], first)
+    logs = search.by_cma() if by == "cma" else search.by_gradient()
+    deciding = "selection" if of["selection"] else "fit"
+    ranked = sorted(logs, key=lambda x: search.error(x, of[deciding]))
+    poles, design, worst = names.stable([search.poles(x) for x in ranked])
+    errors = [_compared(run, published, design) for run in runs]
+    return FittedPoles(design, poles, worst, tuple(errors), deciding, search.evaluations, by)
+
+
+def _compared(run: WatchedRecord, published: ObserverDesign, design: ObserverDesign) -> PoleError:
+    """Return the errors of both observers on one record."""
+    before, after = (agreement(run.torque, run.estimate(each)) for each in (published, design))
+    return PoleError(
+        run.record.name, run.record.role, before.rmse, after.rmse, before.relative, after.relative
+    )
+
+
+class _Question(NamedTuple):
+    """What is observed."""
+
+    model: FlatModel
+    estimate: str
+    measured: str
+    sample_time: float
+
+    def designed(self, poles: Sequence[complex] | None, *, every_entry: bool = False) -> ObserverDesign:
+        """Return the published observer with poles, or with the gain of the cascade where there are none."""
+        over = whole_contour(self.model)
+        grid = _EveryEntry if every_entry else FixedGrid
+        return design_observer_with_details(
+            self.model, estimate=self.estimate, measured=self.measured, sample_time=self.sample_time,
+            form=PaperForm(), gain=None if poles is None else PolePlacement(tuple(poles)),
+            grid=grid(over.lower, over.upper, GRID_POINTS),
+        )  # fmt: skip
+
+    def stable(
+        self, ranked: Sequence[tuple[complex, ...]]
+    ) -> tuple[tuple[complex, ...], ObserverDesign, tuple[float, float]]:
+        """Return the first poles whose error decays at every angle, also between points of the table."""
+        for poles in ranked:
+            design = self.designed(poles)
+            worst = check_stability(design.model).worst
+            if worst[1] < 1.0:
+                return poles, design, worst
+        raise ConvergenceError(
+            "fitted poles", f"leave an error that grows at {worst[0]:.4g} rad, by {worst[1]:.4g} a sample",
+            next_step="take the gain of the cascade: leave --fit-poles out",
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _EveryEntry(FixedGrid):
+    """A table with a column for every entry of the step, also where two are alike at some poles."""
+
+    def compact(self, entries: Entries, draft: Draft | None = None) -> Compact:
+        """Return the table; see :class:`Grid`."""
+        angles = np.linspace(self.lower, self.upper, self.points)
+        columns = tuple(entries(angles))
+        places = {entry.key: ColumnPlace(1.0, i) for i, entry in enumerate(columns)}
+        values = np.ascontiguousarray(np.array([entry.values for entry in columns]).T)
+        return Compact(angles, columns, values, places, {}, 0.0)
+
+
+class _Search:
+    """Torque errors over records as a function of three numbers that give the poles, with exact slopes.
+
+    These are the logarithms of frequency and damping of a pair, real or complex, and of the size of a real
+    pole. What the pair does to the gain is smooth where two real poles become complex.
+    """
+
+    def __init__(
+        self,
+        question: _Question,
+        plant: AngleScheduledPlant,
+        runs: Sequence[WatchedRecord],
+        first: Sequence[complex] | None,
+    ) -> None:
+        self.runs, self.evaluations = runs, 0
+        self.fastest = math.pi / question.sample_time
+        ladder = [-self.fastest * np.array(shares) for shares in _SHARES]
+        self.starts = [tuple(rates.tolist()) for rates in ladder] if first is None else [tuple(first)]
+        self.design = question.designed(self.starts[0], every_entry=True)
+        self.grid = self.design.compact.angles
+        self.plants = self.design.step.sampled(self.grid)
+        outputs = range(len(plant.output_matrix))
+        keys = [f"correction[{i}][{j}]" for i in range(len(plant.states)) for j in outputs]
+        columns = [column.key for column in self.design.compact.columns]
+        self.rows = [columns.index(key) for key in keys]
+        self.steps = {False: self._step(0), True: self._step(_FREE)}
+        rates = np.log([SLOWEST, _NEARLY * self.fastest])
+        self.ends = np.array([rates, np.log(DAMPING), rates]).T
+
+    def begin(self, poles: Sequence[complex]) -> Array:
+        """Return the three numbers of some poles."""
+        one, other, alone = (-complex(pole) for pole in poles[:_FREE])
+        size = math.sqrt((one * other).real)
+        numbers = np.log([size, (one + other).real / (2.0 * size), alone.real])
+        inside: Array = np.clip(numbers, *self.ends)
+        return inside
+
+    def poles(self, numbers: Array) -> tuple[complex, ...]:
+        """Return the poles; those beside the angle stay at their first values."""
+        size, damping, alone = np.exp(numbers).tolist()
+        root = cmath.sqrt(damping**2 - 1.0)
+        pair = [-size * (damping + sign * root) for sign in (1.0, -1.0)]
+        real = [pole.real for pole in pair] if damping >= 1.0 else pair
+        return (*real, -alone, *self.starts[0][_FREE:])
+
+    def by_gradient(self) -> list[Array]:
+        """Return where Gauss-Newton steps end, from each start."""
+        ends = []
+        for start in self.starts:
+            reached = least_squares(
+                lambda x: self.errors(x, self.runs)[0],
+                self.begin(start),
+                jac=lambda x: self.errors(x, self.runs)[1],
+                bounds=self.ends,
+                max_nfev=_STEPS,
+                ftol=_ENOUGH,
+                xtol=_ENOUGH,
+            )
+            ends.append(reached.x)
+        return ends
+
+    def by_cma(self) -> list[Array]:
+        """Return where CMA-ES ends, from the first start."""
+        within = (*self.ends, self.begin(self.starts[0]))
+        best, _, _ = least_by_cma(
+            lambda x: self.error(x, self.runs), within, seed=_SEED, simulations=_SIMULATIONS
+        )
+        return [best]
+
+    def error(self, numbers: Array, runs: Sequence[WatchedRecord]) -> float:
+        """Return the root mean square error over records."""
+        return rmse(self.errors(numbers, runs, slopes=False)[0])
+
+    def errors(
+        self, numbers: Array, runs: Sequence[WatchedRecord], *, slopes: bool = True
+    ) -> tuple[Array, Array]:
+        """Return estimate minus torque over all samples, and its slopes, shape (n, 3)."""
+        self.evaluations += 1
+        poles = self.poles(numbers)
+        if max(map(abs, poles)) > self.fastest:
+            return np.full(sum(len(run.torque) for run in runs), np.inf), np.zeros(0)
+        placed = [PolePlacement(poles).with_slopes(plant) for plant in self.plants]
+        gain = np.array([m.ravel() for m, _ in placed])
+        by_pole = np.array([s.reshape(len(s), -1) for _, s in placed])
+        by_number = np.real(np.einsum("kj,akc->jac", self._pace(numbers), by_pole))
+        parts = []
+        for run in runs:
+            inputs = run.inputs(self.design)
+            table = linearly(self.grid, self.design.compact.values, inputs[0])
+            table[self.rows] = linearly(self.grid, gain, inputs[0])
+            moved = [linearly(self.grid, values, inputs[0]) for values in by_number[: _FREE * slopes]]
+            begun = self.design.start(float(inputs[0, 0]))
+            memory = np.zeros(self.steps[slopes].size1_in(0))
+            memory[: len(self.design.model.states)] = [
+                begun.get(v.name, 0.0) for v in self.design.model.states
+            ]
+            shown = _along(self.steps[slopes], memory, np.vstack([inputs, table, *moved]))
+            parts.append(np.vstack([shown[0] - run.torque, shown[1:]]))
+        both = np.hstack(parts)
+        return both[0], both[1:].T
+
+    def _pace(self, numbers: Array) -> Array:
+        """Return the slopes of the three poles by the three numbers."""
+        size, damping, alone = np.exp(numbers).tolist()
+        root = cmath.sqrt(damping**2 - 1.0)
+        pair = [
+            [-size * (damping + sign * root), -size * damping * (1.0 + sign * damping / root), 0.0]
+            for sign in (1.0, -1.0)
+        ]
+        return np.array([*pair, [0.0, 0.0, -alone]])
+
+    def _step(self, count: int) -> ca.Function:
+        """Return many samples of the observer with the slopes of its memory by some poles."""
+        model = self.design.model
+        s, size = model.symbols(), len(model.states)
+        (wanted,) = (i for i, v in enumerate(model.outputs) if v.name == self.design.step.plant.estimate.name)
+        after = ca.vertcat(s.derivative, s.output[wanted])
+        gain = ca.vertcat(*[s.table[row] for row in self.rows])
+        memory, moved = ca.SX.sym("memory", size, count), ca.SX.sym("moved", len(self.rows), count)
+        slopes = ca.jacobian(after, s.state) @ memory + ca.jacobian(after, gain) @ moved
+        step = ca.Function(
+            "step",
+            [ca.vertcat(s.state, ca.vec(memory)), ca.vertcat(s.input, s.table, ca.vec(moved))],
+            [ca.vertcat(after[:size], ca.vec(slopes[:size, :])), ca.vertcat(after[size], slopes[size, :].T)],
+            {"cse": True},
+        )
+        return step.mapaccum(_AT_ONCE)
+
+
+def _along(samples: ca.Function, memory: Array, known: Array) -> Array:
+    """Return what a step gives along a record of any length, shape (results, n); ``known``: (m, n)."""
+    whole = np.pad(known, ((0, 0), (0, -known.shape[1] % _AT_ONCE)), mode="edge")
+    results = []
+    for part in np.split(whole, whole.shape[1] // _AT_ONCE, axis=1):
+        states, result = (np.array(of) for of in samples(memory, part))
+        memory = states[:, -1]
+        results.append(result)
+    together: Array = np.hstack(results)[:, : known.shape[1]]
+    return together
