@@ -69,34 +69,18 @@ class PoleError(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FittedPoles:
-    """The published observer with poles that were fitted to records.
-
-    Parameters
-    ----------
-    design
-        With table and start values.
-    poles
-        In 1/s, in the order of the states that are seen through the angle; the last is that of the extension.
-    worst
-        Angle in rad, at or between the points of the table, at which the error decays most slowly, and the
-        spectral radius there.
-    errors
-        By record; those that were held out decided nothing.
-    deciding
-        Role of the records by which one of several fits was taken.
-    evaluations
-        How often all records of the fit were simulated.
-    by
-        How the poles were sought; one of :data:`SEARCHES`.
-    """
+    """The published observer with poles that were fitted to records."""
 
     design: ObserverDesign
+    # poles: in 1/s, of what is seen through the angle; the last is that of the extension
     poles: tuple[complex, ...]
+    # worst: angle in rad, at or between points of the table, where the error decays most slowly, and the
+    # spectral radius there
     worst: tuple[float, float]
-    errors: tuple[PoleError, ...]
-    deciding: str
-    evaluations: int
-    by: str
+    errors: tuple[PoleError, ...]  # by record; those that were held out decided nothing
+    deciding: str  # role of the records by which one of several fits was taken
+    evaluations: int  # how often records were simulated by the search
+    by: str  # how the poles were sought; one of SEARCHES
 
     @property
     def margin(self) -> float:
@@ -215,17 +199,13 @@ def fit_poles(
     logs = search.by_cma() if by == "cma" else search.by_gradient()
     deciding = "selection" if of["selection"] else "fit"
     ranked = sorted(logs, key=lambda x: search.error(x, of[deciding]))
-    poles, design, worst = names.stable([search.poles(x) for x in ranked])
-    errors = [_compared(run, published, design) for run in runs]
+    poles, design, worst = names.stable([search.poles(x)[0] for x in ranked])
+    errors = []
+    for run in runs:
+        before, after = (agreement(run.torque, run.estimate(it)) for it in (published, design))
+        sizes = (before.rmse, after.rmse, before.relative, after.relative)
+        errors.append(PoleError(run.record.name, run.record.role, *sizes))
     return FittedPoles(design, poles, worst, tuple(errors), deciding, search.evaluations, by)
-
-
-def _compared(run: WatchedRecord, published: ObserverDesign, design: ObserverDesign) -> PoleError:
-    """Return the errors of both observers on one record."""
-    before, after = (agreement(run.torque, run.estimate(each)) for each in (published, design))
-    return PoleError(
-        run.record.name, run.record.role, before.rmse, after.rmse, before.relative, after.relative
-    )
 
 
 class _Question(NamedTuple):
@@ -311,13 +291,15 @@ class _Search:
         inside: Array = np.clip(numbers, *self.ends)
         return inside
 
-    def poles(self, numbers: Array) -> tuple[complex, ...]:
-        """Return the poles; those beside the angle stay at their first values."""
+    def poles(self, numbers: Array) -> tuple[tuple[complex, ...], Array]:
+        """Return the poles, of which that of the extension stays, and the slopes of the others."""
         size, damping, alone = np.exp(numbers).tolist()
-        root = cmath.sqrt(damping**2 - 1.0)
+        root = cmath.sqrt(damping**2 - 1.0) or 1e-9
         pair = [-size * (damping + sign * root) for sign in (1.0, -1.0)]
+        bends = [-size * damping * (1.0 + sign * damping / root) for sign in (1.0, -1.0)]
+        slopes = [[pole, bend, 0.0] for pole, bend in zip(pair, bends, strict=True)]
         real = [pole.real for pole in pair] if damping >= 1.0 else pair
-        return (*real, -alone, *self.starts[0][_FREE:])
+        return (*real, -alone, *self.starts[0][_FREE:]), np.array([*slopes, [0.0, 0.0, -alone]])
 
     def by_gradient(self) -> list[Array]:
         """Return where Gauss-Newton steps end, from each start."""
@@ -352,13 +334,13 @@ class _Search:
     ) -> tuple[Array, Array]:
         """Return estimate minus torque over all samples, and its slopes, shape (n, 3)."""
         self.evaluations += 1
-        poles = self.poles(numbers)
+        poles, paces = self.poles(numbers)
         if max(map(abs, poles)) > self.fastest:
             return np.full(sum(len(run.torque) for run in runs), np.inf), np.zeros(0)
         placed = [PolePlacement(poles).with_slopes(plant) for plant in self.plants]
         gain = np.array([m.ravel() for m, _ in placed])
         by_pole = np.array([s.reshape(len(s), -1) for _, s in placed])
-        by_number = np.real(np.einsum("kj,akc->jac", self._pace(numbers), by_pole))
+        by_number = np.real(np.einsum("kj,akc->jac", paces, by_pole))
         parts = []
         for run in runs:
             inputs = run.inputs(self.design)
@@ -374,16 +356,6 @@ class _Search:
             parts.append(np.vstack([shown[0] - run.torque, shown[1:]]))
         both = np.hstack(parts)
         return both[0], both[1:].T
-
-    def _pace(self, numbers: Array) -> Array:
-        """Return the slopes of the three poles by the three numbers."""
-        size, damping, alone = np.exp(numbers).tolist()
-        root = cmath.sqrt(damping**2 - 1.0)
-        pair = [
-            [-size * (damping + sign * root), -size * damping * (1.0 + sign * damping / root), 0.0]
-            for sign in (1.0, -1.0)
-        ]
-        return np.array([*pair, [0.0, 0.0, -alone]])
 
     def _step(self, count: int) -> ca.Function:
         """Return many samples of the observer with the slopes of its memory by some poles."""

@@ -158,10 +158,6 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _silent(text: str) -> None:
-    """Say nothing."""
-
-
 def regenerate(
     declared: FlatModel,
     better: FlatModel,
@@ -169,7 +165,7 @@ def regenerate(
     *,
     fits: Sequence[Fit] = (),
     choice: ObserverChoice | None = None,
-    progress: Callable[[str], None] = _silent,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Regeneration:
     """Design the observer again, and compare it with the one from the declared model.
 
@@ -221,10 +217,13 @@ def regenerate(
     draws = [*_draws(declared, ()), *_draws(better, fits)]
     models = [*[declared] * DRAWS, *[better] * DRAWS]
     spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
+    count = sum(not math.isfinite(error) for error in spread)
+    words = f"for {count} of {len(spread)} draws of the numbers no observer can be designed"
+    undesigned = (words,) if count else ()
     return Regeneration(
         better,
         generated.model,
-        (*lacking, *_failures(spread)),
+        (*lacking, *undesigned),
         errors=errors,
         corrected=corrected,
         chosen=chosen,
@@ -343,12 +342,6 @@ def _drawn_error(
         return _rms([run.error(run.estimate(design)) for run in runs])
     except NlsError:
         return math.nan
-
-
-def _failures(spread: Sequence[float]) -> tuple[str, ...]:
-    count = sum(not math.isfinite(error) for error in spread)
-    words = f"for {count} of {len(spread)} draws of the numbers no observer can be designed"
-    return (words,) if count else ()
 
 
 def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration, dict[Path, str]]:
