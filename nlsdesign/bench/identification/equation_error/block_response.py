@@ -10,7 +10,7 @@ import numpy as np
 
 from ....foundation.arrays import Array, Indices
 from ....foundation.errors import ConvergenceError, unknown_name
-from ....foundation.symbolic import Expression, dependence, depends
+from ....foundation.symbolic import Expression, dependence
 from ..filters import smoothed, without_rounding
 from ..records.measurement import Record
 from .batch import ChainFunction, ColumnFunction, PointFunction
@@ -103,11 +103,10 @@ class DrivenBlock:
         self._fixed = block.model.values
         self._straightened = _places(block, straightened)
         e = _equations(block, self.free, self._straightened)
-        self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
-        self._shifted, self._digest_shifted = e.shifted, ColumnFunction(e.digest_shifted)
+        self._equations, self._size, self._shifted = e, e.state.numel(), e.shifted
         self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
-        self._output, self._plain_output = (ColumnFunction(each) for each in _output_functions(e))
-        self._equations = e
+        functions = (e.digest, e.digest_shifted, *_output_functions(e))
+        self._digest, self._digest_shifted, self._output, self._plain_output = map(ColumnFunction, functions)
         self._sloped = _sloped(block)
         self._walk: _Walk | None = None
         if self._size:
@@ -149,7 +148,7 @@ class DrivenBlock:
         the place of the slope.
         """
         model, n = self.block.model, len(record.trace)
-        inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
+        inputs = self.block.at_rest(n)
         rates = np.zeros_like(inputs)
         for i, variable in enumerate(model.inputs):
             drive = self.block.drives.get(variable.name)
@@ -293,7 +292,7 @@ def _require_finite(block: Block, response: Array) -> None:
 
 def _rest(block: Block, rate_at: PointFunction, begin: Array, p: Array) -> Array:
     """Return the state in which a block rests at the first sample: bench records start at rest."""
-    x = block.model.start(block.model.states)
+    x = np.array([v.start for v in block.model.states])
     for _ in range(3):
         rate, slope = rate_at(x, begin, p)
         if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
@@ -326,7 +325,7 @@ def _sloped(block: Block) -> list[int]:
     s, drives = block.model.symbols(), block.drives
     names = [v.name for v in block.model.inputs]
     sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
-    moved = s.state.numel() and depends(s.derivative, ca.vertcat(*[s.input[i] for i in sloped]))
+    moved = s.state.numel() and ca.depends_on(s.derivative, ca.vertcat(*[s.input[i] for i in sloped]))
     return sloped if moved else []
 
 
@@ -360,7 +359,7 @@ def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
             raise unknown_name("parameter", name, names)
     together = ca.vertcat(s.output, s.derivative) if s.state.numel() else s.output
     late = {name for d in block.drives.values() for name in d.shifted_by}
-    return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))
+    return tuple(n for n in free if n in late or ca.depends_on(together, s.parameter[names.index(n)]))
 
 
 def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -> _Equations:
@@ -374,7 +373,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     now, moved = ca.SX.sym("now", len(late)), list[Expression]()
     together = ca.vertcat(s.derivative, s.output) if s.state.numel() else s.output
     fixed = ca.vertcat(*[s.parameter[i] for i in rest])
-    together = ca.substitute(together, fixed, ca.DM(model.start(model.parameters)[rest]))
+    together = ca.substitute(together, fixed, ca.DM(np.array([model.parameters[i].start for i in rest])))
     for i, variable in enumerate(model.inputs):
         drive = block.drives.get(variable.name)
         if drive in late:
@@ -393,7 +392,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     core, symbols, parts = ca.extract_parametric(together, given)
     core = ca.cse(core)
     # Inputs that stand alone, as a factor of a parameter, are not extracted: they pass as they are.
-    bare = [given[i] for i in range(given.numel()) if depends(core, given[i])]
+    bare = [given[i] for i in range(given.numel()) if ca.depends_on(core, given[i])]
     aliases = [ca.SX.sym(f"bare_{k}") for k in range(len(bare))]
     core = ca.substitute(core, ca.vertcat(*bare), ca.vertcat(*aliases)) if bare else core
     symbols, parts = [*symbols, *aliases], [*parts, *bare]
