@@ -26,7 +26,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError
 from ...foundation.quantity import same_dimension
-from ...foundation.symbolic import Expression, depends
+from ...foundation.symbolic import Expression
 from ...model import FlatModel, Variable
 from ...model.flat import Symbols
 from ...model.readings import ReadingNames, reading_of
@@ -77,12 +77,12 @@ def _variable_behind(model: FlatModel, name: str) -> str:
     variable, value = known[name]
     moving = [(v, s.state[i]) for i, v in enumerate(model.states)]
     moving += [(v, s.input[i]) for i, v in enumerate(model.inputs)]
-    inside = [(v, symbol) for v, symbol in moving if depends(value, symbol)]
+    inside = [(v, symbol) for v, symbol in moving if ca.depends_on(value, symbol)]
     if len(inside) != 1 or not same_dimension(inside[0][0].unit, variable.unit):
         return name
     behind, symbol = inside[0]
     everything = ca.vertcat(s.state, s.input, s.time)
-    return name if depends(ca.jacobian(value, symbol), everything) else behind.name
+    return name if ca.depends_on(ca.jacobian(value, symbol), everything) else behind.name
 
 
 def behind_ratio(measured: Measured, value: Expression, known: Mapping[str, Expression]) -> Expression:
@@ -130,8 +130,8 @@ def scaled_balance(
         if declared == 0.0 or not np.isfinite(declared):
             continue
         tangent = ca.jacobian(given, reading)
-        if not depends(tangent, reading):
-            direct = depends(terms.balance, reading) and not _states_behind(terms, reading)
+        if not ca.depends_on(tangent, reading):
+            direct = ca.depends_on(terms.balance, reading) and not _states_behind(terms, reading)
             in_motion = -ca.jacobian(terms.balance, reading) if direct else tangent
             if _clocks(terms):
                 first = _at_start(terms, in_motion)
@@ -146,7 +146,7 @@ def scaled_balance(
         if _clocks(terms):
             share = _between_least_and_one(share)
         return terms.balance * (declared / (slope * share)), declared
-    if any(depends(terms.balance, reading) for reading in efforts):
+    if any(ca.depends_on(terms.balance, reading) for reading in efforts):
         return terms.balance, 1.0
     declared = _declared(terms, inertia)
     return terms.balance * (declared / inertia), declared
@@ -155,7 +155,7 @@ def scaled_balance(
 def _clocks(terms: BalanceTerms) -> list[int]:
     """Return the states that go on with time alone, whatever is measured."""
     moving = ca.vertcat(terms.readings, terms.state)
-    return [i for i in range(terms.state.numel()) if not depends(terms.derivative[i], moving)]
+    return [i for i in range(terms.state.numel()) if not ca.depends_on(terms.derivative[i], moving)]
 
 
 def _at_start(terms: BalanceTerms, value: Expression) -> Expression:
@@ -203,7 +203,7 @@ def _states_behind(terms: BalanceTerms, reading: Expression) -> list[int]:
     while frontier:
         symbol = frontier.pop()
         for i in range(terms.state.numel()):
-            if i not in reached and depends(terms.derivative[i], symbol):
+            if i not in reached and ca.depends_on(terms.derivative[i], symbol):
                 reached.append(i)
                 frontier.append(terms.state[i])
     return sorted(reached)
@@ -297,7 +297,7 @@ def _check_place(model: FlatModel, body: MovingBody, each: Measured, names: Coll
     """Refuse the rate of a prescribed motion without the motion, where efforts depend on the place."""
     s = model.symbols()
     place = [v.name for v in model.inputs].index(body.motion)
-    if each.order == RATE and body.motion not in names and depends(s.derivative, s.input[place]):
+    if each.order == RATE and body.motion not in names and ca.depends_on(s.derivative, s.input[place]):
         raise MeasurementError(
             f"signal '{each.signal}'",
             f"says how fast '{body.name}' moves, not where it is, and efforts depend on that",
@@ -319,8 +319,8 @@ def _says_something(block: Block, unknown: Collection[str]) -> bool:
     together = ca.vertcat(s.output, s.derivative)
     driving = [s.input[i] for i, name in enumerate(names) if name in block.drives]
     hidden = [s.input[i] for i, name in enumerate(names) if name in unknown]
-    return any(depends(together, symbol) for symbol in driving) and not any(
-        depends(together, symbol) for symbol in hidden
+    return any(ca.depends_on(together, symbol) for symbol in driving) and not any(
+        ca.depends_on(together, symbol) for symbol in hidden
     )
 
 
@@ -360,10 +360,10 @@ def _acting(model: FlatModel, drives: Sequence[Measured], efforts: Sequence[Meas
         motion, rate = states.index(body.motion), states.index(body.rate)
         fed = cut(model, [e.shown for e in acting], keep=True)
         inside = fed.symbols()
-        closed = depends(s.derivative[rate], s.state[motion])
-        if closed and not depends(inside.derivative[rate], inside.state[motion]):
+        closed = ca.depends_on(s.derivative[rate], s.state[motion])
+        if closed and not ca.depends_on(inside.derivative[rate], inside.state[motion]):
             places = {v.name: inside.input[i] for i, v in enumerate(fed.inputs)}
-            acting = [e for e in acting if not depends(inside.derivative[rate], places[e.shown])]
+            acting = [e for e in acting if not ca.depends_on(inside.derivative[rate], places[e.shown])]
     return acting
 
 
@@ -387,10 +387,10 @@ def _reading_block(model: FlatModel, target: Measured, given: Sequence[Measured]
     led = {name for each in given for name in _given(each)}
     own = ca.vertcat(*[s.derivative[i] for i, v in enumerate(model.states) if v.name not in led])
     torn = {v.name for v in model.signals} & set(inputs)
-    used = [m for m in given if m.shown not in torn or depends(own, s.input[inputs.index(m.shown)])]
+    used = [m for m in given if m.shown not in torn or ca.depends_on(own, s.input[inputs.index(m.shown)])]
     signal = target.signal
-    values = named(model, s) | {v.name: s.signal[i] for i, v in enumerate(model.signals)}
     tearing = _Tearing(model, s, used, signal)
+    values = tearing.known | {v.name: s.signal[i] for i, v in enumerate(model.signals)}
     part = top_part(target.shown)
     return tearing.block(_Result(part, model.variable(signal), values[signal], signal, None))
 
@@ -411,7 +411,7 @@ def _balance_block(
     output = f"{body.name}.unbalanced"
     s = model.symbols()
     tearing = _Tearing(model, s, given, output)
-    inertia = named(model, s)[str(body.inertia)]
+    inertia = tearing.known[str(body.inertia)]
     efforts = inertia * s.derivative[[v.name for v in model.states].index(body.rate)]
     seen = tearing.inferred(accelerated, 0) if accelerated else tearing.inferred(lead, 2 - lead.order)
     balance = inertia * seen - efforts
@@ -425,7 +425,7 @@ class _Tearing:
 
     def __init__(self, model: FlatModel, s: Symbols, given: Sequence[Measured], output: str) -> None:
         self._model, self._s, self._given, self._output = model, s, given, output
-        self._known = named(model, s)
+        self.known = named(model, s)
         self._drives: dict[str, Drive] = {}
         self._inputs: dict[str, tuple[Variable, Expression]] = {}
         self._replaced = dict(self._replacements())
@@ -443,8 +443,8 @@ class _Tearing:
 
     def inferred(self, measured: Measured, order: int) -> Expression:
         """Return what the sensors must have seen, or its derivative of that order."""
-        seen = measured.reading.inferred(self._reading(measured, 0), self._known)
-        value = behind_ratio(measured, seen, self._known)
+        seen = measured.reading.inferred(self._reading(measured, 0), self.known)
+        value = behind_ratio(measured, seen, self.known)
         if order == 0:
             return value
         # A reading is a static function of what it reads, so rates follow by its slope, which may change.
@@ -539,7 +539,7 @@ class _Tearing:
             ),
             drives=[self._reading(m, 0) for m in first],
             efforts=efforts,
-            inertia=self._known[str(body.inertia)],
+            inertia=self.known[str(body.inertia)],
         )
 
 

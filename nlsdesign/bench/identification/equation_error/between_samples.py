@@ -28,6 +28,7 @@ from ..filters import Smoothing, kernel
 from ..records.clocks import Resolution
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
+from .block_noise import BlockNoise
 from .block_response import DrivenBlock
 
 _RESOLVED = 0.05
@@ -102,6 +103,19 @@ def on_clock(records: RecordSet, step: float) -> RecordSet:
     )
     finer = tuple(refined(r, k) for r, k in zip(records.records, times, strict=True))
     return replace(records, records=finer, remarks=(*records.remarks, remark))
+
+
+def floor_on_clock(floor: BlockNoise, record: Record, width: float, step: float) -> BlockNoise:
+    """Return the same rows of a record with the same noise floor, made of what stands in between as well.
+
+    ``width``: standard deviation of the filter in s. ``step``: time between samples of the clock in s.
+    """
+    times = times_on(record, step)
+    if times == 1:
+        return floor
+    count = len(floor.raw_sigma)
+    raw = np.interp(np.arange((count - 1) * times + 1) / times, np.arange(count), floor.raw_sigma)
+    return replace(floor, filter=refined_filter(floor.filter, width / record.step, times), raw_sigma=raw)
 
 
 def times_on(record: Record, step: float) -> int:

@@ -58,6 +58,10 @@ class Block:
         equations = ca.Function("equations", columns, [s.derivative, output, s.signal, s.residual])
         return replace(self, model=replace(model, equations=equations), effort_per_drive=effort_per_drive)
 
+    def at_rest(self, count: int) -> Array:
+        """Return the inputs of the model where nothing drives them, shape (inputs, count)."""
+        return np.repeat(self.model.start(self.model.inputs)[:, None], count, axis=1)
+
     @property
     def unit(self) -> str:
         """Unit of the residual."""

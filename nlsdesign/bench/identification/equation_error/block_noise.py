@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -126,6 +126,13 @@ class BlockNoise:
     independent: float = math.inf
     known: float = math.inf
     covered: float = 1.0
+    # shares: of the variance of the floor, from the noise of each signal that is taken as it is
+    shares: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def typical(self) -> float:
+        """Noise floor over the rows, root mean square, in the unit of the block."""
+        return float(np.sqrt(np.mean(self.sigma**2)))
 
     @property
     def places(self) -> NDArray[np.int64]:
@@ -163,7 +170,7 @@ def noise_of_blocks(
         for record in records.deciding:
             if (block.name, record.name) in floors:
                 shifts = rectified(block, record, noise, filters[block.name].span)
-                most = _RECTIFIED * rmse(floors[block.name, record.name].sigma)
+                most = _RECTIFIED * floors[block.name, record.name].typical
                 straightened |= {name for name, shift in shifts.items() if shift > most}
         filters[block.name] = filters[block.name]._replace(straightened=tuple(sorted(straightened)))
     return filters, floors
@@ -185,6 +192,7 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     variance = np.full(gains.shape[1], own**2)
     raw = np.full(gains.shape[1], noise.deviation(block.target) ** 2 if block.target else 0.0)
     memory = list(noise.memory(block.target, step, width=width)) if block.target else []
+    powers = dict[str, float]()
     for i, variable in enumerate(block.model.inputs):
         drive = block.drives.get(variable.name)
         if drive is None:
@@ -199,6 +207,8 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
         variance += (gains[i] * behind) ** 2
         if order == 0:
             raw += (gains[i] * deviation) ** 2
+            power = float(np.nanmean(gains[i] ** 2)) * behind**2
+            powers[drive.signal] = powers.get(drive.signal, 0.0) + power
             parts = noise.memory(drive.signal, step, width=width)
             memory += [NoisePart(float(np.mean(gains[i] ** 2)) * p.variance, p.time) for p in parts]
     every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
@@ -212,7 +222,9 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     ]
     independent = independent_number(shares, len(rows.places), spacing) if shares else math.inf
     known = min(squares, default=math.inf)
-    return BlockNoise(rows, np.sqrt(variance[rows.places]), np.sqrt(raw), independent, known, covered)
+    sigma = np.sqrt(variance[rows.places])
+    own_shares = {signal: power / float(np.mean(sigma**2)) for signal, power in powers.items() if len(sigma)}
+    return BlockNoise(rows, sigma, np.sqrt(raw), independent, known, covered, own_shares)
 
 
 def _rows(
@@ -429,7 +441,7 @@ def _functions(block: Block) -> _BlockFunctions:
 def measured_inputs(block: Block, record: Record, span: float) -> Array:
     """Return the inputs of a block's model from a record, shape (inputs, n); those not measured rest."""
     model = block.model
-    inputs = np.repeat(model.start(model.inputs)[:, None], len(record.trace), axis=1)
+    inputs = block.at_rest(len(record.trace))
     for i, variable in enumerate(model.inputs):
         if variable.name in block.drives:
             drive = block.drives[variable.name]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....foundation.arrays import Array, Indices
 from ....foundation.errors import ConvergenceError, unknown_name
-from ....foundation.symbolic import Expression, dependence, depends
+from ....foundation.symbolic import Expression, dependence
 from ..filters import smoothed, without_rounding
 from ..records.measurement import Record
 from .batch import ChainFunction, ColumnFunction, PointFunction
@@ -106,11 +106,10 @@ class DrivenBlock:
         kept = {name for name in straightened if name in drives and not drives[name].shifted_by}
         self._straightened = [i for i, v in enumerate(block.model.inputs) if v.name in kept]
         e = _equations(block, self.free, self._straightened)
-        self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
-        self._shifted, self._digest_shifted = e.shifted, ColumnFunction(e.digest_shifted)
+        self._equations, self._size, self._shifted = e, e.state.numel(), e.shifted
         self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
-        self._output, self._plain_output = (ColumnFunction(each) for each in _output_functions(e))
-        self._equations = e
+        functions = (e.digest, e.digest_shifted, *_output_functions(e))
+        self._digest, self._digest_shifted, self._output, self._plain_output = map(ColumnFunction, functions)
         self._sloped = _sloped(block)
         self._walk: _Walk | None = None
         if self._size:
@@ -129,21 +128,22 @@ class DrivenBlock:
         at other values, where there are any; what no free delay shifts is that of these.
         """
         inputs, rates = self._inputs(record, values, smooth=self.stiff)
-        at = self._digested(inputs, rates, known and known.at)
+
+        def digested(inputs: Array, rates: Array, before: Array | None) -> Array:
+            """Return what neither states nor free parameters enter; what nothing shifts may be known."""
+            if before is None:
+                return self._digest(inputs.shape[1], [inputs, rates])
+            result = before.copy()
+            result[self._shifted] = self._digest_shifted(inputs.shape[1], [inputs, rates])
+            return result
+
+        at = digested(inputs, rates, known and known.at)
         corners = _corners(self.block, self._sloped, inputs, record.step)
         if corners is None:
             return Samples(at, at[:, :-1], at[:, 1:], record.step)
-        begin = self._digested(corners[0], rates[:, :-1], known and known.begin)
-        end = self._digested(corners[1], rates[:, 1:], known and known.end)
+        begin = digested(corners[0], rates[:, :-1], known and known.begin)
+        end = digested(corners[1], rates[:, 1:], known and known.end)
         return Samples(at, begin, end, record.step)
-
-    def _digested(self, inputs: Array, rates: Array, known: Array | None) -> Array:
-        """Return what neither states nor free parameters enter; what nothing shifts may be known."""
-        if known is None:
-            return self._digest(inputs.shape[1], [inputs, rates])
-        result = known.copy()
-        result[self._shifted] = self._digest_shifted(inputs.shape[1], [inputs, rates])
-        return result
 
     def _inputs(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> tuple[Array, Array]:
         """Return the inputs of the model, and the slopes by which late ones change with their delay.
@@ -152,7 +152,7 @@ class DrivenBlock:
         the place of the slope.
         """
         model, n = self.block.model, len(record.trace)
-        inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
+        inputs = self.block.at_rest(n)
         rates = np.zeros_like(inputs)
         for i, variable in enumerate(model.inputs):
             drive = self.block.drives.get(variable.name)
@@ -298,7 +298,7 @@ def _require_finite(block: Block, response: Array) -> None:
 
 def _rest(block: Block, rate_at: PointFunction, begin: Array, p: Array) -> Array:
     """Return the state in which a block rests at the first sample: bench records start at rest."""
-    x = block.model.start(block.model.states)
+    x = np.array([v.start for v in block.model.states])
     for _ in range(3):
         rate, slope = rate_at(x, begin, p)
         if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
@@ -331,7 +331,7 @@ def _sloped(block: Block) -> list[int]:
     s, drives = block.model.symbols(), block.drives
     names = [v.name for v in block.model.inputs]
     sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
-    moved = s.state.numel() and depends(s.derivative, ca.vertcat(*[s.input[i] for i in sloped]))
+    moved = s.state.numel() and ca.depends_on(s.derivative, ca.vertcat(*[s.input[i] for i in sloped]))
     return sloped if moved else []
 
 
@@ -353,7 +353,7 @@ def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
             raise unknown_name("parameter", name, names)
     together = ca.vertcat(s.output, s.derivative) if s.state.numel() else s.output
     late = {name for d in block.drives.values() for name in d.shifted_by}
-    return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))
+    return tuple(n for n in free if n in late or ca.depends_on(together, s.parameter[names.index(n)]))
 
 
 def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -> _Equations:
@@ -367,7 +367,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     now, moved = ca.SX.sym("now", len(late)), list[Expression]()
     together = ca.vertcat(s.derivative, s.output) if s.state.numel() else s.output
     fixed = ca.vertcat(*[s.parameter[i] for i in rest])
-    together = ca.substitute(together, fixed, ca.DM(model.start(model.parameters)[rest]))
+    together = ca.substitute(together, fixed, ca.DM(np.array([model.parameters[i].start for i in rest])))
     for i, variable in enumerate(model.inputs):
         drive = block.drives.get(variable.name)
         if drive in late:
@@ -386,7 +386,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     core, symbols, parts = ca.extract_parametric(together, given)
     core = ca.cse(core)
     # Inputs that stand alone, as a factor of a parameter, are not extracted: they pass as they are.
-    bare = [given[i] for i in range(given.numel()) if depends(core, given[i])]
+    bare = [given[i] for i in range(given.numel()) if ca.depends_on(core, given[i])]
     aliases = [ca.SX.sym(f"bare_{k}") for k in range(len(bare))]
     core = ca.substitute(core, ca.vertcat(*bare), ca.vertcat(*aliases)) if bare else core
     symbols, parts = [*symbols, *aliases], [*parts, *bare]

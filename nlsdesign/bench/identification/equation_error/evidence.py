@@ -16,7 +16,7 @@ from ..filters import derivative, every
 from ..records.measurement import Record, RecordSet, in_canonical_order
 from ..records.quality import Finding
 from ..records.sampling import Sampling
-from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
+from .between_samples import BlockRecord, floor_on_clock, on_clock, resolving_step
 from .block import Block
 from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
@@ -31,15 +31,6 @@ _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
 _REMEMBERED = 4
 """Last answers of a record that are kept: a fit ends a few steps that failed before its last."""
-
-
-def _on_clock(floor: BlockNoise, width: float, times: int) -> BlockNoise:
-    """Return the same rows with the same noise floor, made of several samples in the place of one."""
-    if times == 1:
-        return floor
-    count = len(floor.raw_sigma)
-    raw = np.interp(np.arange((count - 1) * times + 1) / times, np.arange(count), floor.raw_sigma)
-    return replace(floor, filter=refined_filter(floor.filter, width, times), raw_sigma=raw)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +132,8 @@ class Bench:
         self.clock = clock
         for (block_name, record_name), floor in self.floors.items():
             record = next(r for r in self.records.records if r.name == record_name)
-            width = self.filters[block_name].width / record.step
-            self.floors[block_name, record_name] = _on_clock(floor, width, times_on(record, clock))
+            width = self.filters[block_name].width
+            self.floors[block_name, record_name] = floor_on_clock(floor, record, width, clock)
         self.records = on_clock(self.records, clock)
 
     def with_records(self, records: RecordSet) -> Bench:

@@ -32,7 +32,6 @@ from scipy.linalg import solve_triangular
 from ....foundation.arrays import Array
 from ..filters import derivative
 from ..records.measurement import Record, RecordSet
-from .block_noise import measured_inputs, output_slopes
 from .inferred_sampling import SeenBlock, freed, functions_of_motion, rows_of
 from .noise import Band, Colour, Noise, NoisePart, Stretch, bands_of, fitted_at, scatter
 
@@ -124,7 +123,7 @@ class _Signal(NamedTuple):
         """Return the colour of the signal in each record that shows it; none where one contradicts."""
         block, filters, floors = seen
         chosen = [record for record in self.records if record.name in floors]
-        shares = {record.name: self.share(seen, record) for record in chosen}
+        shares = {record.name: floors[record.name].shares.get(self.name, 0.0) for record in chosen}
         if not shares or float(np.mean(list(shares.values()))) < _OWN:
             return {}
         rows = rows_of(seen, chosen, [{}], functions_of_motion)
@@ -146,17 +145,6 @@ class _Signal(NamedTuple):
                     return {}
                 colours[record.name] = colour
         return colours
-
-    def share(self, seen: SeenBlock, record: Record) -> float:
-        """Return the share of the variance of a block's floor that comes from the noise of the signal."""
-        block, filters, floors = seen
-        stride = max(1, round(filters.spacing / record.step))
-        gains = output_slopes(block, measured_inputs(block, record, filters.span), stride)
-        behind = self.noise.behind(self.name, record.step, width=filters.width)
-        names = [v.name for v in block.model.inputs]
-        driven = [names.index(n) for n, d in block.drives.items() if d.signal == self.name and d.order == 0]
-        power = sum((float(np.nanmean(gains[k] ** 2)) for k in driven), 0.0)
-        return power * behind**2 / float(np.mean(floors[record.name].sigma ** 2))
 
     def likeliest(self, record: Record, rows: _Rows, bands: Sequence[Band]) -> tuple[Colour, Array]:
         """Return the colour by bands above all motion and rows of a block, and these rows whitened."""

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from ....foundation.symbolic import Expression, depends
+from ....foundation.symbolic import Expression
 
 _HALVINGS = 8
 _SHORT = 200
@@ -43,7 +43,7 @@ class Stage(NamedTuple):
 def stages_of(derivative: Expression, state: Expression, moving: Expression) -> list[Stage]:
     """Return the stages, earlier ones first."""
     n = state.numel()
-    coupled = np.array([[depends(derivative[i], state[j]) for j in range(n)] for i in range(n)])
+    coupled = np.array([[ca.depends_on(derivative[i], state[j]) for j in range(n)] for i in range(n)])
     count, label = connected_components(coupled, directed=True, connection="strong")
     groups = [[i for i in range(n) if label[i] == k] for k in range(count)]
     acts_on = {
@@ -57,7 +57,7 @@ def stages_of(derivative: Expression, state: Expression, moving: Expression) -> 
     for k in order:
         inside = ca.vertcat(*[state[i] for i in groups[k]])
         slope = ca.jacobian(ca.vertcat(*[derivative[i] for i in groups[k]]), inside)
-        ordered.append(Stage(groups[k], not depends(slope, ca.vertcat(state, moving))))
+        ordered.append(Stage(groups[k], not ca.depends_on(slope, ca.vertcat(state, moving))))
     return ordered
 
 
