@@ -60,8 +60,8 @@ class PoleError(NamedTuple):
         elif self.percent_after > FOREIGN:
             yield (
                 f"{name}: with fitted poles the torque is still {three_digits(self.percent_after)} % off, "
-                f"with the gain of the cascade {self.ratio:.3g} times what is shown: this is not the torque of "
-                "the deck -> check sign, unit and mapping of torque or force, and of the angle"
+                f"with the gain of the cascade {self.ratio:.3g} times what is shown: this is not the torque "
+                "of the deck -> check sign, unit and mapping of torque or force, and of the angle"
             )
         if self.after > self.before:
             yield (

@@ -205,7 +205,7 @@ def test_poles_that_are_unstable_between_two_points_of_the_table_are_refused(
         fit_poles(model, bench, choice=COARSE)
 
 
-POLES = (-34.0 + 155.0j, -34.0 - 155.0j, -1500.0, -94.0)
+POLES = (-34.0 - 155.0j, -34.0 + 155.0j, -1500.0, -94.0)
 
 
 @pytest.fixture
@@ -229,7 +229,7 @@ def over(bench: RecordSet, *records: Record) -> RecordSet:
 def test_a_record_that_begins_in_motion_is_judged_after_the_observers_have_settled(
     monkeypatch: pytest.MonkeyPatch, model: FlatModel, bench: RecordSet
 ) -> None:
-    """The last third of a sine, as it is held out by default: what the start at rest makes of it is no error."""
+    """The last third of a sine, as it is held out by default: a start at rest is not its error."""
     sine = bench.of("selection")[0]
     third = 2 * len(sine.trace) // 3
     records = over(bench, changed(sine, "fit"), changed(sine, "held_out", rows=slice(third, None)))
