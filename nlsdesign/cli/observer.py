@@ -152,7 +152,7 @@ def observer(
     if proved is not None:
         files.insert(0, proved.write_beside(source.header, source.source))
     statement = () if proved is None else proved.statement
-    remarks = range_remarks(declared, measured=options["measured"])
+    remarks = [*range_remarks(declared, measured=options["measured"]), *(fitted.remarks if fitted else ())]
     warn(remarks)
     sentences = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
     if errors is not None:

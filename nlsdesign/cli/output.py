@@ -42,8 +42,9 @@ def line_width() -> int:
 
 
 def show_json(content: Mapping[str, Any]) -> None:
-    """Print a mapping as JSON."""
-    click.echo(json.dumps(content, indent=2, ensure_ascii=False, default=_plain))
+    """Print a mapping as JSON, which has no number that is not finite: null stands there."""
+    valid = json.loads(json.dumps(content, default=_plain), parse_constant=lambda constant: None)
+    click.echo(json.dumps(valid, indent=2, ensure_ascii=False))
 
 
 def _plain(value: Any) -> Any:

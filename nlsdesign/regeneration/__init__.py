@@ -7,11 +7,11 @@ Presentation and commands may import it; it decides nothing that a room below ca
 
 from .exported_machine import MACHINE as MACHINE
 from .exported_machine import export_machine
-from .fitted_poles import FittedPoles as FittedPoles
 from .fitted_poles import fit_poles
 from .flash import require_flash as require_flash
 from .flash import sized_observer
 from .loadable_code import CodeRecipe, SameTable, block_for
+from .pole_errors import FittedPoles as FittedPoles
 from .range_remarks import beyond_contour as beyond_contour
 from .range_remarks import range_remarks
 from .range_remarks import swept_angle as swept_angle

@@ -10,16 +10,15 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..bench.identification import RecordSet, agreement, rmse
+from ..bench.identification import RecordSet, rmse
 from ..bench.identification.multiple_shooting import least_by_cma
 from ..feedback.observer import (
-    DesignedObserver,
     FixedGrid,
     ObserverDesign,
     PaperForm,
@@ -31,10 +30,9 @@ from ..feedback.observer.scheduling.scheduled import check_stability, whole_cont
 from ..feedback.observer.scheduling.table import ColumnPlace, Compact, Draft, Entries, linearly
 from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError, MeasurementError, unknown_name
-from ..foundation.quantity import three_digits, typeset_unit
-from ..foundation.written_numbers import shared_prefix
 from ..model import FlatModel
 from ..model.roles import measured_motion, series_spring
+from .pole_errors import FittedPoles, PoleError, slowest_decay
 from .watched_records import ObserverChoice, WatchedRecord
 
 SEARCHES = ("gradient", "cma")
@@ -48,85 +46,16 @@ DAMPING = (0.1, 10.0)
 _SHARES, _NEARLY = ((0.01, 0.012, 0.3, 0.06), (0.1, 0.15, 0.2, 0.06)), 0.999
 """First poles as shares of the fastest that the sample rate carries: slow but for one, and fast; the last
 is that of the extension. And the share up to which a search may go."""
+SETTLED = 10.0
+"""Slowest time constants of the gain of the cascade after which errors count: less than a hundredth is left
+of a start, also with poles half as fast."""
 _FREE = 3
 """Poles of force, angle and speed."""
 _STEPS, _ENOUGH, _SIMULATIONS, _SEED = 40, 1e-5, 400, 1
+_AT_END = 1e-2
+"""Distance to the end of its range, as a share, within which a pole is at it."""
 _AT_ONCE = 500
 """Samples in one call; a function for a whole record takes longer to make than to run."""
-
-
-class PoleError(NamedTuple):
-    """Error of the estimated torque on one record: rms in its unit, and average percent relative error."""
-
-    record: str
-    role: str
-    # before, after: with the gain of the cascade, and with the fitted poles
-    before: float
-    after: float
-    percent_before: float
-    percent_after: float
-
-
-@dataclass(frozen=True, eq=False)
-class FittedPoles:
-    """The published observer with poles that were fitted to records."""
-
-    design: ObserverDesign
-    # poles: in 1/s, of what is seen through the angle; the last is that of the extension
-    poles: tuple[complex, ...]
-    # worst: angle in rad, at or between points of the table, where the error decays most slowly, and the
-    # spectral radius there
-    worst: tuple[float, float]
-    errors: tuple[PoleError, ...]  # by record; those that were held out decided nothing
-    deciding: str  # role of the records by which one of several fits was taken
-    evaluations: int  # how often records were simulated by the search
-    by: str  # how the poles were sought; one of SEARCHES
-
-    @property
-    def margin(self) -> float:
-        """Least decay of the error at a standing angle, in 1/s."""
-        return -math.log(self.worst[1]) / self.design.step.sample_time
-
-    @property
-    def reason(self) -> str:
-        """The poles and their margin in a sentence."""
-        names = self.design.step.plant.names
-        order = [
-            *(n for n in names if n not in self.design.step.plant.measured),
-            *self.design.step.plant.measured,
-        ]
-        placed = ", ".join(f"{p:.4g}" for p in self.poles)
-        return (
-            f"poles at {placed} 1/s for {', '.join(order)}, fitted by {self.by}; at a standing angle the "
-            f"error decays with at least {self.margin:.3g} 1/s (spectral radius {self.worst[1]:.5f} at "
-            f"{self.worst[0]:.3g} rad), of a moving one nothing is proved"
-        )
-
-    @property
-    def observer(self) -> DesignedObserver:
-        """The observer as commands write it."""
-        return DesignedObserver("published", self.design, self.reason)
-
-    def shown(self) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
-        """Return title, heads and rows of the table of errors."""
-        unit = typeset_unit(self.design.step.plant.estimate.unit)
-        factor, prefixed = shared_prefix([e.after for e in self.errors], unit)
-        heads = ("record", "role", f"{prefixed} rms", "fitted", "average relative error, %", "fitted")
-        rows = [
-            (e.record, e.role.replace("_", " "), *(three_digits(factor * v) for v in e[2:4]),
-             *(three_digits(v) for v in e[4:]))
-            for e in self.errors
-        ]  # fmt: skip
-        return "Torque error, with the gain of the cascade and with fitted poles", heads, rows
-
-    def content(self) -> dict[str, Any]:
-        """Return everything as JSON has it."""
-        return {
-            "poles": [[complex(p).real, complex(p).imag] for p in self.poles],
-            "by": self.by, "decided_by": self.deciding,
-            "least_decay": self.margin, "spectral_radius": self.worst[1], "at_angle": self.worst[0],
-            "simulations": self.evaluations, "errors": [error._asdict() for error in self.errors],
-        }  # fmt: skip
 
 
 def fit_poles(
@@ -139,10 +68,14 @@ def fit_poles(
 ) -> FittedPoles:
     """Fit the poles of the published observer to the torque that records show.
 
-    Least squares of the torque error over the records of the role ``fit``, all begun at rest at their first
-    angle. Searches from several first poles end at several fits; the one that errs least on the records of
-    the role ``selection`` is taken, or on those of the fit where there are none. The pole of the extension
-    moves no torque and stays. Poles are real.
+    Least squares of the torque error over the records of the role ``fit``. Searches from several first poles
+    end at several fits; the one that errs least on the records of the role ``selection`` is taken, or on
+    those of the fit where there are none. The pole of the extension moves no torque and stays. The first two
+    poles may become a complex pair; the third is real.
+
+    Every run begins at rest at its first angle, and a record may begin in motion. So no error counts, in the
+    fit or anywhere, before ten slowest time constants of the gain of the cascade, or before a quarter of the
+    record if that is sooner: the same samples for all poles.
 
     Parameters
     ----------
@@ -153,21 +86,23 @@ def fit_poles(
     choice
         What is estimated; by default the torque of the series spring, every millisecond.
     first
-        Poles at which the search begins, in 1/s, one per state, negative; several sets by default.
+        Poles at which the search begins, in 1/s, in the order of the result: of force, angle, speed and
+        extension. Each has a negative real part; only the first two may be a complex pair. By default two
+        sets.
     by
         ``"gradient"`` for Gauss–Newton steps with exact slopes, or ``"cma"`` for CMA-ES.
 
     Returns
     -------
     FittedPoles
-        The observer, how far its error is from unstable, and its errors before and after, by record.
+        The observer, how far its error is from unstable, its errors before and after by record, and remarks.
 
     Raises
     ------
     UnknownNameError
         If there is no such search.
     MeasurementError
-        If no record may be fitted, or a record lacks a signal; it is named.
+        If no record may be fitted, those of the fit show no torque, or a record lacks a signal; it is named.
     ValueRangeError
         If the first poles are not one per state, not stable, or faster than the sample rate carries.
     ArrangementError
@@ -183,7 +118,8 @@ def fit_poles(
     spring = series_spring(model, choice.spring)
     names = _Question(model, spring.effort, measured_motion(model, choice.measured), choice.sample_time)
     published = names.designed(None)
-    runs = [WatchedRecord.of(model, spring, record, choice) for record in records.records]
+    settling = SETTLED / slowest_decay(check_stability(published.model).worst, published)
+    runs = [WatchedRecord.of(model, spring, r, choice).settled(settling) for r in records.records]
     for run in runs:
         if lacking := run.lacks(published):
             raise MeasurementError(
@@ -195,17 +131,22 @@ def fit_poles(
         raise MeasurementError(
             "records", "none has the role 'fit'", next_step="hold out fewer of them, so that one is fitted"
         )
+    if not any(np.any(run.torque) for run in of["fit"]):
+        raise MeasurementError(
+            f"records {', '.join(run.record.name for run in of['fit'])}",
+            "no torque in the records: it is zero everywhere",
+            next_step="map the column of torque or force, and look whether its sensor was on",
+        )
     search = _Search(names, published.step.plant, of["fit"], first)
     logs = search.by_cma() if by == "cma" else search.by_gradient()
     deciding = "selection" if of["selection"] else "fit"
     ranked = sorted(logs, key=lambda x: search.error(x, of[deciding]))
     poles, design, worst = names.stable([search.poles(x)[0] for x in ranked])
-    errors = []
-    for run in runs:
-        before, after = (agreement(run.torque, run.estimate(it)) for it in (published, design))
-        sizes = (before.rmse, after.rmse, before.relative, after.relative)
-        errors.append(PoleError(run.record.name, run.record.role, *sizes))
-    return FittedPoles(design, poles, worst, tuple(errors), deciding, search.evaluations, by)
+    errors = tuple(PoleError.of(run, published, design) for run in runs)
+    about = [*map(str, (*records.findings, *records.remarks))]
+    about += [text for run, error in zip(runs, errors, strict=True) for text in error.remarks(model, run)]
+    how = (deciding, search.evaluations, by, search.at_end(poles))
+    return FittedPoles(design, poles, worst, errors, settling, *how, tuple(about))
 
 
 class _Question(NamedTuple):
@@ -291,6 +232,13 @@ class _Search:
         inside: Array = np.clip(numbers, *self.ends)
         return inside
 
+    def at_end(self, poles: Sequence[complex]) -> tuple[str, ...]:
+        """Return the states whose poles lie at an end of the range of the search."""
+        ended = np.min(np.abs(self.ends - self.begin(poles)), axis=0) < _AT_END
+        both = ended[0] or ended[1]
+        states = self.design.step.plant.pole_order[:_FREE]
+        return tuple(n for n, at in zip(states, (both, both, ended[2]), strict=True) if at)
+
     def poles(self, numbers: Array) -> tuple[tuple[complex, ...], Array]:
         """Return the poles, of which that of the extension stays, and the slopes of the others."""
         size, damping, alone = np.exp(numbers).tolist()
@@ -332,11 +280,11 @@ class _Search:
     def errors(
         self, numbers: Array, runs: Sequence[WatchedRecord], *, slopes: bool = True
     ) -> tuple[Array, Array]:
-        """Return estimate minus torque over all samples, and its slopes, shape (n, 3)."""
+        """Return estimate minus torque over the samples that count, and its slopes, shape (n, 3)."""
         self.evaluations += 1
         poles, paces = self.poles(numbers)
         if max(map(abs, poles)) > self.fastest:
-            return np.full(sum(len(run.torque) for run in runs), np.inf), np.zeros(0)
+            return np.full(sum(len(run.torque) - run.skipped for run in runs), np.inf), np.zeros(0)
         placed = [PolePlacement(poles).with_slopes(plant) for plant in self.plants]
         gain = np.array([m.ravel() for m, _ in placed])
         by_pole = np.array([s.reshape(len(s), -1) for _, s in placed])
@@ -353,7 +301,7 @@ class _Search:
                 begun.get(v.name, 0.0) for v in self.design.model.states
             ]
             shown = _along(self.steps[slopes], memory, np.vstack([inputs, table, *moved]))
-            parts.append(np.vstack([shown[0] - run.torque, shown[1:]]))
+            parts.append(np.vstack([shown[0] - run.torque, shown[1:]])[:, run.skipped :])
         both = np.hstack(parts)
         return both[0], both[1:].T
 

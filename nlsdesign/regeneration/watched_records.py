@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import casadi as ca
@@ -50,6 +50,7 @@ class WatchedRecord:
     readings: Mapping[str, str]
     motion: str
     silent: tuple[str, ...]
+    skipped: int = 0  # first samples that count in no error
 
     @classmethod
     def of(cls, model: FlatModel, spring: SpringNames, record: Record, choice: ObserverChoice) -> Self:
@@ -72,6 +73,14 @@ class WatchedRecord:
         """Root mean square of the torque."""
         return float(np.sqrt(np.mean(self.torque**2)))
 
+    def settled(self, time: float) -> Self:
+        """Return the record whose errors count after a time in s, or after a quarter of it if that is sooner.
+
+        Observers begin at rest; a record may begin in motion, and so does each that was cut in time.
+        """
+        first = int(np.searchsorted(self.trace.time, self.trace.time[0] + time))
+        return replace(self, skipped=min(first, len(self.torque) // 4))
+
     def lacks(self, design: ObserverDesign | CorrectedDesign) -> list[str]:
         """Return inputs of an observer that the record does not measure."""
         return [v.name for v in design.model.inputs if v.name in self.silent]
@@ -90,7 +99,7 @@ class WatchedRecord:
 
     def error(self, estimate: Array) -> float:
         """Return the root mean square error of an estimate."""
-        return float(np.sqrt(np.mean((estimate - self.torque) ** 2)))
+        return float(np.sqrt(np.mean((estimate - self.torque)[self.skipped :] ** 2)))
 
 
 _TORQUE = "torque behind the readings"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -11,6 +13,7 @@ import pytest
 from nlsdesign import declare, flatten, load_deck
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.records.mapping import Column
+from nlsdesign.bench.identification.records.quality import Finding
 from nlsdesign.components import CurrentSensor, ForceSensor
 from nlsdesign.feedback.observer.scheduling.scheduled import error_matrices
 from nlsdesign.foundation.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError
@@ -85,7 +88,7 @@ def test_the_error_printed_is_that_of_the_observer_that_is_written(
     plant = fitted.design.step.plant
     run = fitted_poles.WatchedRecord.of(
         model, fitted_poles.series_spring(model, None), bench.of("fit")[0], COARSE
-    )
+    ).settled(fitted.settling)
     search = fitted_poles._Search(question, plant, [run], fitted.poles)
     numbers = search.begin(fitted.poles)
     assert search.error(numbers, [run]) == pytest.approx(fitted.errors[0].after, rel=1e-6)
@@ -136,6 +139,7 @@ def selected(fit: FittedPoles, model: FlatModel, bench: RecordSet) -> float:
     """Error on the record that selects."""
     spring = fitted_poles.series_spring(model, None)
     run = fitted_poles.WatchedRecord.of(model, spring, bench.of("selection")[0], COARSE)
+    run = run.settled(fit.settling)
     return run.error(run.estimate(fit.design))
 
 
@@ -199,3 +203,120 @@ def test_poles_that_are_unstable_between_two_points_of_the_table_are_refused(
     )
     with pytest.raises(ConvergenceError, match=r"leave an error that grows at .* rad"):
         fit_poles(model, bench, choice=COARSE)
+
+
+POLES = (-34.0 - 155.0j, -34.0 + 155.0j, -1500.0, -94.0)
+
+
+@pytest.fixture
+def searched_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Poles of a fit to the record of 5 Hz, without the search."""
+    monkeypatch.setattr(fitted_poles._Search, "by_gradient", lambda self: [self.begin(POLES)])
+
+
+def changed(record: Record, role: str, *, rows: slice = slice(None), **times: float) -> Record:
+    """Return rows of a record with another role, a signal of it times a number."""
+    trace = record.trace
+    signals = {n: times.get(n.partition(".")[0], 1.0) * v[rows] for n, v in trace.signals.items()}
+    return replace(record, role=role, trace=Trace(trace.time[rows], signals, trace.units))
+
+
+def over(bench: RecordSet, *records: Record) -> RecordSet:
+    return replace(bench, records=records)
+
+
+@pytest.mark.usefixtures("searched_nothing")
+def test_a_record_that_begins_in_motion_is_judged_after_the_observers_have_settled(
+    monkeypatch: pytest.MonkeyPatch, model: FlatModel, bench: RecordSet
+) -> None:
+    """The last third of a sine, as it is held out by default: a start at rest is not its error."""
+    sine = bench.of("selection")[0]
+    third = 2 * len(sine.trace) // 3
+    records = over(bench, changed(sine, "fit"), changed(sine, "held_out", rows=slice(third, None)))
+    fitted = fit_poles(model, records, choice=COARSE)
+    moving = fitted.errors[1]
+    assert moving.after < moving.before
+    assert not fitted.remarks
+    assert fitted.content()["settling_time"] == fitted.settling
+    assert f"from {1e3 * fitted.settling:.3g} ms on" in fitted.shown()[0]
+    monkeypatch.setattr(fitted_poles, "SETTLED", 0.0)
+    spoiled = fit_poles(model, records, choice=COARSE)
+    assert spoiled.errors[1].after > 3.0 * moving.after
+    assert any(
+        "(first" not in r and "the fit makes it worse" in r and "held out" in r for r in spoiled.remarks
+    )
+
+
+def test_the_same_samples_count_for_all_poles_and_no_more_than_a_quarter_does_not(
+    model: FlatModel, bench: RecordSet
+) -> None:
+    question = fitted_poles._Question(model, "spring.torque", "motor.angle", COARSE.sample_time)
+    plant = question.designed(None).step.plant
+    spring = fitted_poles.series_spring(model, None)
+    whole = fitted_poles.WatchedRecord.of(model, spring, bench.of("fit")[0], COARSE)
+    count = len(whole.torque)
+    assert whole.settled(0.1).skipped == round(0.1 / COARSE.sample_time)
+    run = whole.settled(1e3)
+    assert run.skipped == count // 4
+    search = fitted_poles._Search(question, plant, [run], POLES)
+    faster = search.begin(POLES)
+    errors, slopes = search.errors(faster, [run])
+    assert (len(errors), len(slopes)) == (count - run.skipped,) * 2
+    assert np.array_equal(errors, search.errors(faster, [whole])[0][run.skipped :])
+    refused = search.errors(np.log([9000.0, 1.0, 10.0]), [run])[0]
+    assert refused.shape == errors.shape
+    assert np.all(np.isinf(refused))
+
+
+def test_no_torque_in_the_records_is_refused(model: FlatModel, bench: RecordSet) -> None:
+    with pytest.raises(MeasurementError, match=r"records sine_2\.0Hz: no torque in the records.* -> map"):
+        fit_poles(model, over(bench, changed(bench.of("fit")[0], "fit", load_cell=0.0)), choice=COARSE)
+
+
+@pytest.mark.usefixtures("searched_nothing")
+@pytest.mark.parametrize(
+    ("role", "factors", "words"),
+    [
+        ("fit", {"load_cell": -1.0}, r"still [\d.]+ % off, .*-\d.* times what is shown.*check sign, unit"),
+        ("fit", {"load_cell": 1e3}, r"still 99\.9 % off.*not the torque of the deck"),
+        ("held_out", {"load_cell": 0.0}, r"no torque in it"),
+        (
+            "fit",
+            {"motor_encoder": 6.0},
+            r"goes to \d+\.?\d*°, the contour of .* ends at 65°.*mapping of the angle",
+        ),
+    ],
+)
+def test_records_that_do_not_show_the_torque_of_the_deck_are_remarked(
+    model: FlatModel, bench: RecordSet, role: str, factors: dict[str, float], words: str
+) -> None:
+    sine = bench.of("selection")[0]
+    strange = replace(changed(sine, role, **factors), name="strange")
+    fitted = fit_poles(model, over(bench, changed(sine, "fit"), strange), choice=COARSE)
+    assert any(re.search(f"record 'strange': .*{words}", remark) for remark in fitted.remarks), fitted.remarks
+    assert not any(remark.startswith("record 'sine") for remark in fitted.remarks)
+
+
+@pytest.mark.usefixtures("searched_nothing")
+def test_the_order_of_the_poles_is_one_and_so_is_what_is_at_an_end(
+    monkeypatch: pytest.MonkeyPatch, model: FlatModel, bench: RecordSet
+) -> None:
+    order = ("spring.rubber.force", "motor.angle", "motor.speed", "spring.rubber.extension")
+    with pytest.raises(ValueRangeError, match=f"one per state: {', '.join(order)}"):
+        fit_poles(model, bench, choice=COARSE, first=(-50.0, -60.0, -200.0))
+    for wrong, words in ((math.nan, "not nan for motor.angle"), (1.0, "not 1 for motor.angle")):
+        with pytest.raises(ValueRangeError, match=f"{words}; they stand for {', '.join(order)}"):
+            fit_poles(model, bench, choice=COARSE, first=(-50.0, wrong, -200.0, -94.0))
+    noted = replace(
+        over(bench, changed(bench.of("fit")[0], "fit")), remarks=(Finding("sine.csv", "3 masked"),)
+    )
+    fitted = fit_poles(model, noted, choice=COARSE, first=POLES)
+    assert fitted.poles == pytest.approx(POLES)
+    assert fitted.at_end == ()
+    assert fitted.remarks[0] == "sine.csv: 3 masked"
+    assert f"for {', '.join(order)}, fitted by gradient, not fitted for {order[3]};" in fitted.reason
+    assert str(fitted) == repr(fitted) == f"FittedPoles: {fitted.reason}"
+    monkeypatch.setattr(fitted_poles._Search, "by_gradient", lambda self: [self.ends[1] - [3.0, 0.5, 0.0]])
+    ended = fit_poles(model, noted, choice=COARSE)
+    assert ended.at_end == ("motor.speed",)
+    assert "at the end of its range for motor.speed, not fitted" in ended.reason

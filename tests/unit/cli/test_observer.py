@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from nlsdesign.cli.observer import SEARCHES
 from nlsdesign.cli.options import KINDS
+from nlsdesign.cli.output import show_json
 from nlsdesign.components import CurrentSensor, ForceSensor
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.feedback.observer import choose_observer, designed_observer
@@ -73,7 +76,7 @@ def test_poles_are_fitted_to_records(run: Run, tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(fitted_poles, "_STEPS", 3)
     bench = Path(__file__).parents[3] / "studies" / "austin2015_bench"
     (tmp_path / "bench").mkdir()
-    mapping = (bench / "records.toml").read_text("utf-8").replace('["hold", "sine_2.0Hz"]', '["sine_2.0Hz"]')
+    mapping = (bench / "records.toml").read_text("utf-8").replace('held_out = ["hold", "sine_2.0Hz"]', "")
     (tmp_path / "bench" / "records.toml").write_text(mapping, "utf-8")
     for name in ("sine_2.0Hz.csv", "sine_5.0Hz.csv"):
         (tmp_path / "bench" / name).write_text((bench / name).read_text("utf-8"), "utf-8")
@@ -86,8 +89,11 @@ def test_poles_are_fitted_to_records(run: Run, tmp_path: Path, monkeypatch: pyte
     asked = ("observer", "--deck", "d.toml", "--kind", "published", "--fit-poles", "bench", "--out", "o")
     status, out, err = run(*asked)
     assert status == 0, err
-    assert "fitted by gradient; at a standing angle the error decays with at least" in out
+    decay = "not fitted for spring.rubber.extension; at a standing angle the error decays with at least"
+    assert f"fitted by gradient, {decay}" in out
     assert "average relative error, %" in out
+    assert "ms on, after the observers have settled (a quarter of a record at most)" in out
+    assert "warning: records: held out by default: " in err
     assert "held out" in out
     head = (tmp_path / "o" / "observer.h").read_text("utf-8").splitlines()[0]
     assert "poles at" in head
@@ -100,6 +106,22 @@ def test_poles_are_fitted_to_records(run: Run, tmp_path: Path, monkeypatch: pyte
         status, _, err = run(*wrong)
         assert status == 2
         assert "--fit-poles" in err
+    status, _, err = run(*asked, "--hold-out", "*")
+    assert status == 2
+    assert "none is left for fitting -> hold out fewer records (--hold-out, " in err
+    status, _, err = run(*asked[:6], "bench/sine_2.0Hz.csv")
+    assert status == 2
+    assert "is a file, no folder -> name the folder of the records: bench" in err
+
+
+def test_json_has_no_number_that_is_not_finite(capsys: pytest.CaptureFixture[str]) -> None:
+    show_json({"errors": [{"percent": math.nan}, math.inf, -math.inf, np.array([1.5, np.nan])], 3: "NaN"})
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    content = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert content == {"errors": [{"percent": None}, None, None, [1.5, None]], "3": "NaN"}
 
 
 def test_the_searches_of_the_option_are_those_of_the_fit() -> None:

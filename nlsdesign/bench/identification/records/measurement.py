@@ -584,7 +584,10 @@ def split(
     roles: dict[str, Role] = dict.fromkeys(compared, "selection")
     roles.update(dict.fromkeys(chosen, "held_out"))
     if len(roles) == len(names):
-        raise MeasurementError("records", "none is left for fitting", next_step="hold out fewer records")
+        raise MeasurementError(
+            "records", "none is left for fitting",
+            next_step="hold out fewer records (--hold-out, or held_out and selection in records.toml)",
+        )  # fmt: skip
     return tuple(replace(r, role=roles.get(r.name, "fit")) for r in records)
 
 

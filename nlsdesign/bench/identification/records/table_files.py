@@ -191,6 +191,10 @@ def table_files(folder: Path) -> list[Path]:
             did_you_mean=next(iter(near), None),
             next_step="name the folder of the records",
         )
+    if folder.is_file():
+        raise MeasurementError(
+            str(folder), "is a file, no folder", next_step=f"name the folder of the records: {folder.parent}"
+        )
     files = sorted(f for f in folder.glob("[!.]*") if _is_record(f))
     if not files:
         raise MeasurementError(

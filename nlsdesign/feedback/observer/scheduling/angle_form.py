@@ -81,6 +81,11 @@ class AngleScheduledPlant:
         return self.names.index(self.angle), self.names.index(self.speed)
 
     @property
+    def pole_order(self) -> tuple[str, ...]:
+        """Names of the states as poles are given for them: what is measured besides the angle stands last."""
+        return (*(name for name in self.names if name not in self.measured), *self.measured)
+
+    @property
     def output_matrix(self) -> Array:
         """C, shape (r, n): the angle first, then what else is measured."""
         places = [self.names.index(name) for name in (self.angle, *self.measured)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -317,10 +317,10 @@ class PolePlacement:
         ValueRangeError
             As :meth:`correction`.
         """
-        self._check(plant)
         output, time = plant.output_matrix, plant.sample_time
         beside = [int(np.argmax(row)) for row in output[1:]]
         chain = [i for i in range(len(plant.a)) if i not in beside]
+        self._check(plant, [plant.names[i] for i in (*chain, *beside)])
         poles: Spectrum = np.array(self.poles, dtype=np.complex128)
         scale = plant.sizes[chain]
         a, c = plant.a[np.ix_(chain, chain)] * scale / scale[:, None], output[0, chain] * scale
@@ -348,14 +348,21 @@ class PolePlacement:
         both: Spectrum = np.asarray(np.linalg.solve(plant.transition, gain), dtype=np.complex128)
         return both[0].real, both[1:]
 
-    def _check(self, plant: SampledPlant) -> None:
+    def _check(self, plant: SampledPlant, order: Sequence[str]) -> None:
         """Refuse poles that are not one per state, not stable, or faster than the sample rate carries."""
         poles = np.array(self.poles)
-        if len(poles) != len(plant.a) or np.any(poles.real >= 0.0):
+        if len(poles) != len(order):
             raise ValueRangeError(
                 f"poles {self.poles}",
-                f"needs {len(plant.a)} poles with negative real part, one per state: "
-                f"{', '.join(plant.names)}",
+                f"needs {len(order)} poles with negative real part, one per state: {', '.join(order)}",
+            )
+        wrong = [
+            f"{p:g} for {n}" for n, p in zip(order, self.poles, strict=True) if not complex(p).real < 0.0
+        ]
+        if wrong:
+            raise ValueRangeError(
+                f"poles {self.poles}",
+                f"needs negative real parts, not {', '.join(wrong)}; they stand for {', '.join(order)}",
             )
         fastest = math.pi / plant.sample_time
         if np.max(np.abs(poles)) > fastest:
