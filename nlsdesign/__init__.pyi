@@ -90,7 +90,6 @@ from .presentation import figures as figures
 from .presentation import report as report
 from .presentation import sweep_report as sweep_report
 from .presentation.report import write_report as write_report
-from .regeneration import fit_poles as fit_poles
 from .simulation import Trace as Trace
 from .simulation import measure as measure
 from .simulation import simulate as simulate
