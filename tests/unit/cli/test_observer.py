@@ -92,7 +92,7 @@ def test_poles_are_fitted_to_records(run: Run, tmp_path: Path, monkeypatch: pyte
     decay = "not fitted for spring.rubber.extension; at a standing angle the error decays with at least"
     assert f"fitted by gradient, {decay}" in out
     assert "average relative error, %" in out
-    assert "ms on, after the observers have settled (a quarter of a record at most)" in out
+    assert "ms on, after the observers have settled (a quarter of a record at most)" in " ".join(out.split())
     assert "warning: records: held out by default: " in err
     assert "held out" in out
     head = (tmp_path / "o" / "observer.h").read_text("utf-8").splitlines()[0]
