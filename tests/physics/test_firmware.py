@@ -10,6 +10,7 @@ from benchmarks.firmware_in_the_loop import BOARD, Firmware, image, made, run_bo
 from nlsdesign.export import CORTEX_M4F, CORTEX_M7
 from nlsdesign.export.compilation.target_run import missing_emulator
 
+# Emulator and compiler are programs of the system, no packages: where they are absent nothing is proved here.
 pytestmark = pytest.mark.skipif(bool(missing_emulator()), reason=missing_emulator())
 
 
