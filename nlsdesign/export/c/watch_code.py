@@ -1,0 +1,421 @@
+"""The C of a monitor: residuals of the blocks as an exported step, and beside it the moments that are judged.
+
+A mean over `LENGTH` samples is one residual r. With y = (φ₁ … φₖ, r) the sums of y·yᵀ are the evidence: r = Σ δᵢ·φᵢ is
+solved from them by least squares, δᵢ in units of the change that is to be noticed. :class:`WatchTwin` computes the same in
+Python, operation by operation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ...foundation.errors import ExportError
+from ...foundation.locations import version
+from ...model.flat import FlatModel
+from ..files import write_all
+from .block_code import half_byte_sums
+from .c_text import Real, comment, identifier
+from .controller_code import export_c
+from .provenance import origin_lines, stamped
+from .writer import CSource
+
+LENGTH = 20
+"""Samples whose mean is one residual."""
+PERIOD, MEMORY = 10.0, 300.0
+"""Time between two judgements, and time constant of the evidence that is kept, s."""
+RECENTLY = 2.0 / 3.0
+"""Share of the recent evidence that is kept from one judgement to the next."""
+LIMIT, SURE, LEAST = 0.5, 5.0, 200
+"""Share of the change to be noticed at which it is reported; standard errors that it must have; means that are needed."""
+PRIOR = 3.0
+"""Standard deviation of a change before anything was seen, in changes that are to be noticed."""
+SPEEDS, LOAD, WARM = (5.0, 25.0), 0.1, 35.0
+"""Between bins: speeds as multiples of the least one, load as a share of the largest drive, temperature in degrees Celsius."""
+BINS = 12
+FIRST_BIT = 8
+VERSION = 1
+MAGIC = 0x57534C4E  # "NLSW"
+
+
+@dataclass(frozen=True)
+class WatchedBlock:
+    """A block of a machine and the changes that its residual can tell.
+
+    Parameters
+    ----------
+    name
+        Body whose efforts it balances.
+    changes
+        Names of the changes, in the order of the outputs.
+    noticed
+        The change of each that is to be noticed: a share of the number, or what `units` says.
+    units
+        Unit of each; empty for a share of the number.
+    least_speed
+        Speed below which dry friction may stick, so that nothing is taken; 0 without friction.
+    usual_load
+        Load between the bins of little and much.
+    """
+
+    name: str
+    changes: tuple[str, ...]
+    noticed: tuple[float, ...]
+    units: tuple[str, ...]
+    least_speed: float
+    usual_load: float
+
+
+@dataclass(frozen=True, eq=False)
+class WatchPlan:
+    """What a monitor computes: residuals as a sampled model, and what its outputs are.
+
+    Parameters
+    ----------
+    model
+        Of each block in turn: what each change adds, the residual, speed and load.
+    blocks
+        In the order of the outputs.
+    settling
+        Time until the filters have settled, s.
+    between
+        Time between two judgements, s.
+    """
+
+    model: FlatModel
+    blocks: tuple[WatchedBlock, ...]
+    settling: float
+    between: float = PERIOD
+
+    @property
+    def most(self) -> int:
+        """Changes of the block that has most."""
+        return max(len(block.changes) for block in self.blocks)
+
+    @property
+    def period(self) -> int:
+        """Means between two judgements."""
+        return max(2, round(self.between / (LENGTH * float(self.model.sample_time or 1.0))))
+
+    @property
+    def digest(self) -> tuple[int, int, int, int]:
+        """Two words of the deck, and two of what is watched."""
+        deck = hashlib.sha256((self.model.origin.digest if self.model.origin else "").encode()).digest()
+        told = repr((self.model.sample_time, self.blocks, LENGTH, self.between, MEMORY, RECENTLY, PRIOR, SPEEDS, LOAD, WARM))
+        words = np.frombuffer(deck[:8] + hashlib.sha256(told.encode()).digest()[:8], "<u4")
+        return tuple(map(int, words))  # type: ignore[return-value]
+
+    def layout(self, real: Real) -> np.dtype[Any]:
+        """Return the record as it lies in memory."""
+        number, blocks = ("<f4" if real is Real.FLOAT else "<f8"), len(self.blocks)
+        moments = np.dtype([("count", number), ("products", number, ((self.most + 1) * (self.most + 2) // 2,))])
+        words = [(name, "<u4") for name in ("magic", "version", "size", "real")]
+        return np.dtype([
+            *words, ("digest", "<u4", (4,)), ("judged", "<u4"), ("word", "<u4"),
+            ("reference", number, (blocks, self.most)), ("recent", moments, (blocks,)),
+            ("bins", moments, (blocks, BINS)), ("checksum", "<u4"), ("spare", "<u4"),
+        ])  # fmt: skip
+
+    def first_bit(self, number: int) -> int:
+        """Return the bit of the first change of a block in the word."""
+        return FIRST_BIT + sum(len(block.changes) for block in self.blocks[:number])
+
+
+@dataclass(frozen=True, eq=False)
+class WatchSource:
+    """C files of a monitor.
+
+    Parameters
+    ----------
+    plan
+        What they compute.
+    name, real
+        Prefix of all C names, and the number type.
+    residuals
+        The step that gives the residuals.
+    header, source, selftest
+        Paths of the monitor and of the program that tests it.
+    """
+
+    plan: WatchPlan
+    name: str
+    real: Real
+    residuals: CSource
+    header: Path
+    source: Path
+    selftest: Path
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files."""
+        own = (self.header, self.source, self.selftest)
+        return (*own, self.residuals.header, self.residuals.source, self.residuals.selftest)
+
+
+def export_watch(plan: WatchPlan, folder: str | Path, *, real: Real | str = Real.FLOAT, name: str = "watch") -> WatchSource:
+    """Write the C of a monitor, with its self-test.
+
+    Parameters
+    ----------
+    plan
+        What it watches: :func:`~nlsdesign.regeneration.watch_plan`.
+    folder
+        Folder of the files; it is made if it is missing.
+    real
+        ``"double"`` or ``"float"``.
+    name
+        Prefix of all C names.
+
+    Returns
+    -------
+    WatchSource
+        Names of the files.
+
+    Raises
+    ------
+    ExportError
+        If there are more changes than the word has bits, or the folder cannot be written.
+    """
+    number, prefix = Real.named(real), identifier(name)
+    if plan.first_bit(len(plan.blocks)) > 32:
+        raise ExportError(f"deck '{plan.model.name}'", "has more numbers to watch than a word has bits",
+                          next_step="watch a part of it: a deck with fewer readings")  # fmt: skip
+    residuals = export_c(plan.model, folder, real=number, name=f"{prefix}_residuals")
+    values = _values(plan, number, residuals)
+    values |= {"name": prefix, "NAME": prefix.upper()}
+    texts = {
+        Path(folder) / f"{prefix}{ending}": residuals.writer.filled(template, values)
+        for ending, template in ((".h", "watch.h"), (".c", "watch.c"), ("_selftest.c", "watch_selftest.c"))
+    }
+    write_all({path: stamped(text, plan.model) for path, text in texts.items()})
+    return WatchSource(plan, prefix, number, residuals, *texts)
+
+
+def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | list[str]]:
+    names, numbers = [], []
+    for i, (column, block) in enumerate(_columns(plan)):
+        first = plan.first_bit(i)
+        for k, (change, noticed, unit) in enumerate(zip(block.changes, block.noticed, block.units, strict=True)):
+            size = f"{noticed:g} {unit}" if unit else f"{100.0 * noticed:g} %"
+            names.append(f"/* bit {first + k}: {comment(change)} has changed by some {size}, as {comment(block.name)} shows */")
+        speeds = ", ".join(real.literal(s) for s in _bounds(block))
+        load = real.literal(block.usual_load)
+        numbers.append(
+            f"{{{len(block.changes)}u, {column}u, {first}u, {real.literal(block.least_speed)}, {{{speeds}}}, {load}}},"
+        )
+    model, pairs = plan.model, (plan.most + 1) * (plan.most + 2) // 2
+    title = [
+        f"/* Monitor of {comment(model.name)}: whether the model holds in use.",
+        f"   Sample time {model.sample_time!r} s; all numbers in SI units.", *origin_lines(model),
+        f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
+    ]  # fmt: skip
+    literals = {
+        "one": 1.0, "prior": PRIOR**-2, "tiny": 1e-30, "least": float(LEAST), "limit": LIMIT, "sure": SURE**2,
+        "kept": _kept(plan), "recently": RECENTLY, "share": 1.0 / LENGTH, "warm": WARM, "enough": 5.0 * LEAST,
+    }  # fmt: skip
+    return {
+        "title": title, "blocks": str(len(plan.blocks)), "most": str(plan.most), "pairs": str(pairs), "bins": str(BINS),
+        "columns": str(len(model.outputs)), "length": str(LENGTH), "period": str(plan.period), "memory": f"{MEMORY:g}",
+        "names": names, "numbers": numbers, "fabs": real.function("fabs"),
+        "settling": str(max(1, round(plan.settling / float(model.sample_time or 1.0)))),
+        "given": [f"outputs.{path}," for path in residuals.writer.paths.outputs],
+        "magic": f"0x{MAGIC:08x}u", "version": str(VERSION), "digest": ", ".join(f"0x{w:08x}u" for w in plan.digest),
+        "half_bytes": half_byte_sums(), **{key: real.literal(value) for key, value in literals.items()},
+        **_test_values(plan, real),
+    }  # fmt: skip
+
+
+def _bounds(block: WatchedBlock) -> tuple[float, float]:
+    return SPEEDS[0] * block.least_speed, SPEEDS[1] * block.least_speed
+
+
+def _kept(plan: WatchPlan) -> float:
+    return math.exp(-plan.between / MEMORY)
+
+
+class WatchTwin:
+    """The monitor in Python from the residuals on, in the number type and with the order of operations of the C.
+
+    ``plan``: what is watched. ``settling``: samples that are passed over, as the plan says by default.
+    """
+
+    def __init__(self, plan: WatchPlan, real: Real = Real.FLOAT) -> None:
+        self.plan, self._r = plan, np.float32 if real is Real.FLOAT else np.float64
+        self.record = np.zeros((), plan.layout(real))
+        for name, value in (("magic", MAGIC), ("version", VERSION), ("size", self.record.nbytes), ("word", 2)):
+            self.record[name] = value
+        self.record["real"], self.record["digest"] = self._r(0).nbytes, plan.digest
+        self._settling = max(1, round(plan.settling / float(plan.model.sample_time or 1.0)))
+        self._sums: list[Any] = [[self._r(0)] * (plan.most + 3) for _ in plan.blocks]
+        self._means: list[Any] = [[] for _ in plan.blocks]
+        self._refused, self._before, self._fresh = ([first] * len(plan.blocks) for first in (1, False, False))
+        self._sample, self._mean_count, self._task, self._found = 0, 0, 0, 0
+        self.work: Any = np.zeros((plan.most + 1, plan.most + 1), self._r)
+
+    def take(self, given: Sequence[float], usable: bool = True, temperature: float = 0.0) -> int:
+        """Look at what the residuals give of one sample; return the word."""
+        blocks = self.plan.blocks
+        self._settling, usable = max(0, self._settling - 1), usable and self._settling == 0
+        for i, (column, block) in enumerate(_columns(self.plan)):
+            k = len(block.changes)
+            row = [self._r(v) for v in given[column : column + k + 3]]
+            row[k + 1], row[k + 2] = abs(row[k + 1]), abs(row[k + 2])
+            self._sums[i][: k + 3] = [a + b for a, b in zip(self._sums[i], row, strict=False)]
+            self._refused[i] += not (usable and row[k + 1] >= self._r(block.least_speed))
+        if self._sample < len(blocks):
+            self._finish(self._sample, temperature)
+        elif self._sample < 2 * len(blocks):
+            number = self._sample - len(blocks)
+            if self._fresh[number]:
+                self._add(self.record["recent"][number], self._means[number])
+        elif self._task:
+            self._go_on()
+        self._sample = (self._sample + 1) % LENGTH
+        if self._sample == 0:
+            self._mean_count += 1
+            if self._mean_count == self.plan.period:
+                self._mean_count, self._task, self._found = 0, 1, 0
+        return int(self.record["word"]) | (4 if self._refused[0] else 0)
+
+    def _finish(self, number: int, temperature: float) -> None:
+        block, r = self.plan.blocks[number], self._r
+        k, share, sums = len(block.changes), r(1.0 / LENGTH), self._sums[number]
+        self._fresh[number] = not self._refused[number] and self._before[number]
+        self._before[number] = not self._refused[number]
+        if self._fresh[number]:
+            mean = [value * share for value in sums[: k + 1]]
+            for i in range(k):
+                mean[k] -= self.record["reference"][number][i] * mean[i]
+            speed = sums[k + 1] * share
+            slow, fast = (r(s) for s in _bounds(block))
+            bin_ = 2 if speed > fast else 1 if speed > slow else 0
+            bin_ += 3 * (sums[k + 2] * share > r(block.usual_load)) + 6 * (r(temperature) > r(WARM))
+            self._means[number] = mean
+            self._add(self.record["bins"][number][bin_], mean)
+        self._sums[number] = [r(0)] * (self.plan.most + 3)
+        self._refused[number] = 0
+
+    def _add(self, moments: Any, mean: Sequence[Any]) -> None:
+        moments["count"] += self._r(1)
+        products = moments["products"]
+        pairs = [(i, j) for i in range(len(mean)) for j in range(i + 1)]
+        for at, (i, j) in enumerate(pairs):
+            products[at] += mean[i] * mean[j]
+
+    def _go_on(self) -> None:
+        each = BINS + self.plan.most + 2
+        number, piece = divmod(self._task - 1, each)
+        changes, recent = len(self.plan.blocks[number].changes), self.record["recent"][number]
+        if piece < BINS:
+            _forget(self.record["bins"][number][piece], self._r(_kept(self.plan)))
+        elif piece == BINS:
+            self._fill(recent, changes)
+        elif piece <= BINS + changes:
+            self._sweep(changes, piece - BINS - 1)
+        elif piece == each - 1:
+            self._found |= self._judged(recent, number)
+            _forget(recent, self._r(RECENTLY))
+            if number == len(self.plan.blocks) - 1:
+                self.record["word"], self._task = self._found, -1
+                self.record["judged"] += 1
+        self._task += 1
+
+    def _fill(self, moments: Any, changes: int) -> None:
+        work, products = self.work, moments["products"]
+        pairs = [(i, j) for i in range(changes + 1) for j in range(i + 1)]
+        for at, (i, j) in enumerate(pairs):
+            work[i, j] = work[j, i] = products[at]
+        r = self._r
+        prior = (work[changes, changes] / (moments["count"] + r(1))) * r(PRIOR**-2) + r(1e-30)
+        for i in range(changes):
+            work[i, i] += prior
+
+    def _sweep(self, changes: int, pivot: int) -> None:
+        work, n = self.work, changes + 1
+        inverse = self._r(1) / work[pivot, pivot]
+        work[pivot, :n] *= inverse
+        work[pivot, pivot] = inverse
+        for i in range(n):
+            if i != pivot:
+                factor = work[i, pivot]
+                work[i, pivot] = 0
+                work[i, :n] -= factor * work[pivot, :n]
+
+    def _judged(self, moments: Any, number: int) -> int:
+        k, r, work = len(self.plan.blocks[number].changes), self._r, self.work
+        if moments["count"] < r(LEAST):
+            return 2
+        variance, word = work[k, k] / (moments["count"] - r(k)), 0
+        for i in range(k):
+            change = work[i, k]
+            if abs(change) > r(LIMIT) and change * change > r(SURE**2) * variance * work[i, i]:
+                word |= 1 | 1 << (self.plan.first_bit(number) + i)
+        return word
+
+
+def _forget(moments: Any, kept: Any) -> None:
+    moments["count"] *= kept
+    moments["products"] *= kept
+
+
+TEST_PERIODS = 2.2
+"""Periods of the self-test."""
+
+
+def drawn_rows(plan: WatchPlan, count: int) -> list[list[float]]:
+    """Return residuals of a machine whose first change of each block is as large as is to be noticed, shape (count, columns).
+
+    Whole numbers over a power of two, the same in every number type: C makes them again.
+    """
+    word, rows = 1, []
+    for _ in range(count):
+        row: list[float] = []
+        for block in plan.blocks:
+            draws = []
+            for _ in block.changes:
+                word = (1664525 * word + 1013904223) & 0xFFFFFFFF
+                draws.append(float((word >> 20) - 2048) / 4096.0)
+            row += [*draws, draws[0], 1.0 + block.least_speed, draws[0]]
+        rows.append(row)
+    return rows
+
+
+def _test_values(plan: WatchPlan, real: Real) -> dict[str, str | list[str]]:
+    """Return what the self-test compares with: word and evidence that the twin has after the same rows."""
+    count = round(TEST_PERIODS * plan.period * LENGTH)
+    twin = WatchTwin(replace(plan, settling=0.0), real)
+    for row in drawn_rows(plan, count):
+        twin.take(row)
+    kept = twin.record["bins"]
+    rows = [[float(v) for v in (m["count"], *m["products"])] for m in twin.record["recent"]]
+    rows += [[float(v) for v in (m["count"].sum(), *m["products"].sum(axis=0))] for m in kept]
+    drawn = [
+        line
+        for column, block in _columns(plan)
+        for k in range(len(block.changes))
+        for line in ("word = 1664525u * word + 1013904223u;",
+                     f"given[{column + k}] = ((@real@)(word >> 20u) - 2048) / 4096;".replace("@real@", real))
+    ]  # fmt: skip
+    for column, block in _columns(plan):
+        k = column + len(block.changes)
+        drawn += [f"given[{k}] = given[{column}];", f"given[{k + 2}] = given[{column}];",
+                  f"given[{k + 1}] = {real.literal(1.0)} + {real.literal(block.least_speed)};"]  # fmt: skip
+    return {
+        "test_samples": str(count), "expected": real.table("expected", rows), "drawn": drawn,
+        "expected_word": f"0x{int(twin.record['word']):x}u", "tolerance": real.literal(2e-4 if real is Real.FLOAT else 1e-9),
+    }  # fmt: skip
+
+
+def _columns(plan: WatchPlan) -> Iterator[tuple[int, WatchedBlock]]:
+    """Yield each block with its first column."""
+    column = 0
+    for block in plan.blocks:
+        yield column, block
+        column += len(block.changes) + 3
