@@ -9,7 +9,7 @@ r = Σ δᵢ·φᵢ with δᵢ in units of the change that is to be noticed. Wha
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ..bench.discrepancy.tearing import blocks_of
-from ..bench.identification.equation_error.block import Block
+from ..bench.identification.equation_error.block import Block, Drive
 from ..export import WatchedBlock, WatchPlan
 from ..export.c.watch_code import LOAD
 from ..foundation.arrays import Array
@@ -124,6 +124,10 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
             states.append(ca.SX.sym(f"{name}.inner", count))
             jump += ca.jtimes(whole, s.state, states[-1])
         added[name] = jump
+    if not any(filters[d.signal].held and ca.depends_on(s.output, s.input[i]) for i, d in _driven(block)):
+        # Efforts that nothing measured drives are known up to a common factor: the spring is its measure.
+        spring = added.pop(next((name for name in added if name.endswith(".stiffness")), ""), None)
+        load = load if spring is None else spring[count]
     told = [jump[:count] for jump in added.values() if ca.depends_on(jump, ca.vertcat(ca.SX(0, 1), *states[1:]))]
     state, slopes = ca.vertcat(*states), ca.vertcat(whole[:count], *told)
     names, rows = list(added), [s.output, *[-jump[count] for jump in added.values()]]
@@ -134,7 +138,6 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
             late, load = late + slope * moving[i], load + slope * s.input[i]
     if not late.is_zero():
         names, rows = [*names, f"{block.name}.delay"], [*rows, DELAY * late]
-    load = next((rows[1 + i] for i, n in enumerate(names) if n.endswith(".stiffness")), load) if load.is_zero() else load
     following, slowest = ca.SX(0, 1), 0.0
     if count:
         # Half a sample ahead along the motion, and the implicit half of the trapezoid along the states.
@@ -165,6 +168,11 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
         results = ca.substitute(results, [ca.vertcat(*every)], [ca.vertcat(*combined)])
     shown, following = results
     return Told(tuple(names), ca.vertsplit(shown), state, following, slowest, tables, columns)
+
+
+def _driven(block: Block) -> Iterator[tuple[int, Drive]]:
+    """Yield the inputs of a block that follow from a reading."""
+    return ((i, block.drives[v.name]) for i, v in enumerate(block.model.inputs) if v.name in block.drives)
 
 
 def _vanishes(column: Expression, s: Symbols, numbers: Array) -> bool:

@@ -6,11 +6,14 @@ elastic joint with dry friction, and compiles it together with whatever looks at
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from nlsdesign.export import WatchSource
 from tests.compiling import compile_program
 
 from .bench import CAM_GRID, SERVO_BANDWIDTH, SERVO_DAMPING, _cam_tables
@@ -48,7 +51,7 @@ def published_machine() -> str:
     extension, lever_arm = _cam_tables(PUBLISHED.cam, 0.0)
     force = rubber.equilibrium(_LOWEST + _GRID * np.arange(_ROWS))
     lines = _defined(
-        CAM=1, RATE=1000.0, STEP=1e-4, CAM_GRID=CAM_GRID, LOWEST=_LOWEST, GRID=_GRID, COUNT=7.67e-4, LOAD_COUNT=1.0,
+        CAM=1, RATE=1000.0, STEP=2e-4, CAM_GRID=CAM_GRID, LOWEST=_LOWEST, GRID=_GRID, COUNT=7.67e-4, LOAD_COUNT=1.0,
         RELAXATION_TIME=rubber.relaxation_time, BRANCH=rubber.shape * rubber.k, MOTOR_INERTIA=drive.inertia,
         VISCOUS=drive.viscosity, SLIDING=PUBLISHED_FRICTION, PER_AMPERE=drive.torque_per_ampere, LIMIT=20.0,
         CURRENT_NOISE=PUBLISHED.sensors.current_noise, PROPORTIONAL=gain * SERVO_BANDWIDTH,
@@ -63,7 +66,7 @@ def joint_machine() -> str:
     """Return the header of the elastic joint with dry friction: 500 Hz, encoders on both sides."""
     plant, loop, logger = ELASTIC_JOINT.plant, ELASTIC_JOINT.controller(1.0), ELASTIC_JOINT.logger
     return "\n".join(_defined(
-        CAM=0, RATE=loop.rate, STEP=1e-4, COUNT=logger.quantum, LOAD_COUNT=logger.load_quantum,
+        CAM=0, RATE=loop.rate, STEP=4e-4, COUNT=logger.quantum, LOAD_COUNT=logger.load_quantum,
         MOTOR_INERTIA=plant.inertia, VISCOUS=plant.damping, SLIDING=JOINT_FRICTION, PER_AMPERE=plant.effort_per_ampere,
         LOAD_INERTIA=plant.load_inertia, LOAD_VISCOUS=plant.load_damping, STIFF=plant.stiffness,
         SPRING_VISCOUS=plant.spring_damping, HEAVY=plant.weight, LIMIT=loop.limit, CURRENT_NOISE=logger.current_noise,
@@ -85,10 +88,46 @@ def joint_deck() -> str:
 MACHINES = {"published": published_machine, "joint": joint_machine}
 
 
-def build(machine: str, folder: Path, *looking: Path) -> Path:
-    """Compile a machine with what looks at its readings; return the program."""
+def build(machine: str, folder: Path, *, look: Path = HERE / "watched_record.c", code: Sequence[Path] = ()) -> Path:
+    """Compile a machine with what looks at its readings, and the C that this calls; return the program."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "machine.h").write_text(MACHINES[machine](), encoding="utf-8")
-    sources = [HERE / "watched_bench.c", *(looking or [HERE / "watched_record.c"])]
-    flags = ["-I", str(folder), *(f"-I{file.parent}" for file in looking)]
-    return compile_program(sources, folder / machine, flags=flags)
+    return compile_program([HERE / "watched_bench.c", look, *code], folder / machine, flags=["-I", str(folder)])
+
+
+_SHOWN = {"motor_encoder.reading": "motor", "encoder.reading": "motor", "load_encoder.reading": "load"}
+
+
+def build_watched(machine: str, source: WatchSource) -> Path:
+    """Compile a machine with its monitor beside the loop; the program lies beside the C of the monitor."""
+    folder, writer = source.header.parent, source.residuals.writer
+    lines = ['#include "watch.h"', f"#define COMPARED {len(source.plan.blocks)}"]
+    wires = [f"inputs.{path} = read->{_SHOWN.get(v.name, 'current')};"
+             for v, path in zip(writer.model.inputs, writer.paths.inputs, strict=True)]  # fmt: skip
+    lines += [f"#define NUMBER {source.real}", "#define TAKE_READINGS " + " ".join(wires), ""]
+    (folder / "watched_names.h").write_text("\n".join(lines), encoding="utf-8")
+    return build(machine, folder, look=HERE / "watched_look.c", code=[source.source, source.residuals.source])
+
+
+@dataclass(frozen=True)
+class Use:
+    """What a monitor said in use: time of the first word that says so, words that newly did, and the last one."""
+
+    first: float  # s, infinite where there was none
+    bits: int  # of that word
+    alarms: int
+    judged: int
+    usable: float  # share of the judgements that had enough evidence
+
+
+def use(
+    program: Path, seed: int, seconds: float, *, change_at: float = 1e12, built: Mapping[str, float] | None = None,
+    after: Mapping[str, float] | None = None, commission_at: float = 0.0, record: Path | None = None,
+) -> Use:  # fmt: skip
+    """Let a machine be used; what is not given of the machine is as declared, or as built."""
+    first = dict(built or {})
+    numbers = [*values(**first), *values(**first | dict(after or {}))]
+    command = [str(program), str(seed), str(seconds), str(change_at), *map(repr, numbers), str(commission_at)]
+    done = subprocess.run([*command, str(record or "")], capture_output=True, text=True, check=True, timeout=36000)
+    time, bits, alarms, judged, usable = done.stdout.split()
+    return Use(float(time), int(bits, 16), int(alarms), int(judged), int(usable) / max(int(judged), 1))

@@ -56,27 +56,35 @@ static double place, speed, load_place, load_speed;
 #if CAM
 static double stretched, branch; /* extension of the rubber, force of its branch */
 
-static double rubber(double y, double keep, double gain, double soft, double *slope)
+static double keep, gain, per_inertia;
+
+static double rubber(double y, double soft, double *slope)
 {
-    const double at = (y - LOWEST) / GRID;
+    const double at = (y - LOWEST) * (1.0 / GRID);
     const int j = (int)at;
     const double rise = soft * (equilibrium[j + 1] - equilibrium[j]);
-    *slope = rise / GRID + gain;
+    *slope = rise * (1.0 / GRID) + gain;
     return soft * equilibrium[j] + (at - j) * rise + keep * branch + gain * (y - stretched);
+}
+
+static void prepare(const double *now)
+{
+    const double time = RELAXATION_TIME * now[RELAXATION];
+    keep = exp(-STEP / time);
+    gain = now[STIFFNESS] * BRANCH * time / STEP * (1.0 - keep);
+    per_inertia = STEP / (MOTOR_INERTIA * now[INERTIA]);
 }
 
 static void advance(double drive, const double *now)
 {
-    const double time = RELAXATION_TIME * now[RELAXATION], keep = exp(-STEP / time);
-    const double gain = now[STIFFNESS] * BRANCH * time / STEP * (1.0 - keep);
-    const double at = fabs(place) / CAM_GRID;
+    const double at = fabs(place) * (1.0 / CAM_GRID);
     const int j = (int)at;
     const double part = at - j, arm = lever_arm[j] + part * (lever_arm[j + 1] - lever_arm[j]);
     double y = extension[j] + 0.5 * part * CAM_GRID * (lever_arm[j] + arm), slope;
-    double force = rubber(y, keep, gain, now[STIFFNESS], &slope);
+    double force = rubber(y, now[STIFFNESS], &slope);
     if (force < 0.0) {
         for (int turn = 0; turn < 20; ++turn) {
-            y -= rubber(y, keep, gain, now[STIFFNESS], &slope) / slope;
+            y -= rubber(y, now[STIFFNESS], &slope) / slope;
         }
         force = 0.0;
     }
@@ -84,29 +92,38 @@ static void advance(double drive, const double *now)
     stretched = y;
     const double load = place >= 0.0 ? arm * force : -arm * force;
     const double level = SLIDING * now[FRICTION] + now[LOAD_FRICTION] * fabs(load);
-    const double inertia = MOTOR_INERTIA * now[INERTIA];
-    speed = prox(speed + STEP * (drive - VISCOUS * now[DAMPING] * speed - load) / inertia, STEP * level / inertia);
+    speed = prox(speed + per_inertia * (drive - VISCOUS * now[DAMPING] * speed - load), per_inertia * level);
     place += STEP * speed;
     load_place = place;
 }
 #else
+static const double half = 0.5 * STEP, coupled = 0.5 * STEP * SPRING_VISCOUS;
+static double drag, load_drag, per, load_per, whole;
+
+static void prepare(const double *now)
+{
+    const double inertia = MOTOR_INERTIA * now[INERTIA];
+    drag = half * VISCOUS * now[DAMPING] / inertia;
+    load_drag = half * LOAD_VISCOUS / LOAD_INERTIA;
+    per = 1.0 / (inertia * (1.0 + drag));
+    load_per = 1.0 / (LOAD_INERTIA * (1.0 + load_drag));
+    whole = coupled / (1.0 + coupled * (per + load_per));
+}
+
 static void advance(double effort, const double *now)
 {
-    const double half = 0.5 * STEP, inertia = MOTOR_INERTIA * now[INERTIA];
-    const double drag = half * VISCOUS * now[DAMPING] / inertia, load_drag = half * LOAD_VISCOUS / LOAD_INERTIA;
-    const double mobility = 1.0 / (inertia * (1.0 + drag)) + 1.0 / (LOAD_INERTIA * (1.0 + load_drag));
     place += half * speed;
     load_place += half * load_speed;
     const double twist = STIFF * now[STIFFNESS] * (place - load_place);
-    double free = ((1.0 - drag) * speed + STEP * (effort - twist) / inertia) / (1.0 + drag);
+    double free = (1.0 - drag) / (1.0 + drag) * speed + STEP * per * (effort - twist);
     const double pull = twist - HEAVY * now[WEIGHT] * sin(load_place);
-    double load_free = ((1.0 - load_drag) * load_speed + STEP * pull / LOAD_INERTIA) / (1.0 + load_drag);
-    const double rate = speed - load_speed, coupled = half * SPRING_VISCOUS;
-    const double impulse = coupled * (rate + free - load_free) / (1.0 + coupled * mobility);
-    free -= impulse / (inertia * (1.0 + drag));
-    load_free += impulse / (LOAD_INERTIA * (1.0 + load_drag));
+    double load_free = (1.0 - load_drag) / (1.0 + load_drag) * load_speed + STEP * load_per * pull;
+    const double rate = speed - load_speed;
+    const double impulse = whole * (rate + free - load_free);
+    free -= impulse * per;
+    load_free += impulse * load_per;
     const double level = SLIDING * now[FRICTION] + now[LOAD_FRICTION] * fabs(twist + SPRING_VISCOUS * rate);
-    speed = prox(free, STEP * level / inertia);
+    speed = prox(free, STEP * level * per * (1.0 + drag));
     load_speed = load_free;
     place += half * speed;
     load_place += half * load_speed;
@@ -162,6 +179,9 @@ int main(int argc, char **argv)
     reach use = {0.0, 0.0, 0.0, 1.0, 0.0};
     for (int64_t k = 0; k < samples; ++k) {
         const double *const now = k < change ? built : after;
+        if (k == 0 || k == change) {
+            prepare(now);
+        }
         const double read = COUNT * floor(place / COUNT + 0.5);
         wanted(&use, (double)k * period, &goal, &pace, &bend);
         filtered += smooth * ((read - before) / period - filtered);

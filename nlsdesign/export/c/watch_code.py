@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,12 +31,14 @@ LENGTH = 20
 """Samples whose mean is one residual."""
 PERIOD, MEMORY = 10.0, 300.0
 """Time between two judgements, and time constant of the evidence that is kept, s."""
-RECENTLY = 2.0 / 3.0
+RECENTLY = 0.75
 """Share of the recent evidence that is kept from one judgement to the next."""
-LIMIT, SURE, LEAST = 0.5, 5.0, 200
+LIMIT, SURE, LEAST = 0.5, 4.0, 200
 """Share of the change to be noticed at which it is reported; standard errors that it must have; means that are needed."""
-PRIOR = 3.0
+PRIOR = 1.0
 """Standard deviation of a change before anything was seen, in changes that are to be noticed."""
+RIDGE = 1e-5
+"""Share of its square by which a change is held, so that what no motion tells apart is solved in single precision."""
 SPEEDS, LOAD, WARM = (5.0, 25.0), 0.1, 35.0
 """Between bins: speeds as multiples of the least one, load as a share of the largest drive, temperature in degrees Celsius."""
 BINS = 12
@@ -199,8 +201,9 @@ def export_watch(plan: WatchPlan, folder: str | Path, *, real: Real | str = Real
 
 
 def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | list[str]]:
-    names, numbers = [], []
-    for i, (column, block) in enumerate(_columns(plan)):
+    names, numbers, given = [], [], []
+    paths = iter(residuals.writer.paths.outputs)
+    for i, block in enumerate(plan.blocks):
         first = plan.first_bit(i)
         for k, (change, noticed, unit) in enumerate(zip(block.changes, block.noticed, block.units, strict=True)):
             size = f"{noticed:g} {unit}" if unit else f"{100.0 * noticed:g} %"
@@ -208,8 +211,11 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
         speeds = ", ".join(real.literal(s) for s in _bounds(block))
         load = real.literal(block.usual_load)
         numbers.append(
-            f"{{{len(block.changes)}u, {column}u, {first}u, {real.literal(block.least_speed)}, {{{speeds}}}, {load}}},"
+            f"{{{len(block.changes)}u, {first}u, {real.literal(block.least_speed)}, {{{speeds}}}, {load}}},"
         )
+        cells = [f"outputs.{next(paths)}" for _ in range(len(block.changes) + 3)]
+        cells[-3:-3] = [real.literal(0.0)] * (plan.most - len(block.changes))
+        given.append(", ".join(cells) + ",")
     model, pairs = plan.model, (plan.most + 1) * (plan.most + 2) // 2
     title = [
         f"/* Monitor of {comment(model.name)}: whether the model holds in use.",
@@ -217,15 +223,15 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]  # fmt: skip
     literals = {
-        "one": 1.0, "prior": PRIOR**-2, "tiny": 1e-30, "least": float(LEAST), "limit": LIMIT, "sure": SURE**2,
+        "one": 1.0, "prior": PRIOR**-2, "ridge": RIDGE, "tiny": 1e-30, "least": float(LEAST), "limit": LIMIT, "sure": SURE**2,
         "kept": _kept(plan), "recently": RECENTLY, "share": 1.0 / LENGTH, "warm": WARM, "enough": 5.0 * LEAST,
     }  # fmt: skip
     return {
         "title": title, "blocks": str(len(plan.blocks)), "most": str(plan.most), "pairs": str(pairs), "bins": str(BINS),
-        "columns": str(len(model.outputs)), "length": str(LENGTH), "period": str(plan.period), "memory": f"{MEMORY:g}",
+        "length": str(LENGTH), "period": str(plan.period), "memory": f"{MEMORY:g}",
         "names": names, "numbers": numbers, "fabs": real.function("fabs"),
         "settling": str(max(1, round(plan.settling / float(model.sample_time or 1.0)))),
-        "given": [f"outputs.{path}," for path in residuals.writer.paths.outputs],
+        "given": given,
         "magic": f"0x{MAGIC:08x}u", "version": str(VERSION), "digest": ", ".join(f"0x{w:08x}u" for w in plan.digest),
         "half_bytes": half_byte_sums(), **{key: real.literal(value) for key, value in literals.items()},
         **_test_values(plan, real),
@@ -255,20 +261,23 @@ class WatchTwin:
         self._settling = max(1, round(plan.settling / float(plan.model.sample_time or 1.0)))
         self._sums: list[Any] = [[self._r(0)] * (plan.most + 3) for _ in plan.blocks]
         self._means: list[Any] = [[] for _ in plan.blocks]
-        self._refused, self._before, self._fresh = ([first] * len(plan.blocks) for first in (1, False, False))
+        self._held: list[Any] = [(0, []) for _ in plan.blocks]
+        self._ways = [[0, 0] for _ in plan.blocks]
+        self._refused, self._forward, self._fresh = ([first] * len(plan.blocks) for first in (1, 0, 0))
         self._sample, self._mean_count, self._task, self._found = 0, 0, 0, 0
+        self._pairs = [(i, j) for i in range(plan.most + 1) for j in range(i + 1)]
         self.work: Any = np.zeros((plan.most + 1, plan.most + 1), self._r)
 
-    def take(self, given: Sequence[float], usable: bool = True, temperature: float = 0.0) -> int:
-        """Look at what the residuals give of one sample; return the word."""
-        blocks = self.plan.blocks
+    def take(self, given: Sequence[Sequence[float]], usable: bool = True, temperature: float = 0.0) -> int:
+        """Look at what the residuals give of one sample, for each block; return the word."""
+        blocks, most = self.plan.blocks, self.plan.most
         self._settling, usable = max(0, self._settling - 1), usable and self._settling == 0
-        for i, (column, block) in enumerate(_columns(self.plan)):
-            k = len(block.changes)
-            row = [self._r(v) for v in given[column : column + k + 3]]
-            row[k + 1], row[k + 2] = abs(row[k + 1]), abs(row[k + 2])
-            self._sums[i][: k + 3] = [a + b for a, b in zip(self._sums[i], row, strict=False)]
-            self._refused[i] += not (usable and row[k + 1] >= self._r(block.least_speed))
+        for i, block in enumerate(blocks):
+            row = [self._r(v) for v in given[i]]
+            row = [*row[:-3], *[self._r(0)] * (most + 3 - len(row)), row[-3], abs(row[-2]), abs(row[-1])]
+            self._sums[i] = [a + b for a, b in zip(self._sums[i], row, strict=True)]
+            self._refused[i] += not (usable and row[most + 1] >= self._r(block.least_speed))
+            self._forward[i] += given[i][-2] > 0.0
         if self._sample < len(blocks):
             self._finish(self._sample, temperature)
         elif self._sample < 2 * len(blocks):
@@ -285,40 +294,43 @@ class WatchTwin:
         return int(self.record["word"]) | (4 if self._refused[0] else 0)
 
     def _finish(self, number: int, temperature: float) -> None:
-        block, r = self.plan.blocks[number], self._r
-        k, share, sums = len(block.changes), r(1.0 / LENGTH), self._sums[number]
-        self._fresh[number] = not self._refused[number] and self._before[number]
-        self._before[number] = not self._refused[number]
+        block, r, most = self.plan.blocks[number], self._r, self.plan.most
+        share, sums, way = r(1.0 / LENGTH), self._sums[number], 0 if self._refused[number] else 1
+        if way and block.least_speed > 0.0:
+            way = {0: 3, LENGTH: 2}.get(self._forward[number], 0)
+        self._fresh[number] = int(bool(way) and self._ways[number] == [way, way])
         if self._fresh[number]:
-            mean = [value * share for value in sums[: k + 1]]
-            for i in range(k):
-                mean[k] -= self.record["reference"][number][i] * mean[i]
-            speed = sums[k + 1] * share
-            slow, fast = (r(s) for s in _bounds(block))
-            bin_ = 2 if speed > fast else 1 if speed > slow else 0
-            bin_ += 3 * (sums[k + 2] * share > r(block.usual_load)) + 6 * (r(temperature) > r(WARM))
+            bin_, mean = self._held[number]
+            for i in range(most):
+                mean[most] -= self.record["reference"][number][i] * mean[i]
             self._means[number] = mean
             self._add(self.record["bins"][number][bin_], mean)
-        self._sums[number] = [r(0)] * (self.plan.most + 3)
-        self._refused[number] = 0
+        self._ways[number] = [self._ways[number][1], way]
+        speed = sums[most + 1] * share
+        slow, fast = (r(s) for s in _bounds(block))
+        bin_ = 2 if speed > fast else 1 if speed > slow else 0
+        bin_ += 3 * (sums[most + 2] * share > r(block.usual_load)) + 6 * (r(temperature) > r(WARM))
+        self._held[number] = bin_, [value * share for value in sums[: most + 1]]
+        self._sums[number] = [r(0)] * (most + 3)
+        self._refused[number] = self._forward[number] = 0
 
     def _add(self, moments: Any, mean: Sequence[Any]) -> None:
         moments["count"] += self._r(1)
         products = moments["products"]
-        pairs = [(i, j) for i in range(len(mean)) for j in range(i + 1)]
-        for at, (i, j) in enumerate(pairs):
+        for at, (i, j) in enumerate(self._pairs):
             products[at] += mean[i] * mean[j]
 
     def _go_on(self) -> None:
-        each = BINS + self.plan.most + 2
+        each = BINS + 2 * self.plan.most + 2
         number, piece = divmod(self._task - 1, each)
         changes, recent = len(self.plan.blocks[number].changes), self.record["recent"][number]
         if piece < BINS:
             _forget(self.record["bins"][number][piece], self._r(_kept(self.plan)))
         elif piece == BINS:
-            self._fill(recent, changes)
-        elif piece <= BINS + changes:
-            self._sweep(changes, piece - BINS - 1)
+            self._fill(recent)
+        elif piece <= BINS + 2 * changes:
+            if piece % 2 == BINS % 2:
+                self._sweep((piece - BINS) // 2 - 1)
         elif piece == each - 1:
             self._found |= self._judged(recent, number)
             _forget(recent, self._r(RECENTLY))
@@ -327,35 +339,33 @@ class WatchTwin:
                 self.record["judged"] += 1
         self._task += 1
 
-    def _fill(self, moments: Any, changes: int) -> None:
-        work, products = self.work, moments["products"]
-        pairs = [(i, j) for i in range(changes + 1) for j in range(i + 1)]
-        for at, (i, j) in enumerate(pairs):
-            work[i, j] = work[j, i] = products[at]
-        r = self._r
-        prior = (work[changes, changes] / (moments["count"] + r(1))) * r(PRIOR**-2) + r(1e-30)
-        for i in range(changes):
-            work[i, i] += prior
+    def _fill(self, moments: Any) -> None:
+        work, r, most = self.work, self._r, self.plan.most
+        for value, (i, j) in zip(moments["products"], self._pairs, strict=True):
+            work[i, j] = work[j, i] = value
+        prior = (work[most, most] / (moments["count"] + r(1))) * r(PRIOR**-2) + r(1e-30)
+        for i in range(most):
+            work[i, i] += (work[i, i] * r(RIDGE)) + prior
 
-    def _sweep(self, changes: int, pivot: int) -> None:
-        work, n = self.work, changes + 1
+    def _sweep(self, pivot: int) -> None:
+        work = self.work
         inverse = self._r(1) / work[pivot, pivot]
-        work[pivot, :n] *= inverse
+        work[pivot] *= inverse
         work[pivot, pivot] = inverse
-        for i in range(n):
+        for i in range(len(work)):
             if i != pivot:
                 factor = work[i, pivot]
                 work[i, pivot] = 0
-                work[i, :n] -= factor * work[pivot, :n]
+                work[i] -= factor * work[pivot]
 
     def _judged(self, moments: Any, number: int) -> int:
         k, r, work = len(self.plan.blocks[number].changes), self._r, self.work
         if moments["count"] < r(LEAST):
             return 2
-        variance, word = work[k, k] / (moments["count"] - r(k)), 0
+        variance, word = work[-1, -1] / (moments["count"] - r(k)), 0
         for i in range(k):
-            change = work[i, k]
-            if abs(change) > r(LIMIT) and change * change > r(SURE**2) * variance * work[i, i]:
+            change = work[i, -1]
+            if work[i, i] > 0 and abs(change) > r(LIMIT) and change * change > r(SURE**2) * variance * work[i, i]:
                 word |= 1 | 1 << (self.plan.first_bit(number) + i)
         return word
 
@@ -369,20 +379,20 @@ TEST_PERIODS = 2.2
 """Periods of the self-test."""
 
 
-def drawn_rows(plan: WatchPlan, count: int) -> list[list[float]]:
-    """Return residuals of a machine whose first change of each block is as large as is to be noticed, shape (count, columns).
+def drawn_rows(plan: WatchPlan, count: int) -> list[list[list[float]]]:
+    """Return residuals of a machine whose first change of each block is as large as is to be noticed.
 
-    Whole numbers over a power of two, the same in every number type: C makes them again.
+    Shape (count, blocks, changes + 3). Whole numbers over a power of two, which C makes again.
     """
     word, rows = 1, []
     for _ in range(count):
-        row: list[float] = []
+        row = []
         for block in plan.blocks:
             draws = []
             for _ in block.changes:
                 word = (1664525 * word + 1013904223) & 0xFFFFFFFF
                 draws.append(float((word >> 20) - 2048) / 4096.0)
-            row += [*draws, draws[0], 1.0 + block.least_speed, draws[0]]
+            row.append([*draws, draws[0], 1.0 + block.least_speed, draws[0]])
         rows.append(row)
     return rows
 
@@ -393,29 +403,16 @@ def _test_values(plan: WatchPlan, real: Real) -> dict[str, str | list[str]]:
     twin = WatchTwin(replace(plan, settling=0.0), real)
     for row in drawn_rows(plan, count):
         twin.take(row)
-    kept = twin.record["bins"]
     rows = [[float(v) for v in (m["count"], *m["products"])] for m in twin.record["recent"]]
-    rows += [[float(v) for v in (m["count"].sum(), *m["products"].sum(axis=0))] for m in kept]
-    drawn = [
-        line
-        for column, block in _columns(plan)
-        for k in range(len(block.changes))
-        for line in ("word = 1664525u * word + 1013904223u;",
-                     f"given[{column + k}] = ((@real@)(word >> 20u) - 2048) / 4096;".replace("@real@", real))
-    ]  # fmt: skip
-    for column, block in _columns(plan):
-        k = column + len(block.changes)
-        drawn += [f"given[{k}] = given[{column}];", f"given[{k + 2}] = given[{column}];",
-                  f"given[{k + 1}] = {real.literal(1.0)} + {real.literal(block.least_speed)};"]  # fmt: skip
+    rows += [[float(v) for v in (m["count"].sum(), *m["products"].sum(axis=0))] for m in twin.record["bins"]]
+    drawn, most = [], plan.most
+    for first, block in zip(range(0, len(plan.blocks) * (most + 3), most + 3), plan.blocks, strict=True):
+        for k in range(len(block.changes)):
+            number = f"(({real})(word >> 20u) - {real.literal(2048.0)}) / {real.literal(4096.0)}"
+            drawn += ["word = (1664525u * word) + 1013904223u;", f"given[{first + k}] = {number};"]
+        drawn += [f"given[{first + most}] = given[{first}];", f"given[{first + most + 2}] = given[{first}];",
+                  f"given[{first + most + 1}] = {real.literal(1.0)} + {real.literal(block.least_speed)};"]  # fmt: skip
     return {
         "test_samples": str(count), "expected": real.table("expected", rows), "drawn": drawn,
         "expected_word": f"0x{int(twin.record['word']):x}u", "tolerance": real.literal(2e-4 if real is Real.FLOAT else 1e-9),
     }  # fmt: skip
-
-
-def _columns(plan: WatchPlan) -> Iterator[tuple[int, WatchedBlock]]:
-    """Yield each block with its first column."""
-    column = 0
-    for block in plan.blocks:
-        yield column, block
-        column += len(block.changes) + 3

@@ -13,10 +13,12 @@
 
 #define STARTED 0x57415443u
 #define SETTLING @settling@u
+#define HALF ((@NAME@_MOST + 1u) / 2u) /* rows */
+
+enum { ONE_WAY = 1u, FORWARD = 2u, BACKWARD = 3u };
 
 typedef struct {
-    uint32_t changes; /* how many there are */
-    uint32_t column; /* of its residual */
+    uint32_t changes; /* how many there are; the rest of a row is zero */
     uint32_t first_bit; /* in the word */
     @real@ least_speed; /* below which friction may stick */
     @real@ speeds[2]; /* between bins */
@@ -28,12 +30,12 @@ static const block_numbers numbers[@NAME@_BLOCKS] = {
 };
 
 /* Adds the products of one mean. */
-static void add(@name@_moments *moments, const @real@ *mean, uint32_t changes)
+static void add(@name@_moments *moments, const @real@ *mean)
 {
     uint32_t at = 0u;
 
     moments->count += @one@;
-    for (uint32_t i = 0u; i <= changes; ++i) {
+    for (uint32_t i = 0u; i <= @NAME@_MOST; ++i) {
         for (uint32_t j = 0u; j <= i; ++j) {
             moments->products[at] += mean[i] * mean[j];
             ++at;
@@ -51,39 +53,43 @@ static void forget(@name@_moments *moments, @real@ kept)
 }
 
 /* Writes the moments as a full matrix, with what is known before of the changes. */
-static void fill(@real@ (*work)[@NAME@_MOST + 1], const @name@_moments *moments, uint32_t changes)
+static void fill(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *moments)
 {
     uint32_t at = 0u;
     @real@ prior;
 
-    for (uint32_t i = 0u; i <= changes; ++i) {
+    for (uint32_t i = 0u; i <= @NAME@_MOST; ++i) {
         for (uint32_t j = 0u; j <= i; ++j) {
             work[i][j] = moments->products[at];
             work[j][i] = moments->products[at];
             ++at;
         }
     }
-    prior = (work[changes][changes] / (moments->count + @one@)) * @prior@ + @tiny@;
-    for (uint32_t i = 0u; i < changes; ++i) {
-        work[i][i] += prior;
+    prior = (work[@NAME@_MOST][@NAME@_MOST] / (moments->count + @one@)) * @prior@ + @tiny@;
+    for (uint32_t i = 0u; i < @NAME@_MOST; ++i) {
+        work[i][i] += (work[i][i] * @ridge@) + prior;
     }
 }
 
-/* Solves for one more change: a step of Gauss and Jordan in place. */
-static void sweep(@real@ (*work)[@NAME@_MOST + 1], uint32_t changes, uint32_t pivot)
+/* Solves for one more change: a step of Gauss and Jordan in place, in two halves. */
+static void sweep(@real@ (*work)[@NAME@_MOST + 1u], uint32_t pivot, uint32_t half)
 {
-    const @real@ inverse = @one@ / work[pivot][pivot];
+    const uint32_t end = (half == 0u) ? HALF : (@NAME@_MOST + 1u);
 
-    for (uint32_t j = 0u; j <= changes; ++j) {
-        work[pivot][j] *= inverse;
+    if (half == 0u) {
+        const @real@ inverse = @one@ / work[pivot][pivot];
+
+        for (uint32_t j = 0u; j <= @NAME@_MOST; ++j) {
+            work[pivot][j] *= inverse;
+        }
+        work[pivot][pivot] = inverse;
     }
-    work[pivot][pivot] = inverse;
-    for (uint32_t i = 0u; i <= changes; ++i) {
+    for (uint32_t i = half * HALF; i < end; ++i) {
         if (i != pivot) {
             const @real@ factor = work[i][pivot];
 
             work[i][pivot] = @zero@;
-            for (uint32_t j = 0u; j <= changes; ++j) {
+            for (uint32_t j = 0u; j <= @NAME@_MOST; ++j) {
                 work[i][j] -= factor * work[pivot][j];
             }
         }
@@ -91,7 +97,7 @@ static void sweep(@real@ (*work)[@NAME@_MOST + 1], uint32_t changes, uint32_t pi
 }
 
 /* Says which changes are as large as is to be noticed, and surely so. */
-static uint32_t judged(@real@ (*work)[@NAME@_MOST + 1], const @name@_moments *moments, const block_numbers *block)
+static uint32_t judged(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *moments, const block_numbers *block)
 {
     const uint32_t changes = block->changes;
     uint32_t word = 0u;
@@ -99,12 +105,12 @@ static uint32_t judged(@real@ (*work)[@NAME@_MOST + 1], const @name@_moments *mo
     if (moments->count < @least@) {
         word = @NAME@_LITTLE_EVIDENCE;
     } else {
-        const @real@ variance = work[changes][changes] / (moments->count - (@real@)changes);
+        const @real@ variance = work[@NAME@_MOST][@NAME@_MOST] / (moments->count - (@real@)changes);
 
         for (uint32_t i = 0u; i < changes; ++i) {
-            const @real@ change = work[i][changes];
+            const @real@ change = work[i][@NAME@_MOST];
 
-            if (@fabs@(change) > @limit@ && change * change > @sure@ * variance * work[i][i]) {
+            if (work[i][i] > @zero@ && @fabs@(change) > @limit@ && change * change > @sure@ * variance * work[i][i]) {
                 word |= @NAME@_CHANGED | (1u << (block->first_bit + i));
             }
         }
@@ -115,18 +121,19 @@ static uint32_t judged(@real@ (*work)[@NAME@_MOST + 1], const @name@_moments *mo
 /* One piece of a judgement: bins forget one by one, then the recent evidence of each block is solved. */
 static void go_on(@name@_state *state)
 {
-    const uint32_t each = @NAME@_BINS + @NAME@_MOST + 2u;
+    const uint32_t each = @NAME@_BINS + (2u * @NAME@_MOST) + 2u;
     const uint32_t block = (state->task - 1u) / each;
     const uint32_t piece = (state->task - 1u) % each;
-    const uint32_t changes = numbers[block].changes;
     @name@_moments *const recent = &state->record.recent[block];
 
     if (piece < @NAME@_BINS) {
         forget(&state->record.bins[block][piece], @kept@);
     } else if (piece == @NAME@_BINS) {
-        fill(state->work, recent, changes);
-    } else if (piece <= @NAME@_BINS + changes) {
-        sweep(state->work, changes, piece - @NAME@_BINS - 1u);
+        fill(state->work, recent);
+    } else if (piece <= @NAME@_BINS + (2u * numbers[block].changes)) {
+        const uint32_t turn = piece - @NAME@_BINS - 1u;
+
+        sweep(state->work, turn / 2u, turn % 2u);
     } else if (piece == each - 1u) {
         state->found |= judged(state->work, recent, &numbers[block]);
         forget(recent, @recently@);
@@ -146,50 +153,61 @@ static void go_on(@name@_state *state)
 /* Adds one sample to the sums of a block. */
 static void gather(@name@_gathered *to, const @real@ *given, const block_numbers *block, uint32_t usable)
 {
-    const uint32_t changes = block->changes;
-    const @real@ speed = @fabs@(given[changes + 1u]);
+    const @real@ speed = @fabs@(given[@NAME@_MOST + 1u]);
 
-    for (uint32_t i = 0u; i <= changes; ++i) {
+    for (uint32_t i = 0u; i <= @NAME@_MOST; ++i) {
         to->sum[i] += given[i];
     }
-    to->sum[changes + 1u] += speed;
-    to->sum[changes + 2u] += @fabs@(given[changes + 2u]);
+    to->sum[@NAME@_MOST + 1u] += speed;
+    to->sum[@NAME@_MOST + 2u] += @fabs@(given[@NAME@_MOST + 2u]);
     if (usable == 0u || !(speed >= block->least_speed)) {
         ++to->refused;
     }
+    if (given[@NAME@_MOST + 1u] > @zero@) {
+        ++to->forward;
+    }
 }
 
-/* Ends a mean: takes off what counts as no change, and adds it to its bin. */
+/* Ends a mean. The one before it is used where those on both sides can be used too: the filter has seen a reversal some
+   samples before its own speed turns, and some after. */
 static void finish(@name@_state *state, uint32_t number, @real@ temperature)
 {
     const block_numbers *const block = &numbers[number];
-    const uint32_t changes = block->changes;
     @name@_gathered *const from = &state->gathered[number];
     const @real@ *const reference = state->record.reference[number];
+    const @real@ speed = from->sum[@NAME@_MOST + 1u] * @share@;
+    uint32_t way = (from->refused == 0u) ? ONE_WAY : 0u;
 
-    from->fresh = (from->refused == 0u && from->before != 0u) ? 1u : 0u;
-    from->before = (from->refused == 0u) ? 1u : 0u;
-    if (from->fresh != 0u) {
-        const @real@ speed = from->sum[changes + 1u] * @share@;
-        uint32_t bin = (speed > block->speeds[1]) ? 2u : ((speed > block->speeds[0]) ? 1u : 0u);
-
-        for (uint32_t i = 0u; i <= changes; ++i) {
-            from->mean[i] = from->sum[i] * @share@;
-        }
-        for (uint32_t i = 0u; i < changes; ++i) {
-            from->mean[changes] -= reference[i] * from->mean[i];
-        }
-        bin += (from->sum[changes + 2u] * @share@ > block->load) ? 3u : 0u;
-        bin += (temperature > @warm@) ? 6u : 0u;
-        add(&state->record.bins[number][bin], from->mean, changes);
+    if (way != 0u && block->least_speed > @zero@) {
+        way = (from->forward == 0u) ? BACKWARD : ((from->forward == @NAME@_LENGTH) ? FORWARD : 0u);
     }
-    for (uint32_t i = 0u; i <= changes + 2u; ++i) {
+    from->fresh = (way != 0u && from->before == way && from->earlier == way) ? 1u : 0u;
+    if (from->fresh != 0u) {
+        @real@ residual = from->held[@NAME@_MOST];
+
+        for (uint32_t i = 0u; i < @NAME@_MOST; ++i) {
+            from->mean[i] = from->held[i];
+            residual -= reference[i] * from->held[i];
+        }
+        from->mean[@NAME@_MOST] = residual;
+        add(&state->record.bins[number][from->bin], from->mean);
+    }
+    from->earlier = from->before;
+    from->before = way;
+    from->bin = (speed > block->speeds[1]) ? 2u : ((speed > block->speeds[0]) ? 1u : 0u);
+    from->bin += (from->sum[@NAME@_MOST + 2u] * @share@ > block->load) ? 3u : 0u;
+    from->bin += (temperature > @warm@) ? 6u : 0u;
+    for (uint32_t i = 0u; i <= @NAME@_MOST; ++i) {
+        from->held[i] = from->sum[i] * @share@;
         from->sum[i] = @zero@;
     }
+    from->sum[@NAME@_MOST + 1u] = @zero@;
+    from->sum[@NAME@_MOST + 2u] = @zero@;
     from->refused = 0u;
+    from->forward = 0u;
 }
 
-uint32_t @name@_take(@name@_state *state, const @real@ given[@NAME@_COLUMNS], uint32_t usable, @real@ temperature)
+uint32_t @name@_take(@name@_state *state, const @real@ given[@NAME@_BLOCKS * @NAME@_COLUMNS], uint32_t usable, @real@ temperature)
 {
     uint32_t word = @NAME@_NOT_STARTED;
 
@@ -202,7 +220,7 @@ uint32_t @name@_take(@name@_state *state, const @real@ given[@NAME@_COLUMNS], ui
             used = 0u;
         }
         for (uint32_t i = 0u; i < @NAME@_BLOCKS; ++i) {
-            gather(&state->gathered[i], &given[numbers[i].column], &numbers[i], used);
+            gather(&state->gathered[i], &given[i * @NAME@_COLUMNS], &numbers[i], used);
         }
         if (sample < @NAME@_BLOCKS) {
             finish(state, sample, temperature);
@@ -210,7 +228,7 @@ uint32_t @name@_take(@name@_state *state, const @real@ given[@NAME@_COLUMNS], ui
             const uint32_t number = sample - @NAME@_BLOCKS;
 
             if (state->gathered[number].fresh != 0u) {
-                add(&state->record.recent[number], state->gathered[number].mean, numbers[number].changes);
+                add(&state->record.recent[number], state->gathered[number].mean);
             }
         } else if (state->task != 0u) {
             go_on(state);
@@ -235,7 +253,7 @@ uint32_t @name@_step(@name@_state *state, const @name@_residuals_inputs *inputs,
 {
     @name@_residuals_outputs outputs;
     const uint32_t status = @name@_residuals_step(&state->residuals, inputs, &outputs);
-    const @real@ given[@NAME@_COLUMNS] = {
+    const @real@ given[@NAME@_BLOCKS * @NAME@_COLUMNS] = {
         @given@
     };
 
@@ -244,25 +262,21 @@ uint32_t @name@_step(@name@_state *state, const @name@_residuals_inputs *inputs,
 
 void @name@_init(@name@_state *state)
 {
-    static const @name@_record empty = {
-        .magic = @magic@,
-        .version = @version@u,
-        .size = (uint32_t)sizeof(@name@_record),
-        .real = (uint32_t)sizeof(@real@),
-        .digest = {@digest@},
-        .word = @NAME@_LITTLE_EVIDENCE,
-    };
-    static const @name@_gathered nothing = {.refused = 1u};
+    static const uint32_t digest[4] = {@digest@};
 
+    *state = (@name@_state){0};
     (void)@name@_residuals_init(&state->residuals, NULL);
-    state->record = empty;
-    for (uint32_t i = 0u; i < @NAME@_BLOCKS; ++i) {
-        state->gathered[i] = nothing;
+    state->record.magic = @magic@;
+    state->record.version = @version@u;
+    state->record.size = (uint32_t)sizeof(@name@_record);
+    state->record.real = (uint32_t)sizeof(@real@);
+    state->record.word = @NAME@_LITTLE_EVIDENCE;
+    for (uint32_t i = 0u; i < 4u; ++i) {
+        state->record.digest[i] = digest[i];
     }
-    state->sample = 0u;
-    state->means = 0u;
-    state->task = 0u;
-    state->found = 0u;
+    for (uint32_t i = 0u; i < @NAME@_BLOCKS; ++i) {
+        state->gathered[i].refused = 1u;
+    }
     state->settling = SETTLING;
     state->started = STARTED;
 }
@@ -290,18 +304,20 @@ uint32_t @name@_commission(@name@_state *state)
                 all.products[i] += bins[bin].products[i];
             }
         }
-        fill(state->work, &all, changes);
+        fill(state->work, &all);
         for (uint32_t i = 0u; i < changes; ++i) {
-            sweep(state->work, changes, i);
+            sweep(state->work, i, 0u);
+            sweep(state->work, i, 1u);
         }
         for (uint32_t i = 0u; i < changes; ++i) {
-            state->record.reference[number][i] += state->work[i][changes];
+            state->record.reference[number][i] += state->work[i][@NAME@_MOST];
         }
         for (uint32_t bin = 0u; bin < @NAME@_BINS; ++bin) {
             forget(&bins[bin], @zero@);
         }
         forget(&state->record.recent[number], @zero@);
         state->gathered[number].before = 0u;
+        state->gathered[number].earlier = 0u;
         state->gathered[number].fresh = 0u;
     }
     if (enough != 0u) {

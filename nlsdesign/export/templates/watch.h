@@ -10,11 +10,11 @@
 extern "C" {
 #endif
 
-#define @NAME@_BLOCKS @blocks@
-#define @NAME@_MOST @most@ /* changes of the block that has most */
-#define @NAME@_PAIRS @pairs@ /* products of the residual and the changes, each pair once */
-#define @NAME@_BINS @bins@ /* of speed, load and temperature */
-#define @NAME@_COLUMNS @columns@ /* what the residuals give in a sample */
+#define @NAME@_BLOCKS @blocks@u
+#define @NAME@_MOST @most@u /* changes of the block that has most */
+#define @NAME@_PAIRS @pairs@u /* products of the residual and the changes, each pair once */
+#define @NAME@_BINS @bins@u /* of speed, load and temperature */
+#define @NAME@_COLUMNS (@NAME@_MOST + 3u) /* of a block in a sample: changes, residual, speed, load */
 #define @NAME@_LENGTH @length@u /* samples whose mean is one residual */
 #define @NAME@_PERIOD @period@u /* such means between two judgements */
 
@@ -41,7 +41,7 @@ typedef struct {
     uint32_t judged; /* periods since init */
     uint32_t word; /* of the last judgement */
     @real@ reference[@NAME@_BLOCKS][@NAME@_MOST]; /* changes that count as none; a unit is the change to be noticed */
-    @name@_moments recent[@NAME@_BLOCKS]; /* what is judged; a third of it is forgotten in each period */
+    @name@_moments recent[@NAME@_BLOCKS]; /* what is judged; a quarter of it is forgotten in each period */
     @name@_moments bins[@NAME@_BLOCKS][@NAME@_BINS]; /* forgotten with a time constant of @memory@ s */
     uint32_t checksum; /* CRC-32 of all before it */
     uint32_t spare;
@@ -49,10 +49,14 @@ typedef struct {
 
 /* Sums of the mean that is being formed. */
 typedef struct {
-    @real@ sum[@NAME@_MOST + 3];
-    @real@ mean[@NAME@_MOST + 1];
+    @real@ sum[@NAME@_COLUMNS];
+    @real@ held[@NAME@_MOST + 1u]; /* the last mean */
+    @real@ mean[@NAME@_MOST + 1u]; /* the one before it, where it is used */
+    uint32_t bin; /* of the last mean */
     uint32_t refused; /* samples that cannot be used */
-    uint32_t before; /* whether the last mean could be used */
+    uint32_t forward; /* samples of motion in the positive direction */
+    uint32_t before; /* how the last mean can be used, 0 if not */
+    uint32_t earlier; /* the same of the one before it */
     uint32_t fresh; /* whether a mean waits to be added to the recent ones */
 } @name@_gathered;
 
@@ -61,7 +65,7 @@ typedef struct {
     @name@_residuals_state residuals;
     @name@_record record;
     @name@_gathered gathered[@NAME@_BLOCKS];
-    @real@ work[@NAME@_MOST + 1][@NAME@_MOST + 1];
+    @real@ work[@NAME@_MOST + 1u][@NAME@_MOST + 1u];
     uint32_t sample; /* in the mean */
     uint32_t means; /* in the period */
     uint32_t task; /* of the judgement, 0 where none goes on */
@@ -77,7 +81,7 @@ void @name@_init(@name@_state *state);
 uint32_t @name@_step(@name@_state *state, const @name@_residuals_inputs *inputs, @real@ temperature);
 
 /* The second half of the step, from what the residuals give; for tests. */
-uint32_t @name@_take(@name@_state *state, const @real@ given[@NAME@_COLUMNS], uint32_t usable, @real@ temperature);
+uint32_t @name@_take(@name@_state *state, const @real@ given[@NAME@_BLOCKS * @NAME@_COLUMNS], uint32_t usable, @real@ temperature);
 
 /* Takes the machine as it is for the one that is to be held: what the evidence of the last minutes points to counts as
    no change from now on. 1 if it was taken, 0 if there is too little evidence. To be called between two steps, beside

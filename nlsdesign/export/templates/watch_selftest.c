@@ -8,7 +8,7 @@
 int main(void)
 {
     static @name@_state state;
-    @real@ given[@NAME@_COLUMNS];
+    @real@ given[@NAME@_BLOCKS * @NAME@_COLUMNS] = {0};
     uint32_t word = 1u;
     uint32_t told = 0u;
     int differs = 0;
