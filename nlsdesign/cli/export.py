@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..model import FlatModel
 
 _LAW = ("law", "bandwidth", "velocity_bandwidth")
-OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
+OBSERVER, CONTROLLER, BOTH, WATCH = "observer", "controller", "both", "watch"
 
 
 @click.group()
@@ -45,6 +45,8 @@ def export() -> None:
 def _writes(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for."""
     name = "torque_loop" if given["what"] == BOTH else given["what"]
+    if name == WATCH:
+        return [*c_names(name), *c_names(f"{name}_residuals")]
     further = (
         (".hpp", "_supervisor.h", "_example_posix.c", "_example_cortex_m.c", ".mk")
         if given["examples"]
@@ -63,15 +65,17 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
         "nlsdesign export c --deck austin2015_figure_consistent --what both --real float --flash 64kB "
         "--examples",
         "nlsdesign export c --deck my.toml --what controller --law pid --dry-run",
+        "nlsdesign export c --deck austin2015_figure_consistent --what watch --real float",
     ),
 )
 @deck_option
 @click.option(
     "--what",
-    type=click.Choice([OBSERVER, CONTROLLER, BOTH]),
+    type=click.Choice([OBSERVER, CONTROLLER, BOTH, WATCH]),
     default=OBSERVER,
     show_default=True,
-    help="both: observer and torque controller as one step, which keeps the current itself.",
+    help="both: observer and torque controller as one step, which keeps the current itself. watch: a monitor beside "
+    "the observer that says when the deck no longer holds.",
 )
 @kind_option
 @law_options
@@ -98,6 +102,9 @@ def export_code(
 
     The observer is by default the one that is best over the spread of the deck.
     """
+    if what == WATCH:
+        export_monitor(deck_name, sample_time, out, real, as_json, chosen)
+        return
     from ..export import export_c, prove_step, write_examples, write_package
     from ..foundation.progress import Steps
     from ..model import flatten
@@ -134,6 +141,27 @@ def export_code(
     show_written(as_json, (model.description, *sentences), written, name=name, warnings=remarks)
     if proof is not None and not proof.holds:
         raise click.exceptions.Exit(1)
+
+
+_OF_A_STEP = ("examples", "package", "prove", "with_block")
+
+
+def export_monitor(
+    deck_name: str, sample_time: float, out: Path, real: str, as_json: bool, chosen: Mapping[str, Any]
+) -> None:  # fmt: skip
+    """Write the monitor of a deck."""
+    from ..components import smoothed
+    from ..export import export_watch
+    from ..model import flatten
+    from ..regeneration import watch_plan
+
+    given = [f"--{name.removeprefix('with_')}" for name in _OF_A_STEP if chosen[name]]
+    if given:
+        raise click.BadParameter(f"{given[0]} is of an observer or controller; leave it out for --what {WATCH}")
+    plan = watch_plan(flatten(smoothed(machine_of(deck_name))), sample_time)
+    source = export_watch(plan, out, real=real)
+    words = [f"{block.name}: {', '.join(block.changes)}" for block in plan.blocks]
+    show_written(as_json, (f"monitor of {plan.model.name.removesuffix('_residuals')}", *words), source.files, name=source.name)
 
 
 class SampledPart(NamedTuple):

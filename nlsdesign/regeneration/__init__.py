@@ -1,7 +1,8 @@
 """What takes several rooms: from one declared machine to everything that runs it.
 
 Which commands a deck is ready for, observers that keep a size of flash, the observer designed again from the
-better model of a diagnosis, the published observer with poles from records, and all files of a machine.
+better model of a diagnosis, the published observer with poles from records, what a monitor computes and what its
+evidence says, and all files of a machine.
 Presentation and commands may import it; it decides nothing that a room below can decide alone.
 """
 
@@ -20,6 +21,8 @@ from .readiness import Readiness as Readiness
 from .readiness import errors_while_running as errors_while_running
 from .readiness import readiness
 from .regenerated_observer import Regeneration, regenerate, write_regeneration
+from .watch_model import watch_plan
+from .watch_reading import WatchedChange, WatchVerdict, read_watch
 from .watched_records import ObserverChoice
 
 __all__ = [
@@ -27,12 +30,16 @@ __all__ = [
     "ObserverChoice",
     "Regeneration",
     "SameTable",
+    "WatchVerdict",
+    "WatchedChange",
     "block_for",
     "export_machine",
     "fit_poles",
     "range_remarks",
+    "read_watch",
     "readiness",
     "regenerate",
     "sized_observer",
+    "watch_plan",
     "write_regeneration",
 ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,11 +30,11 @@ from .writer import CSource
 
 LENGTH = 20
 """Samples whose mean is one residual."""
-PERIOD, MEMORY = 10.0, 300.0
+PERIOD, MEMORY = 10.0, 150.0
 """Time between two judgements, and time constant of the evidence that is kept, s."""
 RECENTLY = 0.75
 """Share of the recent evidence that is kept from one judgement to the next."""
-LIMIT, SURE, LEAST = 0.5, 4.0, 200
+LIMIT, SURE, LEAST = 0.5, 4.0, 200.0
 """Share of the change to be noticed at which it is reported; standard errors that it must have; means that are needed."""
 PRIOR = 1.0
 """Standard deviation of a change before anything was seen, in changes that are to be noticed."""
@@ -89,12 +90,15 @@ class WatchPlan:
         Time until the filters have settled, s.
     between
         Time between two judgements, s.
+    least
+        Means of late that a judgement needs.
     """
 
     model: FlatModel
     blocks: tuple[WatchedBlock, ...]
     settling: float
     between: float = PERIOD
+    least: float = LEAST
 
     @property
     def most(self) -> int:
@@ -223,8 +227,8 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]  # fmt: skip
     literals = {
-        "one": 1.0, "prior": PRIOR**-2, "ridge": RIDGE, "tiny": 1e-30, "least": float(LEAST), "limit": LIMIT, "sure": SURE**2,
-        "kept": _kept(plan), "recently": RECENTLY, "share": 1.0 / LENGTH, "warm": WARM, "enough": 5.0 * LEAST,
+        "one": 1.0, "prior": PRIOR**-2, "ridge": RIDGE, "tiny": 1e-30, "least": plan.least, "limit": LIMIT, "sure": SURE**2,
+        "kept": _kept(plan), "recently": RECENTLY, "share": 1.0 / LENGTH, "warm": WARM, "enough": 5.0 * plan.least,
     }  # fmt: skip
     return {
         "title": title, "blocks": str(len(plan.blocks)), "most": str(plan.most), "pairs": str(pairs), "bins": str(BINS),
@@ -360,7 +364,7 @@ class WatchTwin:
 
     def _judged(self, moments: Any, number: int) -> int:
         k, r, work = len(self.plan.blocks[number].changes), self._r, self.work
-        if moments["count"] < r(LEAST):
+        if moments["count"] < r(self.plan.least):
             return 2
         variance, word = work[-1, -1] / (moments["count"] - r(k)), 0
         for i in range(k):
@@ -416,3 +420,50 @@ def _test_values(plan: WatchPlan, real: Real) -> dict[str, str | list[str]]:
         "test_samples": str(count), "expected": real.table("expected", rows), "drawn": drawn,
         "expected_word": f"0x{int(twin.record['word']):x}u", "tolerance": real.literal(2e-4 if real is Real.FLOAT else 1e-9),
     }  # fmt: skip
+
+
+def read_watch_record(path: str | Path, plan: WatchPlan) -> np.ndarray[Any, Any]:
+    """Return the evidence that a monitor has kept.
+
+    Parameters
+    ----------
+    path
+        File with the bytes of a record, sealed.
+    plan
+        What was watched.
+
+    Returns
+    -------
+    numpy.ndarray
+        One record of the fields of the C, shape ().
+
+    Raises
+    ------
+    ExportError
+        If the file cannot be read, is damaged, or is of another deck or another monitor.
+    """
+    place = str(path)
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise ExportError(place, f"cannot be read: {error.strerror or error}") from None
+    head = np.frombuffer(content[:32].ljust(32, b"\0"), "<u4")
+    if head[0] != MAGIC:
+        raise ExportError(place, "is no record of a monitor", next_step="write `state.record` to it after NAME_seal")
+    if head[1] != VERSION:
+        raise ExportError(place, f"has version {head[1]} of the format, {VERSION} is read", next_step="export the monitor again")
+    if tuple(head[4:6]) != plan.digest[:2]:
+        raise ExportError(place, f"is of another deck than {plan.model.origin.deck if plan.model.origin else 'this one'}",
+                          next_step="name the deck that the monitor was exported from, with --deck")  # fmt: skip
+    if tuple(head[6:8]) != plan.digest[2:]:
+        raise ExportError(place, "is of another monitor of this deck: another sample time or another version of nlsdesign",
+                          next_step="give its --sample-time, or read it with the version that exported it")  # fmt: skip
+    layout = plan.layout(Real.FLOAT if head[3] == 4 else Real.DOUBLE)
+    if len(content) != layout.itemsize or head[2] != layout.itemsize:
+        raise ExportError(place, f"has {len(content)} bytes where a record has {layout.itemsize}: it was cut, or has more in it")
+    record = np.frombuffer(content, layout)[0:1].reshape(())
+    if zlib.crc32(content[: layout.fields["checksum"][1]]) != int(record["checksum"]):
+        raise ExportError(place, "is damaged: the checksum does not fit", next_step="seal the record and write it again")
+    if not all(np.all(np.isfinite(record[group][field])) for group in ("recent", "bins") for field in ("count", "products")):
+        raise ExportError(place, "holds numbers that are not finite", next_step="start the monitor anew")
+    return record

@@ -52,11 +52,11 @@ static void forget(@name@_moments *moments, @real@ kept)
     }
 }
 
-/* Writes the moments as a full matrix, with what is known before of the changes. */
-static void fill(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *moments)
+/* Writes the moments as a full matrix, with what is known before of the changes, where the residuals leave a square. */
+static void fill(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *moments, @real@ square)
 {
+    const @real@ prior = (square / (moments->count + @one@)) * @prior@ + @tiny@;
     uint32_t at = 0u;
-    @real@ prior;
 
     for (uint32_t i = 0u; i <= @NAME@_MOST; ++i) {
         for (uint32_t j = 0u; j <= i; ++j) {
@@ -65,7 +65,6 @@ static void fill(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *moments
             ++at;
         }
     }
-    prior = (work[@NAME@_MOST][@NAME@_MOST] / (moments->count + @one@)) * @prior@ + @tiny@;
     for (uint32_t i = 0u; i < @NAME@_MOST; ++i) {
         work[i][i] += (work[i][i] * @ridge@) + prior;
     }
@@ -129,7 +128,7 @@ static void go_on(@name@_state *state)
     if (piece < @NAME@_BINS) {
         forget(&state->record.bins[block][piece], @kept@);
     } else if (piece == @NAME@_BINS) {
-        fill(state->work, recent);
+        fill(state->work, recent, recent->products[@NAME@_PAIRS - 1u]);
     } else if (piece <= @NAME@_BINS + (2u * numbers[block].changes)) {
         const uint32_t turn = piece - @NAME@_BINS - 1u;
 
@@ -304,10 +303,16 @@ uint32_t @name@_commission(@name@_state *state)
                 all.products[i] += bins[bin].products[i];
             }
         }
-        fill(state->work, &all);
-        for (uint32_t i = 0u; i < changes; ++i) {
-            sweep(state->work, i, 0u);
-            sweep(state->work, i, 1u);
+        @real@ square = all.products[@NAME@_PAIRS - 1u];
+
+        /* First with all that is left as noise, then with what the first solution leaves. */
+        for (uint32_t turn = 0u; turn < 2u; ++turn) {
+            fill(state->work, &all, square);
+            for (uint32_t i = 0u; i < changes; ++i) {
+                sweep(state->work, i, 0u);
+                sweep(state->work, i, 1u);
+            }
+            square = state->work[@NAME@_MOST][@NAME@_MOST];
         }
         for (uint32_t i = 0u; i < changes; ++i) {
             state->record.reference[number][i] += state->work[i][@NAME@_MOST];
