@@ -55,5 +55,5 @@ def as_step(source: WatchSource) -> CSource:
     files = {"watched.h": HEADER, "watched.c": SOURCE}
     for file, text in files.items():
         (folder / file).write_text(text.format(name=source.name), encoding="utf-8")
-    paths = [Path(folder) / file for file in files]
-    return CSource("watched", source.plan.model, source.real, *paths, source.selftest)
+    header, code = (Path(folder) / file for file in files)
+    return CSource("watched", source.plan.model, source.real, header, code, source.selftest)

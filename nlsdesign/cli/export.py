@@ -74,8 +74,8 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     type=click.Choice([OBSERVER, CONTROLLER, BOTH, WATCH]),
     default=OBSERVER,
     show_default=True,
-    help="both: observer and torque controller as one step, which keeps the current itself. watch: a monitor beside "
-    "the observer that says when the deck no longer holds.",
+    help="both: observer and torque controller as one step, which keeps the current itself. "
+    "watch: a monitor that says in use when the deck no longer holds.",
 )
 @kind_option
 @law_options
@@ -157,11 +157,18 @@ def export_monitor(
 
     given = [f"--{name.removeprefix('with_')}" for name in _OF_A_STEP if chosen[name]]
     if given:
-        raise click.BadParameter(f"{given[0]} is of an observer or controller; leave it out for --what {WATCH}")
+        raise click.BadParameter(
+            f"{given[0]} is of an observer or controller; leave it out for --what {WATCH}"
+        )
     plan = watch_plan(flatten(smoothed(machine_of(deck_name))), sample_time)
     source = export_watch(plan, out, real=real)
     words = [f"{block.name}: {', '.join(block.changes)}" for block in plan.blocks]
-    show_written(as_json, (f"monitor of {plan.model.name.removesuffix('_residuals')}", *words), source.files, name=source.name)
+    show_written(
+        as_json,
+        (f"monitor of {plan.model.name.removesuffix('_residuals')}", *words),
+        source.files,
+        name=source.name,
+    )
 
 
 class SampledPart(NamedTuple):

@@ -1,9 +1,9 @@
 """What takes several rooms: from one declared machine to everything that runs it.
 
 Which commands a deck is ready for, observers that keep a size of flash, the observer designed again from the
-better model of a diagnosis, the published observer with poles from records, what a monitor computes and what its
-evidence says, and all files of a machine.
-Presentation and commands may import it; it decides nothing that a room below can decide alone.
+better model of a diagnosis, the published observer with poles from records, what a monitor computes and what
+its evidence says, and all files of a machine. Presentation and commands may import it; it decides nothing
+that a room below can decide alone.
 """
 
 from .exported_machine import MACHINE as MACHINE

@@ -1,20 +1,21 @@
 """What a monitor computes from each sample: residuals of the blocks, and what each change would add to them.
 
-The model is cut into the blocks of a diagnosis. Readings pass a low-pass filter, all the same one, which gives their rates
-too; a motion runs straight between two samples, a current is held. A residual r is the sum of efforts that the filtered
-readings leave, and the model no longer holds where r follows φ, what a small change of a number would add:
-r = Σ δᵢ·φᵢ with δᵢ in units of the change that is to be noticed. What depends on one motion alone is tabulated.
+The model is cut into the blocks of a diagnosis. Readings pass a low-pass filter, all the same one, which
+gives their rates too; a motion runs straight between two samples, a current is held. A residual r is the sum
+of efforts that the filtered readings leave, and the model no longer holds where r follows φ, what a small
+change of a number would add: r = Σ δᵢ·φᵢ with δᵢ in units of the change that is to be noticed. What depends
+on one motion alone is tabulated.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import expm
 
 from ..bench.discrepancy.tearing import blocks_of
 from ..bench.identification.equation_error.block import Block, Drive
@@ -32,10 +33,15 @@ from ..model.roles import contour_ends, declared_reading, motor_of, with_declare
 LAGS = 2.0
 """Time constant of each of the three stages of the filter, in samples."""
 NOTICED = {
-    "sliding_effort": ("friction", 0.1), "stiffness": ("stiffness", 0.05), "modulus": ("stiffness", 0.05),
-    "viscosity": ("stiffness", 0.05), "damping": ("damping", 0.5), "inertia": ("inertia", 0.1), "mass": ("inertia", 0.1),
+    "sliding_effort": ("friction", 0.1),
+    "stiffness": ("stiffness", 0.05),
+    "modulus": ("stiffness", 0.05),
+    "viscosity": ("stiffness", 0.05),
+    "damping": ("damping", 0.5),
+    "inertia": ("inertia", 0.1),
+    "mass": ("inertia", 0.1),
     "horizontal_torque": ("load", 0.05),
-}  # fmt: skip
+}
 """Last name of a number: the change that it takes part in, and the share that is to be noticed."""
 NOTICED_SHARES = dict(NOTICED.values())
 DELAY = 2e-3
@@ -43,7 +49,8 @@ DELAY = 2e-3
 LEAST_SPEED = 5.0
 """Times the creep speed of the deck, or counts per stage of the filter, below which friction may stick."""
 FINE, SAME = 4097, 1e-9
-"""Rows from which those of a table are chosen; share of a column by which it may differ from a sum of others."""
+"""Rows from which those of a table are chosen; share of a column by which it may differ from a sum of
+others."""
 TABLE_ERROR = 2e-4
 """Largest error of a column by interpolation, as a share of its largest value."""
 
@@ -68,7 +75,7 @@ def _filtered(reading: str, sample_time: float, held: bool) -> Filtered:
     # One matrix exponential of the stages, the value and the slope of what drives them.
     whole = np.zeros((5, 5))
     whole[:3, :3], whole[:3, 3], whole[3, 4] = chain, drive, 1.0
-    over = ca.DM(_exponential(whole * sample_time)[:3])
+    over = ca.DM(expm(whole * sample_time)[:3])
     slope = ca.SX(0) if held else (seen - previous) / sample_time
     following = ca.mtimes(over, ca.vertcat(stages, previous, slope))
     first, second, third = ca.vertsplit(stages)
@@ -76,17 +83,8 @@ def _filtered(reading: str, sample_time: float, held: bool) -> Filtered:
     return Filtered(stages, previous, following, values, seen, held)
 
 
-def _exponential(matrix: Array) -> Array:
-    """Return the exponential of a small matrix by its series, scaled and squared."""
-    scaled, result, term = matrix / 64.0, np.eye(len(matrix)), np.eye(len(matrix))
-    for k in range(1, 16):
-        term = term @ scaled / k
-        result = result + term
-    return np.linalg.matrix_power(result, 64)
-
-
 def _changes(block: Block) -> Mapping[str, tuple[float, list[int]]]:
-    """Return the changes that a block can tell: share to be noticed, and numbers that change together, by name."""
+    """Return what a block can tell: share to be noticed, and numbers that change together, by name."""
     s, model = block.model.symbols(), block.model
     everything = ca.densify(ca.jacobian(ca.vertcat(s.derivative, s.output), s.parameter))
     changes: dict[str, tuple[float, list[int]]] = {}
@@ -100,7 +98,7 @@ def _changes(block: Block) -> Mapping[str, tuple[float, list[int]]]:
 
 
 class Told(NamedTuple):
-    """What a block tells of filtered readings: residual, changes, speed and load; its inner states; its tables."""
+    """What a block tells of filtered readings, its inner states, and its tables."""
 
     names: tuple[str, ...]  # of the changes
     rows: list[Expression]  # residual, what each change adds to it, speed, load
@@ -115,27 +113,16 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
     model, s = block.model, block.model.symbols()
     numbers, count = ca.DM(model.start(model.parameters)), len(model.states)
     moving, late, load = ca.SX.sym("moving", s.input.numel()), ca.SX(0), ca.SX(0)
-    whole, states, added = ca.vertcat(*ca.vertsplit(ca.densify(s.derivative))[:count], s.output), [s.state], {}
-    for name, (share, members) in _changes(block).items():
-        step = ca.SX.zeros(numbers.numel())
-        step[members] = share * numbers[members]
-        jump = ca.densify(ca.jtimes(whole, s.parameter, step))
-        if count and not _vanishes(jump[:count], s, numbers):
-            states.append(ca.SX.sym(f"{name}.inner", count))
-            jump += ca.jtimes(whole, s.state, states[-1])
-        added[name] = jump
-    if not any(filters[d.signal].held and ca.depends_on(s.output, s.input[i]) for i, d in _driven(block)):
+    state, slopes, added = _sensitivities(block, s, numbers)
+    for i, drive in _driven(block):
+        if filters[drive.signal].held and ca.depends_on(s.output, s.input[i]):
+            slope = ca.jacobian(s.output, s.input[i])
+            late, load = late + slope * moving[i], load + slope * s.input[i]
+    if late.is_zero():
         # Efforts that nothing measured drives are known up to a common factor: the spring is its measure.
         spring = added.pop(next((name for name in added if name.endswith(".stiffness")), ""), None)
         load = load if spring is None else spring[count]
-    told = [jump[:count] for jump in added.values() if ca.depends_on(jump, ca.vertcat(ca.SX(0, 1), *states[1:]))]
-    state, slopes = ca.vertcat(*states), ca.vertcat(whole[:count], *told)
     names, rows = list(added), [s.output, *[-jump[count] for jump in added.values()]]
-    for i, v in enumerate(model.inputs):
-        drive = block.drives.get(v.name)
-        if drive and filters[drive.signal].held and ca.depends_on(s.output, s.input[i]):
-            slope = ca.jacobian(s.output, s.input[i])
-            late, load = late + slope * moving[i], load + slope * s.input[i]
     if not late.is_zero():
         names, rows = [*names, f"{block.name}.delay"], [*rows, DELAY * late]
     following, slowest = ca.SX(0, 1), 0.0
@@ -143,15 +130,41 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
         # Half a sample ahead along the motion, and the implicit half of the trapezoid along the states.
         ahead = slopes + 0.5 * sample_time * ca.mtimes(ca.jacobian(slopes, s.input), moving)
         inner = ca.jacobian(slopes, state)
-        following = state + sample_time * ca.solve(ca.SX.eye(state.numel()) - 0.5 * sample_time * inner, ahead)
+        implicit = ca.SX.eye(state.numel()) - 0.5 * sample_time * inner
+        following = state + sample_time * ca.solve(implicit, ahead)
         at = ca.Function("at", [state, s.input, s.parameter], [inner])(0, model.start(model.inputs), numbers)
         slowest = 1.0 / max(float(np.min(np.abs(np.linalg.eigvals(at.full())))), 1e-3)
-    speed = s.input[[v.name for v in model.inputs].index(block.moving)]
-    results = [ca.vertcat(*rows, speed, load), following]
-    results = ca.substitute(results, [s.parameter], [ca.SX(numbers)])
-    function = ca.Function("told", [state, s.input, moving], results)
+    speed = s.input[[v.name for v in model.inputs].index(str(block.moving))]
+    results = ca.substitute([ca.vertcat(*rows, speed, load), following], [s.parameter], [ca.SX(numbers)])
+    told = ca.Function("told", [state, s.input, moving], results)
+    (shown, following), tables, columns = _tabulated(told, block, filters, plant, state)
+    return Told(tuple(names), ca.vertsplit(shown), state, following, slowest, tables, columns)
+
+
+def _sensitivities(
+    block: Block, s: Symbols, numbers: ca.DM
+) -> tuple[Expression, Expression, dict[str, Expression]]:
+    """Return the states with what each change does to them, their slopes, and what it does to all rows."""
+    count = len(block.model.states)
+    whole = ca.vertcat(*ca.vertsplit(ca.densify(s.derivative))[:count], s.output)
+    states, slopes, added = [s.state], [whole[:count]], {}
+    for name, (share, members) in _changes(block).items():
+        step = ca.SX.zeros(numbers.numel())
+        step[members] = share * numbers[members]
+        added[name] = ca.densify(ca.jtimes(whole, s.parameter, step))
+        if count and not _vanishes(added[name][:count], s, numbers):
+            states.append(ca.SX.sym(f"{name}.inner", count))
+            added[name] += ca.jtimes(whole, s.state, states[-1])
+            slopes.append(added[name][:count])
+    return ca.vertcat(*states), ca.vertcat(*slopes), added
+
+
+def _tabulated(
+    told: ca.Function, block: Block, filters: Mapping[str, Filtered], plant: FlatModel, state: Expression
+) -> tuple[list[Expression], tuple[Table, ...], list[Expression]]:
+    """Return what a block tells of filtered readings, with tables and the symbols of their columns."""
     value, rate, places, held = [], [], {}, set()
-    for i, v in enumerate(model.inputs):
+    for i, v in enumerate(block.model.inputs):
         drive = block.drives.get(v.name)
         seen = filters[drive.signal].values if drive else (ca.SX(v.start), ca.SX(0), ca.SX(0))
         order = drive.order if drive else 0
@@ -161,13 +174,12 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
             held.add(i)
         elif order == 0:
             places[i] = drive.signal
-    reading = _Tabulation(function, [state, ca.vertcat(*value), ca.vertcat(*rate)], places, held, plant)
+    reading = _Tabulation(told, [state, ca.vertcat(*value), ca.vertcat(*rate)], places, held, plant)
     results = reading.results()
     tables, columns, every, combined = reading.tables()
     if every:
         results = ca.substitute(results, [ca.vertcat(*every)], [ca.vertcat(*combined)])
-    shown, following = results
-    return Told(tuple(names), ca.vertsplit(shown), state, following, slowest, tables, columns)
+    return results, tables, columns
 
 
 def _driven(block: Block) -> Iterator[tuple[int, Drive]]:
@@ -175,16 +187,18 @@ def _driven(block: Block) -> Iterator[tuple[int, Drive]]:
     return ((i, block.drives[v.name]) for i, v in enumerate(block.model.inputs) if v.name in block.drives)
 
 
-def _vanishes(column: Expression, s: Symbols, numbers: Array) -> bool:
+def _vanishes(column: Expression, s: Symbols, numbers: ca.DM) -> bool:
     """Say whether an expression of a block is zero wherever it is evaluated."""
     at = ca.Function("at", [s.state, s.input], [ca.substitute(column, s.parameter, ca.SX(numbers))])
     draw = np.random.default_rng(1)
-    sizes = [np.abs(at(*(draw.normal(size=a.numel()) for a in (s.state, s.input))).full()).max() for _ in range(8)]
-    return max(sizes) < 1e-9
+    sizes = [
+        np.abs(at(*(draw.normal(size=a.numel()) for a in (s.state, s.input))).full()).max() for _ in range(8)
+    ]
+    return bool(max(sizes) < 1e-9)
 
 
 class _Node(NamedTuple):
-    """A value of a function: its expression, which inputs it follows from, and its value in the middle of the drives."""
+    """A value of a function, which inputs it follows from, and what it is in the middle of the drives."""
 
     expression: Expression
     inputs: frozenset[int]
@@ -198,16 +212,23 @@ LEAST_WORK = 60
 
 
 class _Tabulation:
-    """A function in which what follows from one motion alone is looked up, and a drive is within its limits."""
+    """A function in which what follows from one motion alone is looked up, with drives within their limits."""
 
     def __init__(
-        self, function: ca.Function, given: Sequence[Expression], places: Mapping[int, str], held: set[int], plant: FlatModel
+        self,
+        function: ca.Function,
+        given: Sequence[Expression],
+        places: Mapping[int, str],
+        held: set[int],
+        plant: FlatModel,
     ) -> None:
         self.function, self.given, self.places, self.held, self.plant = function, given, places, held, plant
         self.columns: dict[int, dict[int, tuple[Expression, Expression]]] = {i: {} for i in places}
         self.symbols = {i: ca.SX.sym(f"place_{i}") for i in places}
         work = dict.fromkeys(places, 0)
-        fold(read_graph(function), self._input, self._constant, combined=lambda o, a: self._counted(o, a, work))
+        fold(
+            read_graph(function), self._input, self._constant, combined=lambda o, a: self._counted(o, a, work)
+        )
         self.tabulated = {i for i, operations in work.items() if operations >= LEAST_WORK}
         for column in self.columns.values():
             column.clear()
@@ -228,7 +249,9 @@ class _Tabulation:
             work[place] += 1
         return node
 
-    def _combined(self, operation: int, operands: Sequence[_Node], wanted: Collection[int] | None = None) -> _Node:
+    def _combined(
+        self, operation: int, operands: Sequence[_Node], wanted: Collection[int] | None = None
+    ) -> _Node:
         wanted = self.tabulated if wanted is None else wanted
         inputs = frozenset().union(*[each.inputs for each in operands])
         middle = None
@@ -263,7 +286,7 @@ class _Tabulation:
         return as_results(self.function, read)
 
     def tables(self) -> tuple[tuple[Table, ...], list[Expression], list[Expression], list[Expression]]:
-        """Return tables over the filtered motions, the symbols of their columns, and all symbols with what they are."""
+        """Return tables over motions, the symbols of their columns, and all symbols with what they are."""
         tables, symbols, every, combined = [], [], [], []
         for place, rows in self.columns.items():
             if not rows:
@@ -275,8 +298,12 @@ class _Tabulation:
             basis, shares = _independent(values)
             columns = [ca.SX.sym(f"column_{place}_{i}") for i in basis]
             chosen = _breakpoints(values[:, basis])
-            named = tuple(Variable(f"{signal}.column[{i + 1}]", "", "over the angle") for i in range(len(basis)))
-            tables.append(Table.over(f"{signal}.stage[3]", fine[chosen], named, values[np.ix_(chosen, basis)]))
+            named = tuple(
+                Variable(f"{signal}.column[{i + 1}]", "", "over the angle") for i in range(len(basis))
+            )
+            tables.append(
+                Table.over(f"{signal}.stage[3]", fine[chosen], named, values[np.ix_(chosen, basis)])
+            )
             symbols += columns
             every += [symbol for symbol, _ in rows.values()]
             combined += [_weighted(row, [*columns, ca.SX(1)]) for row in shares]
@@ -289,8 +316,9 @@ def _weighted(shares: Array, terms: Sequence[Expression]) -> Expression:
 
 
 def _independent(values: Array) -> tuple[list[int], Array]:
-    """Return columns of which all are sums, and the shares of these and of one in each, shape (columns, basis + 1)."""
-    ones, basis, known = np.ones((len(values), 1)), [], []
+    """Return columns that make up all others, and their shares in each: (columns, basis + 1)."""
+    basis: list[int] = []
+    ones, known = np.ones((len(values), 1)), []
     for i, column in enumerate(values.T):
         size = float(np.abs(column).max()) or 1.0
         for members in ([], *[[b] for b in basis], basis):
@@ -382,34 +410,56 @@ def watch_plan(model: FlatModel, sample_time: float = 1e-3) -> WatchPlan:
 
 
 def _residual_model(
-    model: FlatModel, blocks: Sequence[WatchedBlock], told: Sequence[Told], filters: Mapping[str, Filtered], sample_time: float
+    model: FlatModel,
+    blocks: Sequence[WatchedBlock],
+    told: Sequence[Told],
+    filters: Mapping[str, Filtered],
+    sample_time: float,
 ) -> FlatModel:
     """Return what gives the residuals in each sample, as a sampled model."""
     inner = [t.state for t in told]
     state = ca.vertcat(*[ca.vertcat(f.stages, f.previous) for f in filters.values()], *inner)
-    following = ca.vertcat(*[ca.vertcat(f.following, f.seen) for f in filters.values()], *[t.following for t in told])
+    following = ca.vertcat(
+        *[ca.vertcat(f.following, f.seen) for f in filters.values()], *[t.following for t in told]
+    )
     readings = ca.vertcat(*[f.seen for f in filters.values()])
     table = ca.vertcat(ca.SX(0, 1), *[c for t in told for c in t.columns])
     states = [Variable(f"{n}.{part}", "", "of the filter") for n in filters
               for part in ("stage[1]", "stage[2]", "stage[3]", "previous")]  # fmt: skip
-    states += [Variable(f"{block.name}.inner[{i + 1}]", "", "inner state") for block, rows in zip(blocks, inner, strict=True)
-               for i in range(rows.numel())]  # fmt: skip
+    states += [
+        Variable(f"{block.name}.inner[{i + 1}]", "", "inner state")
+        for block, rows in zip(blocks, inner, strict=True)
+        for i in range(rows.numel())
+    ]
     outputs = []
     for block in blocks:
         columns = [f"change[{i + 1}]" for i in range(len(block.changes))]
         texts = [*block.changes, "efforts that are left", "of the body", "of the drive or the spring"]
-        outputs += [Variable(f"{block.name}.{n}", "", text)
-                    for n, text in zip([*columns, "residual", "rate", "load"], texts, strict=True)]  # fmt: skip
+        outputs += [
+            Variable(f"{block.name}.{n}", "", text)
+            for n, text in zip([*columns, "residual", "rate", "load"], texts, strict=True)
+        ]
     rows = [e for t in told for e in (*t.rows[1:-2], t.rows[0], *t.rows[-2:])]
-    begun = ca.vertcat(*[f.seen for f in filters.values() for _ in range(4)], *[ca.SX.zeros(i.numel()) for i in inner])
+    begun = ca.vertcat(
+        *[f.seen for f in filters.values() for _ in range(4)], *[ca.SX.zeros(i.numel()) for i in inner]
+    )
     arguments = [state, readings, ca.SX(0, 1), table]
     return FlatModel(
-        name=f"{model.name}_residuals", description=f"Efforts that readings of {model.name} leave, and what changes add",
-        states=tuple(states), inputs=tuple(_reading(model, n, sample_time) for n in filters), parameters=(),
-        outputs=tuple(outputs), signals=(), sample_time=sample_time, tables=tuple(t for each in told for t in each.tables),
-        equations=stated_equations(state, readings, derivative=following, output=ca.vertcat(*rows), table=table),
-        begin=ca.Function("begin", arguments, [begun, begun]), origin=model.origin,
-    )  # fmt: skip
+        name=f"{model.name}_residuals",
+        description=f"Efforts that readings of {model.name} leave, and what changes add",
+        states=tuple(states),
+        inputs=tuple(_reading(model, n, sample_time) for n in filters),
+        parameters=(),
+        outputs=tuple(outputs),
+        signals=(),
+        sample_time=sample_time,
+        tables=tuple(t for each in told for t in each.tables),
+        equations=stated_equations(
+            state, readings, derivative=following, output=ca.vertcat(*rows), table=table
+        ),
+        begin=ca.Function("begin", arguments, [begun, begun]),
+        origin=model.origin,
+    )
 
 
 def _reading(model: FlatModel, signal: str, sample_time: float) -> Variable:
@@ -418,7 +468,12 @@ def _reading(model: FlatModel, signal: str, sample_time: float) -> Variable:
     variable = replace(model.variable(shown), name=signal, description=f"{signal}, {shown}", start=0.0)
     if shown in {v.name for v in model.inputs}:
         limit = _largest_drive(model, of_effort=False)
-        return replace(variable, description=f"{shown} that acts from this reading to the next", minimum=-limit, maximum=limit)
+        return replace(
+            variable,
+            description=f"{shown} that acts from this reading to the next",
+            minimum=-limit,
+            maximum=limit,
+        )
     return with_declared_reading(variable, model, shown)
 
 
@@ -431,7 +486,9 @@ def _largest_drive(model: FlatModel, *, of_effort: bool = True) -> float:
 
 
 def _watched(block: Block, told: Told, model: FlatModel, largest: float, sample_time: float) -> WatchedBlock:
-    noticed = [DELAY if name.endswith(".delay") else NOTICED_SHARES[name.rpartition(".")[2]] for name in told.names]
+    noticed = [
+        DELAY if name.endswith(".delay") else NOTICED_SHARES[name.rpartition(".")[2]] for name in told.names
+    ]
     units = tuple("s" if name.endswith(".delay") else "" for name in told.names)
     creep = [v.start for v in block.model.parameters if v.name.endswith(".creep_speed") and _rubs(block)]
     drive = block.drives[str(block.moving)]

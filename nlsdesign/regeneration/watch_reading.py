@@ -1,7 +1,8 @@
-"""What the evidence of a monitor says: which number changed, with which probability, or that nothing can be said.
+"""What the evidence of a monitor says: which number changed, how probably, or that nothing can be said.
 
-The sums of a monitor give what each change seems to be, δ̂ with a covariance C. Each cause says how the true δ lie: nothing
-changed, one number changed, two did, or something else did. Each has a normal density of δ̂, and Bayes' rule does the rest.
+The sums of a monitor give what each change seems to be, δ̂ with a covariance C. Each cause says how the true
+δ lie: nothing changed, one number changed, two did, or something else did. Each has a normal density of δ̂,
+and Bayes' rule does the rest.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from ..export.c.watch_code import LEAST
 from ..foundation.arrays import Array
 
 TOLERANCE = 0.2
-"""Standard deviation, in changes to be noticed, of what a machine that fits its deck shows for lack of exactness."""
+"""Standard deviation, in changes to be noticed, of what a machine that fits its deck shows for lack of
+exactness."""
 USUAL = 2.0
 """Standard deviation of a change that happened, in changes to be noticed."""
 LOST, WIDE = 1e-6, 30.0
@@ -33,8 +35,11 @@ NOTHING, ONE, TWO, OTHER = 0.35, 0.5, 0.1, 0.05
 OTHERS = ("something else",)
 TORQUE_CONSTANT = "motor.torque_constant"
 EFFECTS = {
-    "friction": "coulomb_friction", "delay": "drive_delay", "damping": "viscous_friction", "load": "gravity_load",
-}  # fmt: skip
+    "friction": "coulomb_friction",
+    "delay": "drive_delay",
+    "damping": "viscous_friction",
+    "load": "gravity_load",
+}
 """Effects of the catalogue of a diagnosis that a change of a number amounts to."""
 
 
@@ -72,7 +77,8 @@ class WatchedChange:
         size = f"{many[0] * self.size:+.2g} ± {many[0] * self.error:.1g} {many[1]}"
         also = f" ({self.effect})" if self.effect else ""
         return f"{self.name}{also}: {size}, probability {self.probability:.2g}" + (
-            f"; or {', '.join(self.aliases)}, which cannot be told from it" if self.aliases else "")
+            f"; or {', '.join(self.aliases)}, which cannot be told from it" if self.aliases else ""
+        )
 
 
 @dataclass(frozen=True)
@@ -82,7 +88,8 @@ class WatchVerdict:
     Parameters
     ----------
     verdict
-        ``none``, ``named``, ``undecidable`` (several causes would do), ``unknown`` (none does), or ``too_little``.
+        ``none``, ``named``, ``undecidable`` (several causes would do), ``unknown`` (none does), or
+        ``too_little``.
     changes
         All numbers that may have changed, the likeliest first.
     probability
@@ -115,7 +122,7 @@ HEADLINES = {
     "none": "The machine is as its deck says: no change, probability {p:.2g}, from {means:.0f} means.",
     "named": "The machine has changed, from {means:.0f} means:",
     "undecidable": "Something has changed, or may have, and these sums do not tell what:",
-    "unknown": "Something has changed that is none of the numbers watched: record some motions and diagnose them.",
+    "unknown": "Something has changed that is no number watched: record some motions and diagnose them.",
     "too_little": "Too little motion was seen, {means:.0f} means: let the machine be used for some minutes.",
 }
 """What a verdict says in one line."""
@@ -160,7 +167,11 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
         size, error = _size(change, base, [direction, *others])
         noticed, unit = _noticed(plan.blocks, name)
         kind = name.rpartition(".")[2]
-        changes.append(WatchedChange(name, EFFECTS.get(kind, ""), size * noticed, error * noticed, unit, min(chance, MOST)))
+        changes.append(
+            WatchedChange(
+                name, EFFECTS.get(kind, ""), size * noticed, error * noticed, unit, min(chance, MOST)
+            )
+        )
     changes.sort(key=lambda c: -c.probability)
     likely = list(itertools.takewhile(lambda c: c.probability > 1.0 - SURE, changes))
     sure = [c for c in likely if c.probability >= SURE]
@@ -171,7 +182,9 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
         verdict, chance = "named", min(c.probability for c in sure)
     elif len(best) == 1 and len(likely) == 2 and (both := _within(chances, likely)) >= SURE:
         verdict, chance = "named", both
-        changes[:2] = [replace(c, aliases=(other.name,)) for c, other in zip(likely, likely[::-1], strict=True)]
+        changes[:2] = [
+            replace(c, aliases=(other.name,)) for c, other in zip(likely, likely[::-1], strict=True)
+        ]
     else:
         verdict = "undecidable"
     return WatchVerdict(verdict, tuple(changes), min(chance, MOST), means)
@@ -195,14 +208,16 @@ def _estimated(bins: Any, block: WatchedBlock, most: int) -> tuple[float, Array,
     normal = matrix + np.diag(LOST * np.diag(matrix) + square / (count + 1.0) / WIDE**2 + 1e-30)
     change = np.linalg.solve(normal, vector)
     variance = max(square - change @ vector, 0.0) / max(count - k, 1.0)
-    return count, change, variance * np.linalg.inv(normal)
+    return count, np.asarray(change), np.asarray(variance * np.linalg.inv(normal))
 
 
 def _directions(blocks: Sequence[WatchedBlock]) -> dict[str, Array]:
     """Return how a change of each number, as large as is to be noticed, shows in all blocks."""
     names = [name for block in blocks for name in block.changes]
     size = len(names)
-    shares = np.array([n if not u else math.inf for b in blocks for n, u in zip(b.noticed, b.units, strict=True)])
+    shares = np.array(
+        [n if not u else math.inf for b in blocks for n, u in zip(b.noticed, b.units, strict=True)]
+    )
     directions = {name: np.array([float(name == each) for each in names]) for name in dict.fromkeys(names)}
     first = 0
     for block in blocks:
@@ -222,11 +237,18 @@ def _directions(blocks: Sequence[WatchedBlock]) -> dict[str, Array]:
 def _noticed(blocks: Sequence[WatchedBlock], name: str) -> tuple[float, str]:
     if name == TORQUE_CONSTANT:
         return 0.05, ""
-    return next((n, u) for b in blocks for each, n, u in zip(b.changes, b.noticed, b.units, strict=True) if each == name)
+    return next(
+        (n, u)
+        for b in blocks
+        for each, n, u in zip(b.changes, b.noticed, b.units, strict=True)
+        if each == name
+    )
 
 
-def _causes(directions: Mapping[str, Array], size: int) -> Iterator[tuple[tuple[str, ...], float, list[Array]]]:
-    """Yield what may have happened: names, probability before anything was seen, and directions of the change."""
+def _causes(
+    directions: Mapping[str, Array], size: int
+) -> Iterator[tuple[tuple[str, ...], float, list[Array]]]:
+    """Yield what may have happened: names, probability before anything was seen, directions."""
     yield (), NOTHING, []
     for name, direction in directions.items():
         yield (name,), ONE / len(directions), [direction]

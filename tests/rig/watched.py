@@ -23,8 +23,17 @@ from .published import PUBLISHED
 
 HERE = Path(__file__).parent
 NUMBERS = (
-    "friction", "stiffness", "inertia", "damping", "torque", "relaxation", "weight", "load_friction", "offset", "delay",
-)  # fmt: skip
+    "friction",
+    "stiffness",
+    "inertia",
+    "damping",
+    "torque",
+    "relaxation",
+    "weight",
+    "load_friction",
+    "offset",
+    "delay",
+)
 """What can be changed: factors up to the weight, then sizes."""
 _LOWEST, _GRID, _ROWS = -0.01, 1e-5, 4001
 JOINT_FRICTION = 0.6  # N·m
@@ -51,13 +60,29 @@ def published_machine() -> str:
     extension, lever_arm = _cam_tables(PUBLISHED.cam, 0.0)
     force = rubber.equilibrium(_LOWEST + _GRID * np.arange(_ROWS))
     lines = _defined(
-        CAM=1, RATE=1000.0, STEP=2e-4, CAM_GRID=CAM_GRID, LOWEST=_LOWEST, GRID=_GRID, COUNT=7.67e-4, LOAD_COUNT=1.0,
-        RELAXATION_TIME=rubber.relaxation_time, BRANCH=rubber.shape * rubber.k, MOTOR_INERTIA=drive.inertia,
-        VISCOUS=drive.viscosity, SLIDING=PUBLISHED_FRICTION, PER_AMPERE=drive.torque_per_ampere, LIMIT=20.0,
-        CURRENT_NOISE=PUBLISHED.sensors.current_noise, PROPORTIONAL=gain * SERVO_BANDWIDTH,
-        DERIVATIVE=2.0 * SERVO_DAMPING * gain, INTEGRAL=15.0 * gain * SERVO_BANDWIDTH, FEED=0.0, REACH=0.85,
+        CAM=1,
+        RATE=1000.0,
+        STEP=2e-4,
+        CAM_GRID=CAM_GRID,
+        LOWEST=_LOWEST,
+        GRID=_GRID,
+        COUNT=7.67e-4,
+        LOAD_COUNT=1.0,
+        RELAXATION_TIME=rubber.relaxation_time,
+        BRANCH=rubber.shape * rubber.k,
+        MOTOR_INERTIA=drive.inertia,
+        VISCOUS=drive.viscosity,
+        SLIDING=PUBLISHED_FRICTION,
+        PER_AMPERE=drive.torque_per_ampere,
+        LIMIT=20.0,
+        CURRENT_NOISE=PUBLISHED.sensors.current_noise,
+        PROPORTIONAL=gain * SERVO_BANDWIDTH,
+        DERIVATIVE=2.0 * SERVO_DAMPING * gain,
+        INTEGRAL=15.0 * gain * SERVO_BANDWIDTH,
+        FEED=0.0,
+        REACH=0.85,
         SHORTEST=0.4,
-    )  # fmt: skip
+    )
     tables = {"extension": extension, "lever_arm": lever_arm, "equilibrium": force.tolist()}
     return "\n".join([*lines, *(_rows(name, row) for name, row in tables.items()), ""])
 
@@ -65,14 +90,35 @@ def published_machine() -> str:
 def joint_machine() -> str:
     """Return the header of the elastic joint with dry friction: 500 Hz, encoders on both sides."""
     plant, loop, logger = ELASTIC_JOINT.plant, ELASTIC_JOINT.controller(1.0), ELASTIC_JOINT.logger
-    return "\n".join(_defined(
-        CAM=0, RATE=loop.rate, STEP=4e-4, COUNT=logger.quantum, LOAD_COUNT=logger.load_quantum,
-        MOTOR_INERTIA=plant.inertia, VISCOUS=plant.damping, SLIDING=JOINT_FRICTION, PER_AMPERE=plant.effort_per_ampere,
-        LOAD_INERTIA=plant.load_inertia, LOAD_VISCOUS=plant.load_damping, STIFF=plant.stiffness,
-        SPRING_VISCOUS=plant.spring_damping, HEAVY=plant.weight, LIMIT=loop.limit, CURRENT_NOISE=logger.current_noise,
-        PROPORTIONAL=loop.proportional, DERIVATIVE=loop.derivative, INTEGRAL=loop.integral, FEED=loop.feed, REACH=1.0,
-        SHORTEST=0.5,
-    )) + "\n"  # fmt: skip
+    return (
+        "\n".join(
+            _defined(
+                CAM=0,
+                RATE=loop.rate,
+                STEP=4e-4,
+                COUNT=logger.quantum,
+                LOAD_COUNT=logger.load_quantum,
+                MOTOR_INERTIA=plant.inertia,
+                VISCOUS=plant.damping,
+                SLIDING=JOINT_FRICTION,
+                PER_AMPERE=plant.effort_per_ampere,
+                LOAD_INERTIA=plant.load_inertia,
+                LOAD_VISCOUS=plant.load_damping,
+                STIFF=plant.stiffness,
+                SPRING_VISCOUS=plant.spring_damping,
+                HEAVY=plant.weight,
+                LIMIT=loop.limit,
+                CURRENT_NOISE=logger.current_noise,
+                PROPORTIONAL=loop.proportional,
+                DERIVATIVE=loop.derivative,
+                INTEGRAL=loop.integral,
+                FEED=loop.feed,
+                REACH=1.0,
+                SHORTEST=0.5,
+            )
+        )
+        + "\n"
+    )
 
 
 def joint_deck() -> str:
@@ -80,7 +126,8 @@ def joint_deck() -> str:
     friction = f'value = {JOINT_FRICTION}, unit = "N*m", source = "declared by its makers", spread = 0.3'
     creep = 'value = 0.002, unit = "rad/s", source = "assumed: some counts per sample"'
     return deck_of(ELASTIC_JOINT, (), NAMES[0], ELASTIC_JOINT.logger) + (
-        f'\n[dry_friction]\ncomponent = "CoulombFriction"\nbetween = ["motor"]\nsliding_effort = {{{friction}}}\n'
+        '\n[dry_friction]\ncomponent = "CoulombFriction"\nbetween = ["motor"]\n'
+        f"sliding_effort = {{{friction}}}\n"
         f"creep_speed = {{{creep}}}\n"
     )
 
@@ -88,11 +135,15 @@ def joint_deck() -> str:
 MACHINES = {"published": published_machine, "joint": joint_machine}
 
 
-def build(machine: str, folder: Path, *, look: Path = HERE / "watched_record.c", code: Sequence[Path] = ()) -> Path:
+def build(
+    machine: str, folder: Path, *, look: Path = HERE / "watched_record.c", code: Sequence[Path] = ()
+) -> Path:
     """Compile a machine with what looks at its readings, and the C that this calls; return the program."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "machine.h").write_text(MACHINES[machine](), encoding="utf-8")
-    return compile_program([HERE / "watched_bench.c", look, *code], folder / machine, flags=["-I", str(folder)])
+    return compile_program(
+        [HERE / "watched_bench.c", look, *code], folder / machine, flags=["-I", str(folder)]
+    )
 
 
 _SHOWN = {"motor_encoder.reading": "motor", "encoder.reading": "motor", "load_encoder.reading": "load"}
@@ -111,7 +162,8 @@ def build_watched(machine: str, source: WatchSource) -> Path:
 
 @dataclass(frozen=True)
 class Use:
-    """What a monitor said in use: time of the first word that says so, words that newly did, and the last one."""
+    """What a monitor said in use: time of the first word that says so, words that newly did, and the last
+    one."""
 
     first: float  # s, infinite where there was none
     bits: int  # of that word
@@ -121,13 +173,22 @@ class Use:
 
 
 def use(
-    program: Path, seed: int, seconds: float, *, change_at: float = 1e12, built: Mapping[str, float] | None = None,
-    after: Mapping[str, float] | None = None, commission_at: float = 0.0, record: Path | None = None,
-) -> Use:  # fmt: skip
+    program: Path,
+    seed: int,
+    seconds: float,
+    *,
+    change_at: float = 1e12,
+    built: Mapping[str, float] | None = None,
+    after: Mapping[str, float] | None = None,
+    commission_at: float = 0.0,
+    record: Path | None = None,
+) -> Use:
     """Let a machine be used; what is not given of the machine is as declared, or as built."""
     first = dict(built or {})
     numbers = [*values(**first), *values(**first | dict(after or {}))]
     command = [str(program), str(seed), str(seconds), str(change_at), *map(repr, numbers), str(commission_at)]
-    done = subprocess.run([*command, str(record or "")], capture_output=True, text=True, check=True, timeout=36000)
+    done = subprocess.run(
+        [*command, str(record or "")], capture_output=True, text=True, check=True, timeout=36000
+    )
     time, bits, alarms, judged, usable = done.stdout.split()
     return Use(float(time), int(bits, 16), int(alarms), int(judged), int(usable) / max(int(judged), 1))

@@ -1,8 +1,8 @@
 """The C of a monitor: residuals of the blocks as an exported step, and beside it the moments that are judged.
 
-A mean over `LENGTH` samples is one residual r. With y = (φ₁ … φₖ, r) the sums of y·yᵀ are the evidence: r = Σ δᵢ·φᵢ is
-solved from them by least squares, δᵢ in units of the change that is to be noticed. :class:`WatchTwin` computes the same in
-Python, operation by operation.
+A mean over `LENGTH` samples is one residual r. With y = (φ₁ … φₖ, r) the sums of y·yᵀ are the evidence: r = Σ
+δᵢ·φᵢ is solved from them by least squares, δᵢ in units of the change that is to be noticed.
+:class:`WatchTwin` computes the same in Python, operation by operation.
 """
 
 from __future__ import annotations
@@ -35,17 +35,21 @@ PERIOD, MEMORY = 10.0, 150.0
 RECENTLY = 0.75
 """Share of the recent evidence that is kept from one judgement to the next."""
 LIMIT, SURE, LEAST = 0.5, 4.0, 200.0
-"""Share of the change to be noticed at which it is reported; standard errors that it must have; means that are needed."""
+"""Share of the change to be noticed at which it is reported; standard errors that it must have; means that
+are needed."""
 PRIOR = 1.0
 """Standard deviation of a change before anything was seen, in changes that are to be noticed."""
 RIDGE = 1e-5
-"""Share of its square by which a change is held, so that what no motion tells apart is solved in single precision."""
+"""Share of its square by which a change is held, so that what no motion tells apart is solved in single
+precision."""
 SPEEDS, LOAD, WARM = (5.0, 25.0), 0.1, 35.0
-"""Between bins: speeds as multiples of the least one, load as a share of the largest drive, temperature in degrees Celsius."""
+"""Between bins: speeds as multiples of the least one, load as a share of the largest drive, temperature in
+degrees Celsius."""
 BINS = 12
 FIRST_BIT = 8
 VERSION = 1
 MAGIC = 0x57534C4E  # "NLSW"
+CHECKED = 8  # bytes at the end that the checksum does not cover
 
 
 @dataclass(frozen=True)
@@ -114,14 +118,29 @@ class WatchPlan:
     def digest(self) -> tuple[int, int, int, int]:
         """Two words of the deck, and two of what is watched."""
         deck = hashlib.sha256((self.model.origin.digest if self.model.origin else "").encode()).digest()
-        told = repr((self.model.sample_time, self.blocks, LENGTH, self.between, MEMORY, RECENTLY, PRIOR, SPEEDS, LOAD, WARM))
+        told = repr(
+            (
+                self.model.sample_time,
+                self.blocks,
+                LENGTH,
+                self.between,
+                MEMORY,
+                RECENTLY,
+                PRIOR,
+                SPEEDS,
+                LOAD,
+                WARM,
+            )
+        )
         words = np.frombuffer(deck[:8] + hashlib.sha256(told.encode()).digest()[:8], "<u4")
         return tuple(map(int, words))  # type: ignore[return-value]
 
     def layout(self, real: Real) -> np.dtype[Any]:
         """Return the record as it lies in memory."""
         number, blocks = ("<f4" if real is Real.FLOAT else "<f8"), len(self.blocks)
-        moments = np.dtype([("count", number), ("products", number, ((self.most + 1) * (self.most + 2) // 2,))])
+        moments = np.dtype(
+            [("count", number), ("products", number, ((self.most + 1) * (self.most + 2) // 2,))]
+        )
         words = [(name, "<u4") for name in ("magic", "version", "size", "real")]
         return np.dtype([
             *words, ("digest", "<u4", (4,)), ("judged", "<u4"), ("word", "<u4"),
@@ -165,7 +184,9 @@ class WatchSource:
         return (*own, self.residuals.header, self.residuals.source, self.residuals.selftest)
 
 
-def export_watch(plan: WatchPlan, folder: str | Path, *, real: Real | str = Real.FLOAT, name: str = "watch") -> WatchSource:
+def export_watch(
+    plan: WatchPlan, folder: str | Path, *, real: Real | str = Real.FLOAT, name: str = "watch"
+) -> WatchSource:
     """Write the C of a monitor, with its self-test.
 
     Parameters
@@ -204,14 +225,20 @@ def export_watch(plan: WatchPlan, folder: str | Path, *, real: Real | str = Real
     return WatchSource(plan, prefix, number, residuals, *texts)
 
 
-def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | list[str]]:
+def _block_rows(plan: WatchPlan, real: Real, residuals: CSource) -> tuple[list[str], list[str], list[str]]:
+    """Return for each block what its bits mean, its numbers, and the outputs that are given of it."""
     names, numbers, given = [], [], []
     paths = iter(residuals.writer.paths.outputs)
     for i, block in enumerate(plan.blocks):
         first = plan.first_bit(i)
-        for k, (change, noticed, unit) in enumerate(zip(block.changes, block.noticed, block.units, strict=True)):
+        for k, (change, noticed, unit) in enumerate(
+            zip(block.changes, block.noticed, block.units, strict=True)
+        ):
             size = f"{noticed:g} {unit}" if unit else f"{100.0 * noticed:g} %"
-            names.append(f"/* bit {first + k}: {comment(change)} has changed by some {size}, as {comment(block.name)} shows */")
+            names.append(
+                f"/* bit {first + k}: {comment(change)} has changed by some {size}, as "
+                f"{comment(block.name)} shows */"
+            )
         speeds = ", ".join(real.literal(s) for s in _bounds(block))
         load = real.literal(block.usual_load)
         numbers.append(
@@ -220,6 +247,11 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
         cells = [f"outputs.{next(paths)}" for _ in range(len(block.changes) + 3)]
         cells[-3:-3] = [real.literal(0.0)] * (plan.most - len(block.changes))
         given.append(", ".join(cells) + ",")
+    return names, numbers, given
+
+
+def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | list[str]]:
+    names, numbers, given = _block_rows(plan, real, residuals)
     model, pairs = plan.model, (plan.most + 1) * (plan.most + 2) // 2
     title = [
         f"/* Monitor of {comment(model.name)}: whether the model holds in use.",
@@ -227,19 +259,40 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]  # fmt: skip
     literals = {
-        "one": 1.0, "prior": PRIOR**-2, "ridge": RIDGE, "tiny": 1e-30, "least": plan.least, "limit": LIMIT, "sure": SURE**2,
-        "kept": _kept(plan), "recently": RECENTLY, "share": 1.0 / LENGTH, "warm": WARM, "enough": 5.0 * plan.least,
-    }  # fmt: skip
+        "one": 1.0,
+        "prior": PRIOR**-2,
+        "ridge": RIDGE,
+        "tiny": 1e-30,
+        "least": plan.least,
+        "limit": LIMIT,
+        "sure": SURE**2,
+        "kept": _kept(plan),
+        "recently": RECENTLY,
+        "share": 1.0 / LENGTH,
+        "warm": WARM,
+        "enough": 5.0 * plan.least,
+    }
     return {
-        "title": title, "blocks": str(len(plan.blocks)), "most": str(plan.most), "pairs": str(pairs), "bins": str(BINS),
-        "length": str(LENGTH), "period": str(plan.period), "memory": f"{MEMORY:g}",
-        "names": names, "numbers": numbers, "fabs": real.function("fabs"),
+        "title": title,
+        "blocks": str(len(plan.blocks)),
+        "most": str(plan.most),
+        "pairs": str(pairs),
+        "bins": str(BINS),
+        "length": str(LENGTH),
+        "period": str(plan.period),
+        "memory": f"{MEMORY:g}",
+        "names": names,
+        "numbers": numbers,
+        "fabs": real.function("fabs"),
         "settling": str(max(1, round(plan.settling / float(model.sample_time or 1.0)))),
         "given": given,
-        "magic": f"0x{MAGIC:08x}u", "version": str(VERSION), "digest": ", ".join(f"0x{w:08x}u" for w in plan.digest),
-        "half_bytes": half_byte_sums(), **{key: real.literal(value) for key, value in literals.items()},
+        "magic": f"0x{MAGIC:08x}u",
+        "version": str(VERSION),
+        "digest": ", ".join(f"0x{w:08x}u" for w in plan.digest),
+        "half_bytes": half_byte_sums(),
+        **{key: real.literal(value) for key, value in literals.items()},
         **_test_values(plan, real),
-    }  # fmt: skip
+    }
 
 
 def _bounds(block: WatchedBlock) -> tuple[float, float]:
@@ -251,15 +304,21 @@ def _kept(plan: WatchPlan) -> float:
 
 
 class WatchTwin:
-    """The monitor in Python from the residuals on, in the number type and with the order of operations of the C.
+    """The monitor in Python from the residuals on, operation by operation as the C has it.
 
     ``plan``: what is watched. ``settling``: samples that are passed over, as the plan says by default.
     """
 
     def __init__(self, plan: WatchPlan, real: Real = Real.FLOAT) -> None:
-        self.plan, self._r = plan, np.float32 if real is Real.FLOAT else np.float64
+        self.plan = plan
+        self._r: Any = np.float32 if real is Real.FLOAT else np.float64
         self.record = np.zeros((), plan.layout(real))
-        for name, value in (("magic", MAGIC), ("version", VERSION), ("size", self.record.nbytes), ("word", 2)):
+        for name, value in (
+            ("magic", MAGIC),
+            ("version", VERSION),
+            ("size", self.record.nbytes),
+            ("word", 2),
+        ):
             self.record[name] = value
         self.record["real"], self.record["digest"] = self._r(0).nbytes, plan.digest
         self._settling = max(1, round(plan.settling / float(plan.model.sample_time or 1.0)))
@@ -369,7 +428,11 @@ class WatchTwin:
         variance, word = work[-1, -1] / (moments["count"] - r(k)), 0
         for i in range(k):
             change = work[i, -1]
-            if work[i, i] > 0 and abs(change) > r(LIMIT) and change * change > r(SURE**2) * variance * work[i, i]:
+            if (
+                work[i, i] > 0
+                and abs(change) > r(LIMIT)
+                and change * change > r(SURE**2) * variance * work[i, i]
+            ):
                 word |= 1 | 1 << (self.plan.first_bit(number) + i)
         return word
 
@@ -414,12 +477,18 @@ def _test_values(plan: WatchPlan, real: Real) -> dict[str, str | list[str]]:
         for k in range(len(block.changes)):
             number = f"(({real})(word >> 20u) - {real.literal(2048.0)}) / {real.literal(4096.0)}"
             drawn += ["word = (1664525u * word) + 1013904223u;", f"given[{first + k}] = {number};"]
-        drawn += [f"given[{first + most}] = given[{first}];", f"given[{first + most + 2}] = given[{first}];",
-                  f"given[{first + most + 1}] = {real.literal(1.0)} + {real.literal(block.least_speed)};"]  # fmt: skip
+        drawn += [
+            f"given[{first + most}] = given[{first}];",
+            f"given[{first + most + 2}] = given[{first}];",
+            f"given[{first + most + 1}] = {real.literal(1.0)} + {real.literal(block.least_speed)};",
+        ]
     return {
-        "test_samples": str(count), "expected": real.table("expected", rows), "drawn": drawn,
-        "expected_word": f"0x{int(twin.record['word']):x}u", "tolerance": real.literal(2e-4 if real is Real.FLOAT else 1e-9),
-    }  # fmt: skip
+        "test_samples": str(count),
+        "expected": real.table("expected", rows),
+        "drawn": drawn,
+        "expected_word": f"0x{int(twin.record['word']):x}u",
+        "tolerance": real.literal(2e-4 if real is Real.FLOAT else 1e-9),
+    }
 
 
 def read_watch_record(path: str | Path, plan: WatchPlan) -> np.ndarray[Any, Any]:
@@ -449,21 +518,42 @@ def read_watch_record(path: str | Path, plan: WatchPlan) -> np.ndarray[Any, Any]
         raise ExportError(place, f"cannot be read: {error.strerror or error}") from None
     head = np.frombuffer(content[:32].ljust(32, b"\0"), "<u4")
     if head[0] != MAGIC:
-        raise ExportError(place, "is no record of a monitor", next_step="write `state.record` to it after NAME_seal")
+        raise ExportError(
+            place, "is no record of a monitor", next_step="write `state.record` to it after NAME_seal"
+        )
     if head[1] != VERSION:
-        raise ExportError(place, f"has version {head[1]} of the format, {VERSION} is read", next_step="export the monitor again")
+        raise ExportError(
+            place,
+            f"has version {head[1]} of the format, {VERSION} is read",
+            next_step="export the monitor again",
+        )
     if tuple(head[4:6]) != plan.digest[:2]:
-        raise ExportError(place, f"is of another deck than {plan.model.origin.deck if plan.model.origin else 'this one'}",
-                          next_step="name the deck that the monitor was exported from, with --deck")  # fmt: skip
+        raise ExportError(
+            place,
+            f"is of another deck than {plan.model.origin.deck if plan.model.origin else 'this one'}",
+            next_step="name the deck that the monitor was exported from, with --deck",
+        )
     if tuple(head[6:8]) != plan.digest[2:]:
-        raise ExportError(place, "is of another monitor of this deck: another sample time or another version of nlsdesign",
-                          next_step="give its --sample-time, or read it with the version that exported it")  # fmt: skip
+        raise ExportError(
+            place,
+            "is of another monitor of this deck: another sample time or another version of nlsdesign",
+            next_step="give its --sample-time, or read it with the version that exported it",
+        )
     layout = plan.layout(Real.FLOAT if head[3] == 4 else Real.DOUBLE)
     if len(content) != layout.itemsize or head[2] != layout.itemsize:
-        raise ExportError(place, f"has {len(content)} bytes where a record has {layout.itemsize}: it was cut, or has more in it")
+        raise ExportError(
+            place,
+            f"has {len(content)} bytes where a record has {layout.itemsize}: it was cut, or has more in it",
+        )
     record = np.frombuffer(content, layout)[0:1].reshape(())
-    if zlib.crc32(content[: layout.fields["checksum"][1]]) != int(record["checksum"]):
-        raise ExportError(place, "is damaged: the checksum does not fit", next_step="seal the record and write it again")
-    if not all(np.all(np.isfinite(record[group][field])) for group in ("recent", "bins") for field in ("count", "products")):
+    if zlib.crc32(content[: layout.itemsize - CHECKED]) != int(record["checksum"]):
+        raise ExportError(
+            place, "is damaged: the checksum does not fit", next_step="seal the record and write it again"
+        )
+    if not all(
+        np.all(np.isfinite(record[group][field]))
+        for group in ("recent", "bins")
+        for field in ("count", "products")
+    ):
         raise ExportError(place, "holds numbers that are not finite", next_step="start the monitor anew")
     return record
