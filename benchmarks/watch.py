@@ -72,7 +72,8 @@ def quiet(each: Watched, hours: float) -> str:
 def times(runs: list[Use], change_at: float) -> str:
     """Median and longest time to notice, and how many runs noticed within a minute."""
     late = np.array([run.first for run in runs]) - change_at
-    return f"{np.median(late):.0f} | {late.max():.0f} | {(late <= 60.5).sum()} of {len(late)}"
+    words = [f"{value:.0f}" if np.isfinite(value) else "never" for value in (np.median(late), late.max())]
+    return f"{' | '.join(words)} | {(late <= 60.5).sum()} of {len(late)}"
 
 
 def noticed(each: Watched, runs: int, program: Path | None = None) -> Iterator[str]:

@@ -26,6 +26,7 @@ from .options import (
 from .output import examples, show_json, show_lines, show_table, show_written, warn
 from .overwriting import c_names, out_file_option, out_option
 from .typed_values import NamedPath
+from .watch import WATCH, export_monitor
 
 if TYPE_CHECKING:
     from ..components import Assembly
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from ..model import FlatModel
 
 _LAW = ("law", "bandwidth", "velocity_bandwidth")
-OBSERVER, CONTROLLER, BOTH, WATCH = "observer", "controller", "both", "watch"
+OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 
 
 @click.group()
@@ -141,34 +142,6 @@ def export_code(
     show_written(as_json, (model.description, *sentences), written, name=name, warnings=remarks)
     if proof is not None and not proof.holds:
         raise click.exceptions.Exit(1)
-
-
-_OF_A_STEP = ("examples", "package", "prove", "with_block")
-
-
-def export_monitor(
-    deck_name: str, sample_time: float, out: Path, real: str, as_json: bool, chosen: Mapping[str, Any]
-) -> None:  # fmt: skip
-    """Write the monitor of a deck."""
-    from ..components import smoothed
-    from ..export import export_watch
-    from ..model import flatten
-    from ..regeneration import watch_plan
-
-    given = [f"--{name.removeprefix('with_')}" for name in _OF_A_STEP if chosen[name]]
-    if given:
-        raise click.BadParameter(
-            f"{given[0]} is of an observer or controller; leave it out for --what {WATCH}"
-        )
-    plan = watch_plan(flatten(smoothed(machine_of(deck_name))), sample_time)
-    source = export_watch(plan, out, real=real)
-    words = [f"{block.name}: {', '.join(block.changes)}" for block in plan.blocks]
-    show_written(
-        as_json,
-        (f"monitor of {plan.model.name.removesuffix('_residuals')}", *words),
-        source.files,
-        name=source.name,
-    )
 
 
 class SampledPart(NamedTuple):

@@ -9,7 +9,7 @@ on one motion alone is tabulated.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..bench.discrepancy.tearing import blocks_of
-from ..bench.identification.equation_error.block import Block, Drive
+from ..bench.identification.equation_error.block import Block
 from ..export import WatchedBlock, WatchPlan
 from ..export.c.watch_code import LOAD
 from ..foundation.arrays import Array
@@ -114,8 +114,9 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
     numbers, count = ca.DM(model.start(model.parameters)), len(model.states)
     moving, late, load = ca.SX.sym("moving", s.input.numel()), ca.SX(0), ca.SX(0)
     state, slopes, added = _sensitivities(block, s, numbers)
-    for i, drive in _driven(block):
-        if filters[drive.signal].held and ca.depends_on(s.output, s.input[i]):
+    for i, v in enumerate(model.inputs):
+        drive = block.drives.get(v.name)
+        if drive and filters[drive.signal].held and ca.depends_on(s.output, s.input[i]):
             slope = ca.jacobian(s.output, s.input[i])
             late, load = late + slope * moving[i], load + slope * s.input[i]
     if late.is_zero():
@@ -182,11 +183,6 @@ def _tabulated(
     return results, tables, columns
 
 
-def _driven(block: Block) -> Iterator[tuple[int, Drive]]:
-    """Yield the inputs of a block that follow from a reading."""
-    return ((i, block.drives[v.name]) for i, v in enumerate(block.model.inputs) if v.name in block.drives)
-
-
 def _vanishes(column: Expression, s: Symbols, numbers: ca.DM) -> bool:
     """Say whether an expression of a block is zero wherever it is evaluated."""
     at = ca.Function("at", [s.state, s.input], [ca.substitute(column, s.parameter, ca.SX(numbers))])
@@ -212,7 +208,7 @@ LEAST_WORK = 60
 
 
 class _Tabulation:
-    """A function in which what follows from one motion alone is looked up, with drives within their limits."""
+    """A function with drives within their limits, where what follows from one motion is looked up."""
 
     def __init__(
         self,
@@ -256,7 +252,7 @@ class _Tabulation:
         inputs = frozenset().union(*[each.inputs for each in operands])
         middle = None
         if all(each.middle is not None for each in operands):
-            middle = float(applied(operation, [ca.SX(each.middle) for each in operands]))
+            middle = float(applied(operation, [ca.SX(each.middle or 0.0) for each in operands]))
             if inputs and operation in _LOGICAL and operation != ca.OP_IF_ELSE_ZERO:
                 return _Node(ca.SX(middle), frozenset(), middle)
             if inputs and operation in (ca.OP_FMIN, ca.OP_FMAX):
@@ -306,13 +302,12 @@ class _Tabulation:
             )
             symbols += columns
             every += [symbol for symbol, _ in rows.values()]
-            combined += [_weighted(row, [*columns, ca.SX(1)]) for row in shares]
+            terms = [*columns, ca.SX(1)]
+            combined += [
+                sum((float(s) * term for s, term in zip(row, terms, strict=True) if s), start=ca.SX(0))
+                for row in shares
+            ]
         return tuple(tables), symbols, every, combined
-
-
-def _weighted(shares: Array, terms: Sequence[Expression]) -> Expression:
-    """Return a sum of terms, without those that have no share."""
-    return sum((float(s) * term for s, term in zip(shares, terms, strict=True) if s), start=ca.SX(0))
 
 
 def _independent(values: Array) -> tuple[list[int], Array]:
@@ -490,14 +485,11 @@ def _watched(block: Block, told: Told, model: FlatModel, largest: float, sample_
         DELAY if name.endswith(".delay") else NOTICED_SHARES[name.rpartition(".")[2]] for name in told.names
     ]
     units = tuple("s" if name.endswith(".delay") else "" for name in told.names)
-    creep = [v.start for v in block.model.parameters if v.name.endswith(".creep_speed") and _rubs(block)]
+    creep = [v.start for v in block.model.parameters if v.name.endswith(".creep_speed")]
+    rubs = any(name.endswith(".friction") for name in told.names)
     drive = block.drives[str(block.moving)]
     quantum = declared_reading(model, reading_of(model.readings, drive.signal).measured).quantum
-    least = max([LEAST_SPEED * max(creep), quantum / (LAGS * sample_time)]) if creep else 0.0
+    least = max([LEAST_SPEED * max(creep), quantum / (LAGS * sample_time)]) if creep and rubs else 0.0
     driven = any(name.endswith(".delay") for name in told.names)
     share = 1.0 if driven else NOTICED_SHARES["stiffness"]
     return WatchedBlock(block.name, told.names, tuple(noticed), units, least, LOAD * share * largest)
-
-
-def _rubs(block: Block) -> bool:
-    return any(name.endswith(".friction") for name in _changes(block))

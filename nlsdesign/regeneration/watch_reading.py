@@ -175,12 +175,14 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
     changes.sort(key=lambda c: -c.probability)
     likely = list(itertools.takewhile(lambda c: c.probability > 1.0 - SURE, changes))
     sure = [c for c in likely if c.probability >= SURE]
+    # One of two numbers, or both, whichever motion could tell them apart.
+    both = sum(p for cause, p in chances.items() if cause and set(cause) <= {c.name for c in likely})
     chance = chances[best]
     if best in ((), OTHERS):
         verdict = "none" if best == () else "unknown"
     elif sure and len(sure) == len(best):
         verdict, chance = "named", min(c.probability for c in sure)
-    elif len(best) == 1 and len(likely) == 2 and (both := _within(chances, likely)) >= SURE:
+    elif len(best) == 1 and len(likely) == 2 and both >= SURE:
         verdict, chance = "named", both
         changes[:2] = [
             replace(c, aliases=(other.name,)) for c, other in zip(likely, likely[::-1], strict=True)
@@ -188,12 +190,6 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
     else:
         verdict = "undecidable"
     return WatchVerdict(verdict, tuple(changes), min(chance, MOST), means)
-
-
-def _within(chances: Mapping[tuple[str, ...], float], changes: Sequence[WatchedChange]) -> float:
-    """Return the probability that some of these numbers changed and no others did."""
-    names = {c.name for c in changes}
-    return sum(chance for cause, chance in chances.items() if cause and set(cause) <= names)
 
 
 def _estimated(bins: Any, block: WatchedBlock, most: int) -> tuple[float, Array, Array]:
