@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -19,8 +19,6 @@ from scipy.linalg import expm
 
 from ..bench.discrepancy.tearing import blocks_of
 from ..bench.identification.equation_error.block import Block
-from ..export import WatchedBlock, WatchPlan
-from ..export.c.watch_code import LOAD
 from ..foundation.arrays import Array
 from ..foundation.errors import ExportError
 from ..foundation.symbolic import Expression
@@ -29,6 +27,9 @@ from ..model.flat import Symbols, stated_equations
 from ..model.graph import applied, as_results, fold, read_graph
 from ..model.readings import reading_of
 from ..model.roles import contour_ends, declared_reading, motor_of, with_declared_reading
+
+if TYPE_CHECKING:
+    from ..export import WatchedBlock, WatchPlan
 
 LAGS = 2.0
 """Time constant of each of the three stages of the filter, in samples."""
@@ -390,6 +391,8 @@ def watch_plan(model: FlatModel, sample_time: float = 1e-3) -> WatchPlan:
     ExportError
         If a law must be tabulated over a motion without a range.
     """
+    from ..export import WatchPlan  # here, as its libraries take time to load
+
     signals = [v.name for v in model.outputs]
     seen = {reading_of(model.readings, name).measured for name in signals}
     signals += [name for body in model.bodies for name in body.commands if name not in seen]
@@ -481,6 +484,8 @@ def _largest_drive(model: FlatModel, *, of_effort: bool = True) -> float:
 
 
 def _watched(block: Block, told: Told, model: FlatModel, largest: float, sample_time: float) -> WatchedBlock:
+    from ..export.c.watch_code import LOAD, WatchedBlock
+
     noticed = [
         DELAY if name.endswith(".delay") else NOTICED_SHARES[name.rpartition(".")[2]] for name in told.names
     ]

@@ -11,13 +11,14 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..export import WatchedBlock, WatchPlan
-from ..export.c.watch_code import LEAST
 from ..foundation.arrays import Array
+
+if TYPE_CHECKING:
+    from ..export import WatchedBlock, WatchPlan
 
 TOLERANCE = 0.2
 """Standard deviation, in changes to be noticed, of what a machine that fits its deck shows for lack of
@@ -145,7 +146,7 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
     """
     seen = [_estimated(record["bins"][i], block, plan.most) for i, block in enumerate(plan.blocks)]
     means = min(count for count, _, _ in seen)
-    if means < LEAST:
+    if means < plan.least:
         return WatchVerdict("too_little", (), math.nan, means)
     change = np.concatenate([d for _, d, _ in seen])
     covariance = np.zeros((len(change), len(change)))

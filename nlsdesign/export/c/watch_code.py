@@ -118,7 +118,7 @@ class WatchPlan:
     def digest(self) -> tuple[int, int, int, int]:
         """Two words of the deck, and two of what is watched."""
         deck = hashlib.sha256((self.model.origin.digest if self.model.origin else "").encode()).digest()
-        told = repr(
+        settings = repr(
             (
                 self.model.sample_time,
                 self.blocks,
@@ -132,7 +132,7 @@ class WatchPlan:
                 WARM,
             )
         )
-        words = np.frombuffer(deck[:8] + hashlib.sha256(told.encode()).digest()[:8], "<u4")
+        words = np.frombuffer(deck[:8] + hashlib.sha256(settings.encode()).digest()[:8], "<u4")
         return tuple(map(int, words))  # type: ignore[return-value]
 
     def layout(self, real: Real) -> np.dtype[Any]:
@@ -425,7 +425,7 @@ class WatchTwin:
         k, r, work = len(self.plan.blocks[number].changes), self._r, self.work
         if moments["count"] < r(self.plan.least):
             return 2
-        variance, word = work[-1, -1] / (moments["count"] - r(k)), 0
+        variance, bits = work[-1, -1] / (moments["count"] - r(k)), 0
         for i in range(k):
             change = work[i, -1]
             if (
@@ -433,8 +433,8 @@ class WatchTwin:
                 and abs(change) > r(LIMIT)
                 and change * change > r(SURE**2) * variance * work[i, i]
             ):
-                word |= 1 | 1 << (self.plan.first_bit(number) + i)
-        return word
+                bits |= 1 | 1 << (self.plan.first_bit(number) + i)
+        return bits
 
 
 def _forget(moments: Any, kept: Any) -> None:
@@ -451,14 +451,14 @@ def drawn_rows(plan: WatchPlan, count: int) -> list[list[list[float]]]:
 
     Shape (count, blocks, changes + 3). Whole numbers over a power of two, which C makes again.
     """
-    word, rows = 1, []
+    random, rows = 1, []
     for _ in range(count):
         row = []
         for block in plan.blocks:
             draws = []
             for _ in block.changes:
-                word = (1664525 * word + 1013904223) & 0xFFFFFFFF
-                draws.append(float((word >> 20) - 2048) / 4096.0)
+                random = (1664525 * random + 1013904223) & 0xFFFFFFFF
+                draws.append(float((random >> 20) - 2048) / 4096.0)
             row.append([*draws, draws[0], 1.0 + block.least_speed, draws[0]])
         rows.append(row)
     return rows
