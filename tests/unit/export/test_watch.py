@@ -63,7 +63,7 @@ def readings(plan, count):
 
 
 @pytest.mark.parametrize("real", list(Real))
-@pytest.mark.parametrize("machine", ["published", "joint"])
+@pytest.mark.parametrize("machine", ["published", pytest.param("joint", marks=pytest.mark.slow)])
 def test_the_c_has_the_bits_of_its_twin(machine, real, request, tmp_path):
     plan = quick(request.getfixturevalue(machine))
     source = export_watch(plan, tmp_path, real=real)
