@@ -47,7 +47,7 @@ from .sections import (
 
 if TYPE_CHECKING:
     # Only its type is wanted here: the module brings the compiler and fmpy along.
-    from ...regeneration import Regeneration
+    from ...regeneration import RegeneratedController, Regeneration
 
 VERDICTS = {
     "none": "nothing is missing",
@@ -363,7 +363,7 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
     """Return the chapter on the observer: torque error before and after, and the files."""
     sections: list[Section] = [
         Chapter(
-            "Observer from the better model",
+            "Observer and controller from the better model",
             "The torque observer, designed from the declared (before) and from the better model (after). "
             "Both read the measured signals and are compared with the torque that the records show.",
         )
@@ -382,6 +382,8 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
                 assumed="The measured torque is what the better model says is behind the readings.",
             )
         )  # fmt: skip
+    if result.controller:
+        sections.append(_tracking(result.controller))
     if result.reasons:
         rows = tuple((reason,) for reason in result.reasons)
         caption = "Why something is lacking here."
@@ -389,6 +391,16 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
     if files:
         sections.append(FileSection("Files", files, caption="Written beside this report."))
     return sections
+
+
+def _tracking(controller: RegeneratedController) -> TableSection:
+    rows = tuple(tuple(three_digits(value) for value in sine) for sine in controller.sines)
+    columns = ("amplitude in N·m", "frequency in Hz", "before in N·m", "after in N·m")
+    caption = (
+        "Root mean square torque error of the better model over the last period of a sine of the wanted "
+        f"torque, under observer and controller of the declared and of the better model. {controller.words()[1]}"
+    )
+    return TableSection("Tracking of the torque", columns, rows, caption=caption)
 
 
 def _torque_errors(result: Regeneration) -> NumbersSection:
