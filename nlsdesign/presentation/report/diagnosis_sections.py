@@ -398,7 +398,8 @@ def _tracking(controller: RegeneratedController) -> TableSection:
     columns = ("amplitude in N·m", "frequency in Hz", "before in N·m", "after in N·m")
     caption = (
         "Root mean square torque error of the better model over the last period of a sine of the wanted "
-        f"torque, under observer and controller of the declared and of the better model. {controller.words()[1]}"
+        "torque, under observer and controller of the declared and of the better model. "
+        f"{controller.words()[1]}"
     )
     return TableSection("Tracking of the torque", columns, rows, caption=caption)
 
