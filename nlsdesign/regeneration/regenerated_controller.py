@@ -14,7 +14,7 @@ from ..feedback.control import (
     tracking,
     with_margin,
 )
-from ..feedback.control.laws.known_drive import only_side
+from ..feedback.control.laws.known_drive import KnownDrive, only_side, torque_at_rest
 from ..feedback.observer import CascadeGain, design_observer
 from ..foundation.errors import NlsError
 from ..foundation.quantity import three_digits
@@ -25,7 +25,7 @@ from ..simulation import Sine
 from .range_remarks import usual_last
 
 SHARES = (0.2, 0.6)
-"""Amplitudes of the sines, as shares of the largest torque that the declared drive can hold."""
+"""Amplitudes of the sines over the largest torque that the declared drive can hold, up to the usual angle."""
 FREQUENCIES = (1.0, 4.0)
 """In Hz."""
 SCATTER = 1.02
@@ -121,7 +121,8 @@ def regenerated_controller(
         encoder_loop(plant, observer=old, controller=before),
         encoder_loop(plant, observer=new, controller=after),
     ]
-    most, side = largest_torque(declared), only_side(declared)
+    side, last = only_side(declared), usual_last(declared)
+    most = min(largest_torque(declared), abs(torque_at_rest(KnownDrive(declared), (side or 1.0) * last)))
     sines = tuple(
         TrackedSine(share * most, frequency, *(_error(loop, share * most, frequency, side) for loop in loops))
         for share in SHARES

@@ -365,7 +365,7 @@ def only_side(plant: FlatModel) -> float:
     """
     drive = KnownDrive(plant)
     end = min(contour_ends(plant, series_spring(plant)).values(), default=_SMALL_TURN)
-    torques = [_torque_at_rest(drive, way * end) for way in (1.0, -1.0)]
+    torques = [torque_at_rest(drive, way * end) for way in (1.0, -1.0)]
     strongest = max(torques, key=abs)
     if min(map(abs, torques)) > _NOTHING * abs(strongest) or strongest == 0.0:
         return 0.0
@@ -450,10 +450,10 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
 def _by_contour(drive: KnownDrive, way: float) -> float:
     """Return the size of the torque at rest at the end of the contour; infinite without a cam."""
     ends = contour_ends(drive.plant, series_spring(drive.plant)).values()
-    return abs(_torque_at_rest(drive, way * min(ends))) if ends else math.inf
+    return abs(torque_at_rest(drive, way * min(ends))) if ends else math.inf
 
 
-def _torque_at_rest(drive: KnownDrive, angle: float) -> float:
+def torque_at_rest(drive: KnownDrive, angle: float) -> float:
     """Return the torque of the spring at rest at an angle of the spring in rad."""
     body, starts = drive.body, {v.name: v.start for v in drive.plant.states}
     turned = {name: starts[name] for name in unmoved_states(drive.plant, body.rate)}
