@@ -13,12 +13,14 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib import pyplot
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 
 from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import typeset_number
 from nlsdesign.presentation import figures
+from nlsdesign.presentation.figures import svg
 from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
 from nlsdesign.presentation.figures.cam_motion import MARKER, CamMotion, cam_motion, cam_picture
 from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look
@@ -436,8 +438,9 @@ def test_a_figure_is_drawn_once_for_its_file_and_for_pages_until_it_changes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     saved: list[object] = []
-    save = figures.Figure.savefig
-    monkeypatch.setattr(figures.Figure, "savefig", lambda *a, **k: (saved.append(a), save(*a, **k)))
+    monkeypatch.setattr(
+        svg, "FigureCanvasSVG", lambda drawn: (saved.append(drawn), FigureCanvasSVG(drawn))[1]
+    )
     figure = samples.FIGURES["gap_bars"]()
     on_page, on_white = figures.inline_svg(figure, "k"), svg_text(figure)
     assert (figures.inline_svg(figure, "k"), len(saved)) == (on_page, 1)
