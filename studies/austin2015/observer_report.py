@@ -10,6 +10,7 @@ from nlsdesign.presentation.report import FigureSection, FoldedSection, Section,
 
 from .observer import STIFFER, WIDER
 from .results import ActuatorResults, Results
+from .spread import Proved
 
 
 def observer_sections(results: Results) -> list[Section]:
@@ -21,7 +22,7 @@ def observer_sections(results: Results) -> list[Section]:
         _on_bench("designed", results.designed),
         _errors_with_known_numbers(results),
     )
-    proved = (_bounds(results), *(_proved(name, each) for name, each in results.both.items()))
+    proved = (_bounds(results), *(_certificate(name, each) for name, each in results.proved.items()))
     return [
         designed,
         _errors_in_numbers(results),
@@ -141,11 +142,10 @@ def _generated(name: str, results: ActuatorResults) -> TextSection:
 
 def _bounds(results: Results) -> TableSection:
     rows = []
-    for name, each in results.both.items():
-        bound = each.spread.certificate.proof.torque
-        proved = "none" if isinstance(bound, str) else f"{1e3 * bound.total:.1f}"
-        decay, condition = each.spread.certificate.proof.decay, each.spread.certificate.proof.condition
-        rows.append((name, f"{decay:.1f}", three_digits(condition), proved))
+    for name, each in results.proved.items():
+        proof = each.certificate.proof
+        within = "none" if isinstance(proof.torque, str) else f"{1e3 * proof.torque.total:.1f}"
+        rows.append((name, f"{proof.decay:.1f}", three_digits(proof.condition), within))
     return TableSection(
         "What is proved of one constant gain",
         ("actuator", "decay in 1/s", "condition of P at most", "torque within, mN·m, exact numbers"),
@@ -155,7 +155,6 @@ def _bounds(results: Results) -> TableSection:
     )
 
 
-def _proved(name: str, results: ActuatorResults) -> TextSection:
-    certificate = results.spread.certificate
-    hashes = "\n".join(f"{file}: SHA-256 {digest}" for file, digest in sorted(results.spread.hashes.items()))
-    return TextSection(f"The certificate, {name}", " ".join(certificate.statement), drawing=hashes)
+def _certificate(name: str, proved: Proved) -> TextSection:
+    hashes = "\n".join(f"{file}: SHA-256 {digest}" for file, digest in sorted(proved.hashes.items()))
+    return TextSection(f"The certificate, {name}", " ".join(proved.certificate.statement), drawing=hashes)

@@ -26,7 +26,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, f
 
 
 def test_the_study_keeps_its_claims(results: tuple[Path, dict[str, float]]) -> None:
-    """Of two rubbers and two losses; what is ranked among all is claimed of the whole study."""
+    """Of one rubber and one loss; what is ranked among all is claimed of the whole study."""
     out, numbers = results
     expected = claims(NAME)
     alone = {name: value for name, value in numbers.items() if not name.startswith(("first_two", "missed"))}

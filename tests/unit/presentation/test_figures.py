@@ -438,9 +438,7 @@ def test_a_figure_is_drawn_once_for_its_file_and_for_pages_until_it_changes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     saved: list[object] = []
-    monkeypatch.setattr(
-        svg, "FigureCanvasSVG", lambda f: (saved.append(f), FigureCanvasSVG(f))[1]
-    )
+    monkeypatch.setattr(svg, "FigureCanvasSVG", lambda f: (saved.append(f), FigureCanvasSVG(f))[1])
     figure = samples.FIGURES["gap_bars"]()
     on_page, on_white = figures.inline_svg(figure, "k"), svg_text(figure)
     assert (figures.inline_svg(figure, "k"), len(saved)) == (on_page, 1)
