@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import nullcontext
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import NamedTuple
@@ -22,6 +23,7 @@ from studies._published import declared_actuator
 from studies.austin2015.diagnosis import RIVALS, diagnose_bench
 from tests.browser import browser, chromium
 from tests.command_line import Run, run
+from tests.undrawn import without_drawing
 
 __all__ = ["run"]
 
@@ -78,7 +80,8 @@ class Study(NamedTuple):
 @pytest.fixture(scope="module", params=["fast", pytest.param("whole", marks=pytest.mark.slow)])
 def study(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Study:
     out, fast = tmp_path_factory.mktemp("austin2015"), request.param == "fast"
-    return Study(out, dict(run_study("austin2015", out, fast=fast)), not fast)
+    with without_drawing() if fast else nullcontext():
+        return Study(out, dict(run_study("austin2015", out, fast=fast)), not fast)
 
 
 def test_the_study_keeps_its_claims(study: Study) -> None:

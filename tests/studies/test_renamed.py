@@ -29,8 +29,10 @@ from tests.diagnosed import rig_set
 from tests.hand_machines import Level, Machine, made
 from tests.renamed import SCHEMES, Renamed, Scheme, exchanged, in_words, nested, renamed
 from tests.selection import quick_only
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 DECKS = ("austin2015_figure_consistent", "austin2015_soft_spring", "one_sided_cable_drive")
 UNSEEN = ("first", "last", "eigenvalues")

@@ -15,6 +15,10 @@ from nlsdesign.foundation.quantity import quantity
 from nlsdesign.live.gallery import question_of
 from nlsdesign.live.views import view_of
 from nlsdesign.presentation.report import write_design_report
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 MADE, EXACT = "torque error over the spread", "torque error, exact numbers"
 FREE = ["spring.cam.contour", "spring.pretension", "spring.rubber.area", "spring.rubber.rest_length"]
