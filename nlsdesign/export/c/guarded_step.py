@@ -14,12 +14,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
+import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Variable
+from ...simulation.buffered import Buffered
 from .c_text import Real
 
 INPUT_HELD = 1 << 0
@@ -192,6 +195,14 @@ def first_outputs(model: FlatModel, real: Real = Real.DOUBLE) -> list[float]:
     return [value if math.isfinite(value) else 0.0 for value in values]
 
 
+@lru_cache(maxsize=4)
+def _next_and_shown(equations: ca.Function) -> ca.Function:
+    """Return the next states and the outputs alone."""
+    given = equations.sx_in()
+    following, outputs, _, _ = equations(*given)
+    return ca.Function("step", given, [ca.densify(following), ca.densify(outputs)])
+
+
 @dataclass
 class GuardedModel:
     """One running instance of a discrete model, evaluated by CasADi, with the guards of the C code."""
@@ -212,6 +223,10 @@ class GuardedModel:
             if numbers is not None:
                 self._guards[i] = ReadingGuard(numbers, self.real, self._inputs[i])
         self._movers = {i: mover(model, model.inputs[i]) for i in self._guards}
+        equations = _next_and_shown(model.equations)
+        self._given = [np.zeros(max(1, equations.numel_in(i))) for i in range(equations.n_in())]
+        self._given[3][: len(self._parameters)] = self._parameters
+        self._computed = Buffered(equations, self._given)
 
     def step(self, inputs: Sequence[float]) -> tuple[list[float], int]:
         """Advance by one sample of any numbers, shape (inputs,); return the outputs and the status word."""
@@ -271,8 +286,10 @@ class GuardedModel:
         at |= {v.name: u for v, u in zip(model.inputs, self._inputs, strict=True)}
         if any(not table.ends[0] <= at[table.argument] <= table.ends[1] for table in model.tables):
             status |= OUT_OF_TABLE
-        f, y, _, _ = model.equations(0.0, self.state, used, self._parameters, w)
-        following, outputs = np.array(f, dtype=float).ravel(), np.array(y, dtype=float).ravel()
+        for place, values in ((1, self.state), (2, used), (4, w)):
+            self._given[place][: len(values)] = values
+        self._computed.evaluate()
+        following, outputs = (result.copy() for result in self._computed.results)
         if np.all(np.abs(following) <= self.real.largest):
             self.state = following
         else:

@@ -24,7 +24,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
         extra=lambda rate, angle: 0.04 * max(angle - 0.8, 0.0),
     )
     folder: Path = tmp_path_factory.mktemp("one_sign")
-    return diagnose(*made(machine, folder, records=2), catalogue=[nls.effects.coulomb_friction])
+    return diagnose(*made(machine, folder), catalogue=[nls.effects.coulomb_friction])
 
 
 def test_a_name_keeps_its_number_beside_a_table(found: Verdict) -> None:
