@@ -63,7 +63,7 @@ class ActuatorResults:
     @property
     def judged(self) -> dict[str, float]:
         """What is proved, and how the torque loop was judged; nothing of what the fast way leaves out."""
-        numbers = {}
+        numbers: dict[str, float] = {}
         if self.spread.proved is not None:
             proof = self.spread.proved.certificate.proof
             numbers |= {"certified_decay_per_s": proof.decay, "certified_condition": proof.condition}

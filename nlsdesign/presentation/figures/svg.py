@@ -67,7 +67,7 @@ def _svg_on_nothing(figure: Figure) -> str:
         metadata = {"Date": None, "Creator": None, "Description": _NO_XML.sub(" ", alternative_text(figure))}
         # ``savefig`` would draw a second time, to lay out what drawing itself lays out; the same bytes.
         with mpl.rc_context(STYLE), _any_letters(), _on_nothing(figure):
-            FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)
+            FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)  # type: ignore[no-untyped-call]
         numbers: dict[str, int] = {}
         _drawn[figure] = _HASHED.sub(
             lambda match: f"{match[1] or match[2]}{numbers.setdefault(match[0], len(numbers))}",
