@@ -10,7 +10,6 @@ from nlsdesign.presentation.report import FigureSection, FoldedSection, Section,
 
 from .observer import STIFFER, WIDER
 from .results import ActuatorResults, Results
-from .spread import Proved
 
 
 def observer_sections(results: Results) -> list[Section]:
@@ -22,13 +21,16 @@ def observer_sections(results: Results) -> list[Section]:
         _on_bench("designed", results.designed),
         _errors_with_known_numbers(results),
     )
-    proved = (_bounds(results), *(_certificate(name, each) for name, each in results.proved.items()))
+    certificates = (
+        TextSection(f"The certificate, {name}", " ".join(each.certificate.statement), drawing=each.hashes)
+        for name, each in results.proved.items()
+    )
     return [
         designed,
         _errors_in_numbers(results),
         FoldedSection("Observability and stability over the angle", _over_angle(results)),
         FoldedSection("More on the observers", more),
-        FoldedSection("What is proved", proved),
+        FoldedSection("What is proved", (_bounds(results), *certificates)),
     ]
 
 
@@ -153,8 +155,3 @@ def _bounds(results: Results) -> TableSection:
         caption="A second observer with one certified gain lies beside the generated one, with its C code "
         "and certificate.json; `nlsdesign observer verify` checks it again without the solver.",
     )
-
-
-def _certificate(name: str, proved: Proved) -> TextSection:
-    hashes = "\n".join(f"{file}: SHA-256 {digest}" for file, digest in sorted(proved.hashes.items()))
-    return TextSection(f"The certificate, {name}", " ".join(proved.certificate.statement), drawing=hashes)

@@ -36,10 +36,11 @@ class Proved:
     file: Path
 
     @property
-    def hashes(self) -> dict[str, str]:
+    def hashes(self) -> str:
         """SHA-256 of the certified C files by name, as the certificate has them."""
         digests = hashes_of_code(self.code.source.parent)
-        return {path.name: digests[path.name] for path in (self.code.header, self.code.source)}
+        files = sorted(path.name for path in (self.code.header, self.code.source))
+        return "\n".join(f"{file}: SHA-256 {digests[file]}" for file in files)
 
 
 @dataclass(frozen=True, eq=False)

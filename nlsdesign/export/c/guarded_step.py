@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -195,14 +194,6 @@ def first_outputs(model: FlatModel, real: Real = Real.DOUBLE) -> list[float]:
     return [value if math.isfinite(value) else 0.0 for value in values]
 
 
-@lru_cache(maxsize=4)
-def _next_and_shown(equations: ca.Function) -> ca.Function:
-    """Return the next states and the outputs alone."""
-    given = equations.sx_in()
-    following, outputs, _, _ = equations(*given)
-    return ca.Function("step", given, [ca.densify(following), ca.densify(outputs)])
-
-
 @dataclass
 class GuardedModel:
     """One running instance of a discrete model, evaluated by CasADi, with the guards of the C code."""
@@ -223,10 +214,11 @@ class GuardedModel:
             if numbers is not None:
                 self._guards[i] = ReadingGuard(numbers, self.real, self._inputs[i])
         self._movers = {i: mover(model, model.inputs[i]) for i in self._guards}
-        equations = _next_and_shown(model.equations)
-        self._given = [np.zeros(max(1, equations.numel_in(i))) for i in range(equations.n_in())]
+        symbols = model.equations.sx_in()
+        self._given = [np.zeros(max(1, each.numel())) for each in symbols]
         self._given[3][: len(self._parameters)] = self._parameters
-        self._computed = Buffered(equations, self._given)
+        results = [ca.densify(each) for each in model.equations(*symbols)[:2]]
+        self._computed = Buffered(ca.Function("step", symbols, results), self._given)
 
     def step(self, inputs: Sequence[float]) -> tuple[list[float], int]:
         """Advance by one sample of any numbers, shape (inputs,); return the outputs and the status word."""
