@@ -20,6 +20,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import Collection, LineCollection, PathCollection, PolyCollection
 from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
@@ -64,14 +65,15 @@ def _svg_on_nothing(figure: Figure) -> str:
     if figure.stale or figure not in _drawn:
         stream = io.StringIO()
         metadata = {"Date": None, "Creator": None, "Description": _NO_XML.sub(" ", alternative_text(figure))}
-        with mpl.rc_context(STYLE), _any_letters():
-            figure.savefig(stream, format="svg", metadata=metadata)
+        # ``savefig`` would draw a second time, to lay out what drawing itself lays out; the same bytes.
+        with mpl.rc_context(STYLE), _any_letters(), _on_nothing(figure):
+            FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)  # type: ignore[no-untyped-call]
         numbers: dict[str, int] = {}
         _drawn[figure] = _HASHED.sub(
             lambda match: f"{match[1] or match[2]}{numbers.setdefault(match[0], len(numbers))}",
             stream.getvalue(),
         )
-        # Saving changes colours and layout and puts them back, which matplotlib takes for a change.
+        # Drawing changes colours and layout and puts them back, which matplotlib takes for a change.
         figure.stale = False
     return _drawn[figure]
 
@@ -137,6 +139,17 @@ def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = 
     for path, figure in paths.items():
         write_bytes(path, _content(figure, suffix))
     return list(paths)
+
+
+@contextmanager
+def _on_nothing(figure: Figure) -> Iterator[None]:
+    """Take the background of a figure away, and put it back."""
+    face, edge = figure.get_facecolor(), figure.get_edgecolor()
+    figure.set(facecolor="none", edgecolor="none")
+    try:
+        yield
+    finally:
+        figure.set(facecolor=face, edgecolor=edge)
 
 
 @contextmanager

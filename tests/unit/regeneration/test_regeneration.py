@@ -31,6 +31,10 @@ from nlsdesign.regeneration import (
     write_regeneration,
 )
 from nlsdesign.simulation import Trace
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 TIME = np.arange(800) * 0.002
 ANGLE = 0.3 * np.sin(4.0 * TIME)

@@ -38,6 +38,10 @@ from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 TIME = np.arange(6000) * 0.002
 SIGMA = 0.1

@@ -44,6 +44,10 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import Variable
 from nlsdesign.presentation import report
 from nlsdesign.presentation.figures.style import alternative_text
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def piece() -> Any:
