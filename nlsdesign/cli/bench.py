@@ -243,7 +243,8 @@ def _diagnosed(
     page, facts = out / "report.html", {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     write_diagnosis_report(page, verdict, facts=facts)
     content = {**verdict.to_dict(str(out / "model.toml")), "warnings": range_findings(verdict, measured)}
-    sentences, models = [str(verdict)], {}
+    sentences: list[str] = [str(verdict)]
+    models: dict[str, Any] = {}
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
         with steps.step("observer"):
