@@ -100,12 +100,6 @@ class KnownDrive:
             return constant
         return writer.number(self.plant.variable(motor.gear_ratio)) * constant
 
-    @property
-    def torque_per_current_value(self) -> float:
-        """K in N·m/A at the declared numbers."""
-        constant = self.plant.values[self.motor.torque_constant]
-        return constant * (1.0 if self.motor.gear_ratio is None else self.plant.values[self.motor.gear_ratio])
-
     def spring_turns(self, writer: LawWriter) -> Expression:
         """Return r, 1."""
         known, _ = self.named
@@ -242,8 +236,10 @@ def _stops(drive: KnownDrive) -> list[str]:
     s = opened.symbols()
     known = named(opened, s)
     end = min(contour_ends(plant, spring).values(), default=math.pi / 2.0) / abs(drive.spring_turns_value)
-    most = abs(drive.torque_per_current_value) * plant.values[drive.motor.current_limit]
     states, inputs = opened.start(opened.states), opened.start(opened.inputs)
+    names = [v.name for v in opened.inputs]
+    inputs[names.index(drive.names.current)] = plant.values[drive.motor.current_limit]
+    most = abs(opened.evaluate(list(states), list(inputs))[f"{drive.body.name}.drive_torque"])
     place = [v.name for v in opened.states].index(drive.body.motion)
     largest: dict[str, float] = {}
     for angle in np.linspace(-1.5 * end, 1.5 * end, 61):

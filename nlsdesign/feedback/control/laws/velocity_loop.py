@@ -251,19 +251,12 @@ class VelocityLoop:
         """Write the loop into a controller and return the current, for the command of its outer law."""
         raw, speed = self.measured_speed(writer, drive, heard)
         slow = writer.state("velocity_loop.integral", "N*m", "integral part of the motor torque")
-        turns, inertia, constant = (
-            drive.spring_turns(writer),
-            drive.inertia(writer),
-            drive.torque_per_current(writer),
+        turns, inertia = drive.spring_turns(writer), drive.inertia(writer)
+        constant = drive.torque_per_current(writer)
+        closes_at = writer.setting(
+            "velocity_bandwidth", "Hz", "velocity loop: bandwidth", self.closes_at(writer.sample_time)
         )
-        stiffness = (
-            inertia
-            * 2.0
-            * math.pi
-            * writer.setting(
-                "velocity_bandwidth", "Hz", "velocity loop: bandwidth", self.closes_at(writer.sample_time)
-            )
-        )
+        stiffness = inertia * 2.0 * math.pi * closes_at
         share = writer.setting(
             "compensation", "1", "velocity loop: share of the estimated spring torque added to the current",
             self.compensation,
@@ -286,13 +279,9 @@ class VelocityLoop:
         if self.disturbance is not None:
             self.disturbance.remember(writer, current)
         beyond = wanted - current
-        rate = (
-            2.0
-            * math.pi
-            * writer.setting(
-                "velocity_integral", "Hz", "velocity loop: corner below which it integrates", self.integral
-            )
-        )
+        rate = 2.0 * math.pi * writer.setting(
+            "velocity_integral", "Hz", "velocity loop: corner below which it integrates", self.integral
+        )  # fmt: skip
         one = Integration("velocity", slow, lacking, rate * stiffness * lacking, (beyond,), beyond * constant)
         writer.follow("velocity_loop.integral", self.windup.following(writer, one))
         return MotorCurrent(
