@@ -83,9 +83,13 @@ def test_a_trim_is_not_asked_for_where_springs_are_good_as_they_come(
 def test_what_breaks_and_what_nobody_knows_to_hold_is_told(design: CamDesign, question: LiveQuestion) -> None:
     stress = next(each for each in design.limits if each.limit == "MaximumStress")
     over = replace(stress, value=1.1 * stress.bound)
+    radius = next(each for each in design.limits if each.limit == "MinimumRadiusOfCurvature")
+    tight, wide = (replace(radius, value=share * radius.bound) for share in (0.9, 2.0))
     short = with_deck(design, f"elongation_at_break = {NUMBER}", "elongation_at_break = {value = 50.0")
     for changed, keep, answer, words in (
         (replace(design, limits=(*design.limits, over)), question.keep, "no", "MPa"),
+        (replace(design, limits=(tight,)), question.keep, "no", "mm"),
+        (replace(design, limits=(wide,)), question.keep, "yes", "curvature"),
         (replace(design, limits=(replace(over, value=stress.bound),)), question.keep, "yes", "stress"),
         (short, question.keep, "no", "stretched further"),
         (design, (), "unknown", "rubber and cable"),
