@@ -43,13 +43,14 @@ def lights_of(design: CamDesign, keep: tuple[Limit, ...]) -> tuple[Light, ...]:
     """
     model = flatten(design.actuator)
     return (
-        Light("can be made", *_made(design, model)),
-        Light("will hold", *_holds(design, model, {type(each).__name__ for each in keep})),
-        Light("will be known", *_known(model, design.target.largest)),
+        Light("can be made", *can_be_made(design, model)),
+        Light("will hold", *will_hold(design, model, {type(each).__name__ for each in keep})),
+        Light("will be known", *will_be_known(model, design.target.largest)),
     )
 
 
-def _made(design: CamDesign, model: FlatModel) -> tuple[str, str]:
+def can_be_made(design: CamDesign, model: FlatModel) -> tuple[str, str]:
+    """Return whether the edge can be cut and made springs are alike enough: answer and reason."""
     largest, made = design.target.largest, design.tolerance
     if not design.met:
         return NO, f"even with exact numbers the torque errs by {prefixed(design.rms)} rms"
@@ -75,7 +76,8 @@ def _made(design: CamDesign, model: FlatModel) -> tuple[str, str]:
     return YES, f"{words}; {process_of(part)}"
 
 
-def _holds(design: CamDesign, model: FlatModel, kept: set[str]) -> tuple[str, str]:
+def will_hold(design: CamDesign, model: FlatModel, kept: set[str]) -> tuple[str, str]:
+    """Return whether limits and what is stated of the rubber hold: answer and reason."""
     strengths = [each for each in design.limits if each.limit in limit_kinds()]
     for each in strengths:
         past = (each.value - each.bound) * (1.0 if each.upper else -1.0)
@@ -93,7 +95,8 @@ def _holds(design: CamDesign, model: FlatModel, kept: set[str]) -> tuple[str, st
     return YES, f"within its limits: {', '.join(sorted({each.of for each in strengths}))}"
 
 
-def _known(model: FlatModel, largest: float) -> tuple[str, str]:
+def will_be_known(model: FlatModel, largest: float) -> tuple[str, str]:
+    """Return whether sensors and spreads let an observer know the torque: answer and reason."""
     try:
         least = least_torque_error(observer_bench(model))(declared_prior(model))
     except NlsError as error:

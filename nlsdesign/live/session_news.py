@@ -325,7 +325,7 @@ class SessionNews:
                         "loop": to_json(answer.loop),
                     }
                     self._outbox.page({"what": "at", "number": None, "at": at})
-                self._motor()
+                self.paid()
             if self._settle_at is not None and time.monotonic() >= self._settle_at:
                 self._settle_at = None
                 self.live.start(SettleDesign())
@@ -333,7 +333,7 @@ class SessionNews:
             self.refuse(str(error), None)
         self.news()
 
-    def _motor(self) -> None:
+    def paid(self) -> None:
         """Say what the motor pays for the tasks, where there are some."""
         live = self.live
         design = None if live.answer.stale else live.answer.design

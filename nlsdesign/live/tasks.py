@@ -123,7 +123,7 @@ def curve_of(question: LiveQuestion) -> TaskCurve:
     if not question.tasks:
         raise ValueRangeError("task", "there is none", next_step="choose a joint first")
     try:
-        return _curve(question.tasks, _drive(question), question.cam.anchor_distance is None)
+        return least_heat(question.tasks, _drive(question), question.cam.anchor_distance is None)
     except InfeasibleError as error:
         raise InfeasibleError(
             "tasks", error.rule, next_step="ask for less assistance, or try another gear ratio"
@@ -131,7 +131,8 @@ def curve_of(question: LiveQuestion) -> TaskCurve:
 
 
 @lru_cache(maxsize=16)
-def _curve(tasks: tuple[AskedTask, ...], drive: MotorAndGear, one_sided: bool) -> TaskCurve:
+def least_heat(tasks: tuple[AskedTask, ...], drive: MotorAndGear, one_sided: bool) -> TaskCurve:
+    """Return the curve of least heat; the last ones are remembered, as a hand that moves asks again."""
     symmetry = OneSidedSpring() if one_sided else OddSpring()
     return curve_for_task(_mixed(tasks), drive, TaskProblem(symmetry=symmetry))
 
@@ -157,6 +158,15 @@ class MotorRow:
     current: float | None  # rms current in A
     power: float | None  # peak power at the shaft in W
     reason: str = ""  # why there is none of these
+
+    @classmethod
+    def of(cls, name: str, cycle: MotorCycle | NlsError, known: bool) -> MotorRow:
+        """Return the row of a cycle, or of the reason why there is none; ``known``: the winding."""
+        if isinstance(cycle, NlsError):
+            return cls(name, None, None, None, f"cannot serve the tasks: {in_words(cycle.rule)}")
+        current = math.sqrt(cycle.cycle.over_period(cycle.current**2) / cycle.cycle.period)
+        heat = cycle.heat / cycle.cycle.period if known else None
+        return cls(name, heat, current, cycle.peak_power)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +201,9 @@ def motor_over_tasks(question: LiveQuestion, view: DesignView | None, revision: 
         every = max(1, len(angle) // _MOST_ROWS)
         rows["this design"] = (tuple(angle[::every]), tuple(torque[::every]))
     for name, (angles, torques) in rows.items():
-        springs[name] = _paid(_mixed(question.tasks), drive, curve, np.array(angles), np.array(torques))
+        springs[name] = cycle_through(
+            _mixed(question.tasks), drive, curve, np.array(angles), np.array(torques)
+        )
     limit = plain(drive.current_limit)
     words = "Friction and the losses of the gear are left out."
     if not known:
@@ -201,12 +213,12 @@ def motor_over_tasks(question: LiveQuestion, view: DesignView | None, revision: 
     if isinstance(design, MotorCycle) and design.peaks["current"] > 1.01 * limit:
         words = f"The design asks for {design.peaks['current']:.3g} A; the drive gives {limit:.3g} A. {words}"
     return MotorAnswer(
-        revision, tuple(_row(name, cycle, known) for name, cycle in springs.items()),
+        revision, tuple(MotorRow.of(name, cycle, known) for name, cycle in springs.items()),
         np.array(curve.target.angles), np.array(curve.target.torques), plain(drive.gear_ratio), words,
     )  # fmt: skip
 
 
-def _paid(
+def cycle_through(
     task: MixedTask, drive: MotorAndGear, curve: TaskCurve, angles: Array, torques: Array
 ) -> MotorCycle | NlsError:
     """Return what the motor does with a spring of this table, or why it cannot."""
@@ -217,11 +229,3 @@ def _paid(
         return motor_cycle(task, drive, spring=spring, opposite=curve.opposite)
     except NlsError as error:
         return error
-
-
-def _row(name: str, cycle: MotorCycle | NlsError, known: bool) -> MotorRow:
-    if isinstance(cycle, NlsError):
-        return MotorRow(name, None, None, None, f"cannot serve the tasks: {in_words(cycle.rule)}")
-    current = math.sqrt(cycle.cycle.over_period(cycle.current**2) / cycle.cycle.period)
-    heat = cycle.heat / cycle.cycle.period if known else None
-    return MotorRow(name, heat, current, cycle.peak_power)
