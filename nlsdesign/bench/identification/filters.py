@@ -13,7 +13,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.ndimage import correlate1d
 
 from ...foundation.arrays import Array, Mask
 
@@ -52,7 +51,8 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
         return smooth
     beyond = min(half, len(signal) - 1)
     longer = np.pad(signal, beyond, mode="reflect", reflect_type="odd")
-    result: Array = correlate1d(longer, weights[::-1], mode="nearest")[beyond : beyond + len(signal)]
+    whole = scipy.ndimage.correlate1d(longer, weights[::-1], mode="nearest")
+    result: Array = whole[beyond : beyond + len(signal)]
     if order == 2:
         result[:half] = 0.0
         result[len(result) - half :] = 0.0

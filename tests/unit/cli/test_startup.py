@@ -14,8 +14,8 @@ from nlsdesign.cli.main import program
 
 HEAVY = {"casadi", "numpy", "sympy", "control", "scipy", "matplotlib", "fmpy", "rich", "jinja2"}
 DECK = "austin2015_figure_consistent"
-SLOW_PARTS = {"scipy.signal", "scipy.stats"}
-"""Of SciPy, half a second each, which SciPy loads at their first use."""
+SLOW_PARTS = {"scipy.signal", "scipy.stats", "scipy.integrate", "scipy.ndimage"}
+"""Of SciPy, up to half a second each, which SciPy loads at their first use."""
 AT_THE_END = f"""
 import atexit, sys
 atexit.register(lambda: print(

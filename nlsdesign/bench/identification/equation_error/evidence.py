@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from ....foundation.arrays import Array
 from ....simulation import Trace
@@ -246,7 +246,8 @@ class Bench:
             allowed = _COARSEST
             for signal in moving:
                 span = max(float(np.ptp(r.trace[signal])) for r in self.records.records)
-                fastest = float(np.max(np.abs(np.gradient(gaussian_filter1d(record.trace[signal], 2.0)))))
+                smooth = scipy.ndimage.gaussian_filter1d(record.trace[signal], 2.0)
+                fastest = float(np.max(np.abs(np.gradient(smooth))))
                 allowed = min(allowed, int(_COARSE_SHARE * span / max(fastest, 1e-300)))
             k = max(1, allowed)
             trace = record.trace
