@@ -124,7 +124,9 @@ def regenerated_controller(
     side, last = only_side(declared), usual_last(declared)
     most = min(largest_torque(declared), abs(torque_at_rest(KnownDrive(declared), (side or 1.0) * last)))
     sines = tuple(
-        TrackedSine(share * most, frequency, *(_error(loop, share * most, frequency, side) for loop in loops))
+        TrackedSine(
+            share * most, frequency, *(sine_error(loop, share * most, frequency, side) for loop in loops)
+        )
         for share in SHARES
         for frequency in FREQUENCIES
     )
@@ -143,7 +145,7 @@ def usual_controller(model: FlatModel, sample_time: float) -> tuple[FlatModel, s
     )
 
 
-def _error(loop: ClosedLoop, amplitude: float, frequency: float, side: float) -> float:
+def sine_error(loop: ClosedLoop, amplitude: float, frequency: float, side: float) -> float:
     """Return the torque error over the last period of a sine; not a number in a limit cycle."""
     stop = 3.0 / frequency
     wanted = Sine(amplitude, frequency, offset=1.25 * side * amplitude)

@@ -199,7 +199,7 @@ def regenerate(
         With reasons in words where something cannot be designed or compared.
     """
     choice = choice or ObserverChoice()
-    result = _observed_again(declared, better, records, fits=fits, choice=choice, progress=progress)
+    result = regenerated_observer(declared, better, records, fits=fits, choice=choice, progress=progress)
     progress("designing the controllers, and following sines under both")
     try:
         controller = regenerated_controller(declared, better, choice.sample_time)
@@ -208,7 +208,7 @@ def regenerate(
     return replace(result, controller=controller)
 
 
-def _observed_again(
+def regenerated_observer(
     declared: FlatModel,
     better: FlatModel,
     records: RecordSet,

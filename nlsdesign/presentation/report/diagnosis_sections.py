@@ -47,7 +47,7 @@ from .sections import (
 
 if TYPE_CHECKING:
     # Only its type is wanted here: the module brings the compiler and fmpy along.
-    from ...regeneration import RegeneratedController, Regeneration
+    from ...regeneration import Regeneration
 
 VERDICTS = {
     "none": "nothing is missing",
@@ -383,25 +383,21 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
             )
         )  # fmt: skip
     if result.controller:
-        sections.append(_tracking(result.controller))
+        rows = [tuple(three_digits(value) for value in sine) for sine in result.controller.sines]
+        columns = ("amplitude in N·m", "frequency in Hz", "before in N·m", "after in N·m")
+        caption = (
+            "Root mean square torque error of the better model over the last period of a sine of the wanted "
+            "torque, under observer and controller of the declared and of the better model. "
+            f"{result.controller.words()[1]}"
+        )
+        sections.append(TableSection("Tracking of the torque", columns, tuple(rows), caption=caption))
     if result.reasons:
-        rows = tuple((reason,) for reason in result.reasons)
+        reasons = tuple((reason,) for reason in result.reasons)
         caption = "Why something is lacking here."
-        sections.append(TableSection("Not done", ("reason",), rows, caption=caption))
+        sections.append(TableSection("Not done", ("reason",), reasons, caption=caption))
     if files:
         sections.append(FileSection("Files", files, caption="Written beside this report."))
     return sections
-
-
-def _tracking(controller: RegeneratedController) -> TableSection:
-    rows = tuple(tuple(three_digits(value) for value in sine) for sine in controller.sines)
-    columns = ("amplitude in N·m", "frequency in Hz", "before in N·m", "after in N·m")
-    caption = (
-        "Root mean square torque error of the better model over the last period of a sine of the wanted "
-        "torque, under observer and controller of the declared and of the better model. "
-        f"{controller.words()[1]}"
-    )
-    return TableSection("Tracking of the torque", columns, rows, caption=caption)
 
 
 def _torque_errors(result: Regeneration) -> NumbersSection:

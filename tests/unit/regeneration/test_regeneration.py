@@ -205,7 +205,7 @@ def test_a_controller_that_follows_worse_or_hunts_replaces_nothing(
     def usual(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
         return torque_controller(model, sample_time=sample_time), "margins"
 
-    monkeypatch.setattr(regenerated_controller, "_error", error)
+    monkeypatch.setattr(regenerated_controller, "sine_error", error)
     monkeypatch.setattr(regenerated_controller, "usual_controller", usual)
     declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
     chosen = regenerated_controller.regenerated_controller(declared, better, 2e-3)

@@ -191,7 +191,7 @@ def known_load(
     spring.
     """
     plant, spring, body = drive.plant, series_spring(drive.plant), drive.body
-    opened = cut(plant, [spring.effort, f"{body.name}.drive_torque", *_stops(drive)])
+    opened = cut(plant, [spring.effort, f"{body.name}.drive_torque", *end_stops(drive)])
     s, (before, declared) = opened.symbols(), drive.named
     known = named(opened, s)
     given = ca.vertcat(
@@ -229,7 +229,7 @@ def _at_start(model: FlatModel, s: Symbols, expression: Expression, free: Expres
     return ca.SX(ca.substitute(ca.substitute(expression, others, starts), fresh, free))
 
 
-def _stops(drive: KnownDrive) -> list[str]:
+def end_stops(drive: KnownDrive) -> list[str]:
     """Return the torques of places that the drive could not hold, as those of end stops."""
     plant, spring = drive.plant, series_spring(drive.plant)
     opened = cut(plant, [spring.effort])
