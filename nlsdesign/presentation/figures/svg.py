@@ -66,7 +66,7 @@ def _svg_on_nothing(figure: Figure) -> str:
         stream = io.StringIO()
         metadata = {"Date": None, "Creator": None, "Description": _NO_XML.sub(" ", alternative_text(figure))}
         # ``savefig`` would draw a second time, to lay out what drawing itself lays out; the same bytes.
-        with mpl.rc_context(STYLE), _any_letters(), _on_nothing(figure):
+        with mpl.rc_context(STYLE), _drawing(figure):
             FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)  # type: ignore[no-untyped-call]
         numbers: dict[str, int] = {}
         _drawn[figure] = _HASHED.sub(
@@ -142,22 +142,19 @@ def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = 
 
 
 @contextmanager
-def _on_nothing(figure: Figure) -> Iterator[None]:
-    """Take the background of a figure away, and put it back."""
+def _drawing(figure: Figure) -> Iterator[None]:
+    """Take the background away while a figure is drawn, and accept letters that matplotlib's font lacks.
+
+    Text stays text, and who shows it has fonts of its own.
+    """
     face, edge = figure.get_facecolor(), figure.get_edgecolor()
     figure.set(facecolor="none", edgecolor="none")
-    try:
-        yield
-    finally:
-        figure.set(facecolor=face, edgecolor=edge)
-
-
-@contextmanager
-def _any_letters() -> Iterator[None]:
-    """Accept letters that matplotlib's font lacks: text stays text, and who shows it has fonts of its own."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
-        yield
+        try:
+            yield
+        finally:
+            figure.set(facecolor=face, edgecolor=edge)
 
 
 def _content(figure: Figure, suffix: str) -> bytes:
