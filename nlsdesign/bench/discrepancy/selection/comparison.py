@@ -19,7 +19,7 @@ from ....foundation.quantity import Quantity
 from ....foundation.work_sharing import parallel_map
 from ....model import Variable, flatten
 from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_noise import BlockNoise
+from ...identification.equation_error.block_noise import NoiseFloor
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit
@@ -212,7 +212,7 @@ class Judged:
     # block, record, floor: which block, which record, and how it is read
     block: Block
     record: Record
-    floor: BlockNoise
+    floor: NoiseFloor
     predicted: Array  # unfiltered output over the record
     residual: Array  # filtered error in units of the noise floor
 

@@ -107,14 +107,15 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Cr
     rows = sum(t.rows for t in tallies.values())
     effective = sum(t.effective_size for t in tallies.values())
     fitted, predicted = sum(t.squares for t in tallies.values()), sum(t.predicted for t in tallies.values())
-    floor, known_from = bench.typical_floor(block), bench.known_from(block)
+    read = bench.block_noise[block]
+    floor, known_from = read.typical, read.known
 
     def is_open(squares: float, count: int, independent: float) -> bool:
         return criteria.is_beyond_noise(squares / max(count, 1), independent, known_from)
 
     return Excess(
         block,
-        bench.units[block],
+        read.block.unit,
         floor,
         floor * math.sqrt(fitted / max(rows, 1)),
         floor * math.sqrt(predicted / max(rows, 1)),

@@ -63,7 +63,11 @@ class BenchByHand:
     """Two fitted records, one for selection, one held out."""
 
     def __init__(self) -> None:
-        self.units = {"spring": "N*m", "wheel": "N*m"}
+        block = SimpleNamespace(unit="N*m")
+        self.block_noise = {
+            name: SimpleNamespace(typical=floor, known=math.inf, block=block)
+            for name, floor in (("spring", 0.1), ("wheel", 0.5))
+        }
         self.roles = {"a": "fit", "b": "fit", "c": "selection", "d": "held_out"}
 
     @property
@@ -72,12 +76,6 @@ class BenchByHand:
 
     def of(self, *roles: str) -> list[SimpleNamespace]:
         return [SimpleNamespace(name=n) for n, role in self.roles.items() if role in roles]
-
-    def typical_floor(self, block: str) -> float:
-        return {"spring": 0.1, "wheel": 0.5}[block]
-
-    def known_from(self, block: str) -> float:
-        return math.inf
 
 
 BENCH = cast(Bench, BenchByHand())
