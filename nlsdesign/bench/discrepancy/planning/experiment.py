@@ -25,8 +25,8 @@ from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ....model.structure import MovingBody, body_moved_by
 from ....simulation import Trace, simulate
-from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_noise import LEAST_ROWS, NoiseFloor, noise_floor
+from ...identification.equation_error.block import Block, NoiseFloor
+from ...identification.equation_error.block_noise import LEAST_ROWS, noise_floor
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import Record

@@ -22,7 +22,7 @@ import scipy
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
-from ...identification.equation_error.block_noise import NoiseFloor
+from ...identification.equation_error.block import NoiseFloor
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit

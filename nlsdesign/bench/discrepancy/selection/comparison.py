@@ -18,8 +18,7 @@ from ....foundation.errors import ConvergenceError, unknown_name
 from ....foundation.quantity import Quantity
 from ....foundation.work_sharing import parallel_map
 from ....model import Variable, flatten
-from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_noise import NoiseFloor
+from ...identification.equation_error.block import Block, NoiseFloor
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit

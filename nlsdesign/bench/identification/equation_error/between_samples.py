@@ -14,7 +14,7 @@ as measured. Records that show everything already stay as they are.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ from ....foundation.errors import ConvergenceError
 from ..filters import Smoothing, kernel
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
-from .block_noise import BlockNoise, NoiseFloor
+from .block import BlockNoise, NoiseFloor
 from .block_response import DrivenBlock
 
 _RESOLVED = 0.05
@@ -87,7 +87,7 @@ def times_on(record: Record, step: float) -> int:
     return max(1, math.ceil(record.step / step - _SHARE))
 
 
-class BlockRecord(NamedTuple):
+class _BlockRecord(NamedTuple):
     """A record as a block reads it."""
 
     driven: DrivenBlock  # the block, ready for evaluation
@@ -95,7 +95,9 @@ class BlockRecord(NamedTuple):
     floor: NoiseFloor
 
 
-def resolving_step(block_records: Sequence[BlockRecord]) -> float:
+def resolving_step(
+    blocks: Sequence[DrivenBlock], read: Mapping[str, BlockNoise], records: Sequence[Record]
+) -> float:
     """Return the time between samples in s at which blocks show what they do; infinite if any is enough.
 
     Notes
@@ -103,6 +105,12 @@ def resolving_step(block_records: Sequence[BlockRecord]) -> float:
     Blocks that are faster than a sample, as contact is, take short steps of their own between the samples;
     where there is one, nothing is interpolated.
     """
+    block_records = [
+        _BlockRecord(driven, record, floors[record.name])
+        for driven, floors in ((driven, read[driven.block.name].floors) for driven in blocks)
+        for record in records
+        if record.name in floors
+    ]
     if any(each.driven.stiff for each in block_records):
         return math.inf
     return min(
@@ -115,7 +123,7 @@ def resolving_step(block_records: Sequence[BlockRecord]) -> float:
     )
 
 
-def _needed(seen: BlockRecord) -> int:
+def _needed(seen: _BlockRecord) -> int:
     """Return how many samples are needed in the place of one."""
     times = 1
     try:
@@ -130,7 +138,7 @@ def _needed(seen: BlockRecord) -> int:
     return times
 
 
-def _filtered(seen: BlockRecord, times: int) -> Array:
+def _filtered(seen: _BlockRecord, times: int) -> Array:
     """Return the filtered output of a block, evaluated at several samples in the place of one."""
     record = seen.record.refined(times)
     output = seen.driven.respond(seen.driven.samples(record, {}), {}).output

@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -46,7 +46,7 @@ from ..filters import Smoothing, blur_weights, difference, filter_weights, filte
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
 from .batch import ColumnFunction
-from .block import Block, Drive
+from .block import Block, BlockNoise, Drive, Filters, NoiseFloor
 from .noise import Noise, NoisePart, independent_number
 
 READING, BALANCE = 0.1, 0.2
@@ -96,76 +96,6 @@ LEAST_ROWS = 20
 LEAST_COVERED = 0.25
 """Share of the power of a motion in the rows of a block, below which it is read across its reversals: the
 standard errors of what is in proportion to it are then twice those of the whole motion."""
-
-
-class Filters(NamedTuple):
-    """How a block reads its records."""
-
-    width: float  # standard deviation in s of the zero-phase Gaussian filter that every term passes
-    span: float  # time in s over which rates are taken
-    spacing: float  # time in s from one row to the next
-    straightened: tuple[str, ...] = ()  # names of the inputs whose noise the block rectifies, see rectified
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseFloor:
-    """What a block makes of the noise of a record: the filter it reads through, and the floor behind it.
-
-    ``filter`` is a zero-phase filter, thinned, without the rows that say nothing; its shape is (rows, n).
-    ``sigma`` is the noise floor of each row in the unit of the block, ``raw_sigma`` that of each unfiltered
-    sample, shape (n,), which only blocks with a target use. Its own noise makes at most ``independent``
-    independent rows of them. The floor is known from ``known`` effective squares of that noise. Both are
-    infinite where the noise is white. The rows hold the share ``covered`` of the power of the motion.
-    """
-
-    filter: Smoothing
-    sigma: Array
-    raw_sigma: Array
-    independent: float = math.inf
-    known: float = math.inf
-    covered: float = 1.0
-    # shares: of the variance of the floor, from the noise of each signal that is taken as it is
-    shares: Mapping[str, float] = field(default_factory=dict)
-    width: float = 0.0  # standard deviation of the filter in s
-
-    @property
-    def typical(self) -> float:
-        """Noise floor over the rows, root mean square, in the unit of the block."""
-        return float(np.sqrt(np.mean(self.sigma**2)))
-
-    @property
-    def places(self) -> NDArray[np.int64]:
-        """Index of the sample in the middle of each row."""
-        return self.filter.places
-
-
-@dataclass(frozen=True, eq=False)
-class BlockNoise:
-    """How a block reads the records of a bench, and what it makes of their noise.
-
-    ``floors``: by name of the record; one that says nothing of the block has none.
-    """
-
-    block: Block
-    filters: Filters
-    floors: Mapping[str, NoiseFloor]
-
-    @property
-    def typical(self) -> float:
-        """Noise floor over all records, root mean square, in the unit of the block."""
-        rows = np.concatenate([floor.sigma for floor in self.floors.values()])
-        return float(np.sqrt(np.mean(rows**2)))
-
-    @property
-    def known(self) -> float:
-        """Effective squares of noise from which the floor is known."""
-        # One estimate of the noise serves all records, so more of them make it no better.
-        doubt = float(np.mean([1.0 / floor.known for floor in self.floors.values()]))
-        return 1.0 / doubt if doubt else math.inf
-
-    def read_by(self, block: Block) -> BlockNoise:
-        """Return the same of another model of the block, in the scale of the declared one."""
-        return replace(self, block=block.scaled_to(self.block.effort_per_drive))
 
 
 def noise_of_blocks(

@@ -16,9 +16,9 @@ from ..filters import derivative, every
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..records.sampling import Sampling
-from .between_samples import BlockRecord, noise_on_clock, on_clock, resolving_step
-from .block import Block
-from .block_noise import Filters, NoiseFloor, noise_of_blocks, slowest_rate
+from .between_samples import noise_on_clock, on_clock, resolving_step
+from .block import Block, Filters, NoiseFloor
+from .block_noise import noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
 from .inferred_sampling import Missing, plain_terms, with_inferred_sampling
 from .input_noise import with_colour_of_inputs
@@ -126,15 +126,8 @@ class Bench:
         self._remarks = self.records.remarks
         self._thin: dict[tuple[str, str, bool], tuple[Record, NoiseFloor]] = {}
         if clock is None:
-            driven = {block.name: self.driven(block, []) for block in blocks}
-            clock = resolving_step(
-                [
-                    BlockRecord(driven[name], record, each.floors[record.name])
-                    for name, each in read.items()
-                    for record in self.records.deciding
-                    if record.name in each.floors
-                ]
-            )
+            driven = [self.driven(block, []) for block in blocks]
+            clock = resolving_step(driven, read, self.records.deciding)
         self.clock = clock
         self.block_noise = {n: noise_on_clock(each, self.records, self.clock) for n, each in read.items()}
         self.records = on_clock(self.records, self.clock)

@@ -32,8 +32,7 @@ from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..records.sampling import AVERAGED, HELD, SAMPLED, Sampling, shifted
 from ..residuals import effective_size
-from .block import Block
-from .block_noise import BlockNoise
+from .block import Block, BlockNoise
 from .block_response import DrivenBlock, free_in
 
 _FORMS = (SAMPLED, HELD, AVERAGED)

@@ -32,7 +32,7 @@ from scipy.linalg import solve_triangular
 from ....foundation.arrays import Array
 from ..filters import derivative
 from ..records.measurement import Record, RecordSet
-from .block_noise import BlockNoise
+from .block import BlockNoise
 from .inferred_sampling import freed, functions_of_motion, rows_of
 from .noise import Band, Colour, Noise, NoisePart, Stretch, bands_of, fitted_at, is_white, scatter
 

@@ -59,7 +59,7 @@ def test_a_corner_that_is_passed_between_samples_is_no_error(monkeypatch: pytest
     assert squares(bench) < 1.4
     (remark,) = bench.records.remarks
     assert "sampled so slowly" in str(remark)
-    monkeypatch.setattr(evidence, "resolving_step", lambda readings: math.inf)
+    monkeypatch.setattr(evidence, "resolving_step", lambda *_: math.inf)
     assert squares(Bench(RECORDS, bench_blocks())) > 1.4, "or the test would show nothing"
 
 

@@ -13,8 +13,7 @@ from scipy.linalg import expm
 from scipy.optimize import lsq_linear
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification.equation_error.block import Block
-from nlsdesign.bench.identification.equation_error.block_noise import NoiseFloor
+from nlsdesign.bench.identification.equation_error.block import Block, NoiseFloor
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.bench.identification.equation_error.evidence import Bench, Evidence
 from nlsdesign.bench.identification.equation_error.stepping import exact_step, rosenbrock_step, stages_of
