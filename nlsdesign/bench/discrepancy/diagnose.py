@@ -326,6 +326,10 @@ def _verdict(
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)
+    judged, better, base = (
+        each.as_known_beside(open_blocks)
+        for each, open_blocks in ((judged, left), (better, left), (base, before))
+    )
     worst = _furthest([n for n in before if n != DECLARED], before)
     read = [(b, r) for b, each in case.bench.block_noise.items() for r in each.floors]
     unpredictable = [key for key in read if key in better.unpredictable]

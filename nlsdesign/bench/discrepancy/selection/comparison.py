@@ -6,6 +6,7 @@ A hypothesis is fitted in groups of blocks that share free numbers.
 from __future__ import annotations
 
 import itertools
+import math
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -185,6 +186,8 @@ class HypothesisFit:
             min(high, variable.maximum),
             "log" if log else "linear",
             1.0 if log else 0.1 * (high - low),
+            # Up to that size something plainer may be a part of the number, each size as likely.
+            confounded=least / math.sqrt(3.0),
         )
 
 
