@@ -73,7 +73,7 @@ def test_a_span_of_rates_leaves_what_a_damped_mode_does(
     monkeypatch.setattr(block_noise, "_BLURRED", let_pass)
     declared, records = opened(joint)
     blocks = blocks_of(flatten(declared), records.signals)
-    filters = Bench(records, blocks).filters
+    filters = {name: read.filters for name, read in Bench(records, blocks).block_noise.items()}
     own = filters["table_side"].span
     assert own < 0.1 if let_pass < 1.0 else own > 0.15
     assert filters["axis_1"].span > 0.15, "behind the noise of the current nothing of it is seen"
