@@ -118,7 +118,7 @@ def main(out: Path, fast: bool = False) -> Results:
     problem = TaskProblem(goal=LeastPeakPower(), pieces=8 if fast else 24)
     power = curve_for_task(tasks["ankle"], drive.geared(ankle.ratio), problem)
     usual = DesignSettings(draws=1000, look_for_size_ranges=False)
-    design = designed_ankle(ankle.curve.target, replace(usual, starts=4, draws=100) if fast else usual)
+    design = designed_ankle(ankle.curve.target, replace(usual, starts=2, draws=40) if fast else usual)
     motor = motor_cycle(tasks["ankle"], drive.geared(ankle.ratio), spring=curve_of(design))
     write(out, joints.values(), power, AnkleSpring(design, motor))
     return Results(

@@ -18,7 +18,7 @@ os.environ["NLSDESIGN_CFLAGS"] = "-O0"
 
 # The same examples in every run; no time limit (it would test the machine); nothing written to disk.
 settings.register_profile("thorough", derandomize=True, deadline=None, database=None, max_examples=300)
-settings.register_profile("quick", settings.get_profile("thorough"), max_examples=40)
+settings.register_profile("quick", settings.get_profile("thorough"), max_examples=20)
 
 
 def pytest_configure(config: pytest.Config) -> None:

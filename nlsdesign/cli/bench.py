@@ -140,7 +140,7 @@ def _roles(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def _diagnosis_files(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for, and of what an earlier diagnosis has left."""
-    parts = [*(["observer"] if given["again"] else []), *(_PARTS if given["exports"] else [])]
+    parts = [*(["observer", "controller"] if given["again"] else []), *(_PARTS if given["exports"] else [])]
     names = [
         "verdict.json",
         "model.toml",
@@ -186,7 +186,7 @@ def _questions(deck: str | None, joints: Sequence[str], out: Path) -> list[tuple
     "--regenerate",
     "again",
     is_flag=True,
-    help="Design the torque observer again from the better model, write it as C and FMU, and compare it.",
+    help="Design torque observer and controller again from the better model, write and compare them.",
 )
 @export_option
 @click.option("--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
@@ -243,7 +243,8 @@ def _diagnosed(
     page, facts = out / "report.html", {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     write_diagnosis_report(page, verdict, facts=facts)
     content = {**verdict.to_dict(str(out / "model.toml")), "warnings": range_findings(verdict, measured)}
-    sentences, observer = [str(verdict)], None
+    sentences: list[str] = [str(verdict)]
+    models: dict[str, Any] = {}
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
         with steps.step("observer"):
@@ -251,12 +252,15 @@ def _diagnosed(
             result = regenerate(plant, better, measured, fits=verdict.fits, choice=choice)
             result, files = write_regeneration(result, out)
             write_diagnosis_report(page, verdict, facts=facts, regenerated=(result, files))
-        observer, names = result.observer, [str(path) for path in files]
+        names = [str(path) for path in files]
+        models = {"observer": result.observer}
+        if result.controller:
+            models["controller"] = result.controller.controller
         content["regeneration"] = {**result.to_dict(), "files": names}
         sentences += [*result.words(), *result.reasons, *([f"written: {', '.join(names)}"] if names else [])]
     if options["exports"]:
         with steps.step("export"):
-            machine = export_machine(flatten(verdict.actuator), out, observer=observer, **roles)
+            machine = export_machine(flatten(verdict.actuator), out, **models, **roles)
         content |= machine.content()
         sentences += machine.findings()
     blocks, lacking = written_block(options["code"], verdict.actuator, out)

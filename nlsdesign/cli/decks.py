@@ -97,12 +97,11 @@ def check(deck_name: str, as_json: bool) -> None:
     from ..regeneration import range_remarks, readiness
 
     read = load_deck(deck_name)
-    problems = deck_problems(read) or _model_problems(declare(read))
+    problems = deck_problems(read) or _model_problems(machine := declare(read))
     if problems:
         for problem in problems:
             click.echo(f"error: {problem}", err=True)
         sys.exit(2)
-    machine = declare(read)
     shares, commands = sources(machine.quantities()), readiness(machine)
     remarks = [*deck_remarks(machine), *range_remarks(machine)]
     if as_json:

@@ -13,7 +13,7 @@ from .curves.target import (
     TorqueBand,
 )
 from .curves.target_files import read_target
-from .curves.task import Task, read_task, walking_task
+from .curves.task import MixedTask, Task, read_task, walking_task
 from .curves.task_curve import (
     LeastEnergy,
     LeastPeakPower,
@@ -144,6 +144,7 @@ __all__ = [
     "MinimumHollowRadius",
     "MinimumRadiusOfCurvature",
     "MinimumSpringIndex",
+    "MixedTask",
     "MotorAndGear",
     "MotorCycle",
     "NormalSpread",

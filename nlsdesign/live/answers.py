@@ -99,6 +99,8 @@ class LiveControls:
     numbers: tuple[Any, ...]
     contour: str  # name of the contour
     contour_free: bool  # whether it may change
+    tasks: tuple[Any, ...]  # rows (joint, body mass, part of the torque, share of the time)
+    motor: Mapping[str, float]  # numbers of the motor that were given
     # can_undo, can_redo: whether there is a step back or forth
     can_undo: bool
     can_redo: bool
@@ -130,6 +132,7 @@ class DesignView:
     # made_error: rms error in N·m that 95 % of the springs stay below whose numbers lie within their declared
     # spreads; None before the check, and where no number is spread
     made_error: float | None = None
+    lights: tuple[Any, ...] = ()  # whether it can be made, will hold and be known; empty before the check
 
     def column(self, name: str) -> LiveColumn:
         """Return one column."""

@@ -16,6 +16,7 @@ from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknow
 from .at_angle import AngleView
 from .gallery import gallery_question
 from .question import LARGEST_ANGLE, LARGEST_TORQUE, LEAST_STEP, LiveQuestion, finite_in
+from .tasks import drop_task, follow_tasks, set_motor, set_task
 from .views import in_words
 
 _LONGEST_NAME = 200
@@ -227,6 +228,10 @@ EDITS: Mapping[str, Callable[..., LiveQuestion]] = {
     "HoldNumber": hold_number,
     "ChooseMaterial": choose_material,
     "ChooseDeck": choose_deck,
+    "SetTask": set_task,
+    "DropTask": drop_task,
+    "SetMotor": set_motor,
+    "FollowTasks": follow_tasks,
 }
 """What each edit does, by the name that messages of the page give it."""
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,11 +30,22 @@ _READ_IN = {
 """Units of the page and their factors, by unit in SI; "%" stands for a ratio that is read so."""
 
 
+class AskedTask(NamedTuple):
+    """What the actuator has to do for a part of the time: walking, at one joint."""
+
+    joint: str
+    body_mass: float  # in kg
+    scale: float  # part of the torque of the joint that the actuator gives
+    share: float  # of the time, beside the shares of the other tasks
+
+
 @dataclass(frozen=True, eq=False)
 class LiveQuestion(CamQuestion):
     """What is asked on the page: a question with a title, its points within what the page can draw."""
 
     title: str = ""
+    tasks: tuple[AskedTask, ...] = ()  # against which motor and spring are held
+    motor: Mapping[str, float] = field(default_factory=dict)  # numbers in SI in place of those of the deck
 
     def with_points(self, points: tuple[TargetPoint, ...]) -> LiveQuestion:
         """Return the question with another target."""

@@ -23,6 +23,7 @@ from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
 from .question import LiveQuestion
+from .tasks import reopened_tasks
 
 MEMBERS = _DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
 """Names in the archive; the commands take the first two as they are."""
@@ -65,9 +66,13 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
         f"title = {json.dumps(question.title)}",
         f"material = {json.dumps(question.machine.material)}",
         f"points = {json.dumps([[float(v) for v in point] for point in question.points])}",
+        f"tasks = {json.dumps(question.tasks)}",
         "",
         "[values]",
         *(f"{json.dumps(name)} = {float(value)!r}" for name, value in values.items()),
+        "",
+        "[motor]",
+        *(f"{name} = {float(value)!r}" for name, value in question.motor.items()),
         *_contour_lines(question.machine.designed),
     ]
     return SavedDesign(deck_text(question.actuator), "\n".join(lines) + "\n", "\n".join(begin) + "\n")
@@ -110,7 +115,8 @@ def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
     for name in (*free, *ranges):
         if name != question.contour:
             question.number(name)
-    return replace(question, free=free).with_points(question.points), _values(begin)
+    question = reopened_tasks(replace(question, free=free), begin.get("tasks"), begin.get("motor"))
+    return question.with_points(question.points), _values(begin)
 
 
 def _contour_lines(contour: Contour | None) -> list[str]:

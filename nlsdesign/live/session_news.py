@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from ..components.materials.material_law import missing_law
+from ..design.curves.task import walking_tables
 from ..design.optimisation.limits import limit_kinds
 from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
@@ -23,6 +24,7 @@ from .background import WorkState
 from .gallery import gallery_cards
 from .live_design import LiveDesign
 from .messages import Outbox
+from .tasks import motor_over_tasks
 from .views import in_words
 from .work import (
     DiagnoseRecords,
@@ -242,6 +244,7 @@ class SessionNews:
         self._angle: float | None = None
         self._settle_at: float | None = None
         self._look_due = False
+        self._paid: tuple[object, ...] = ()  # question and design of which the page knows what the motor pays
 
     @property
     def idle(self) -> bool:
@@ -250,6 +253,7 @@ class SessionNews:
 
     def everything(self, number: int | None) -> None:
         """Show everything, as to a page that was loaded just now."""
+        self._paid = ()
         self.answer(self.live.answer, number, None)
         self.kept(number)
         self._outbox.page({"what": "gallery", **choices()})
@@ -321,12 +325,23 @@ class SessionNews:
                         "loop": to_json(answer.loop),
                     }
                     self._outbox.page({"what": "at", "number": None, "at": at})
+                self.paid()
             if self._settle_at is not None and time.monotonic() >= self._settle_at:
                 self._settle_at = None
                 self.live.start(SettleDesign())
         except NlsError as error:
             self.refuse(str(error), None)
         self.news()
+
+    def paid(self) -> None:
+        """Say what the motor pays for the tasks, where there are some."""
+        live = self.live
+        design = None if live.answer.stale else live.answer.design
+        asked = (live.question, design)
+        if live.question.tasks and asked != self._paid:
+            self._paid = asked
+            answer = motor_over_tasks(live.question, design, live.answer.revision)
+            self._outbox.page({"what": "motor", "motor": to_json(answer)})
 
     def news(self) -> None:
         """Say what has changed of work, also while a hand moves."""
@@ -350,4 +365,5 @@ def choices() -> dict[str, Any]:
         "cards": [to_json(each) for each in gallery_cards()],
         "materials": [{"name": n, "reason": missing_law(each)} for n, each in materials().items()],
         "limits": kinds,
+        "joints": sorted(walking_tables()),
     }

@@ -133,6 +133,8 @@ def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> Li
         numbers=tuple(tuple(each) for each in question.numbers.values()),
         contour=question.contour,
         contour_free=question.contour in question.free,
+        tasks=tuple(tuple(each) for each in question.tasks),
+        motor=question.motor,
         can_undo=can_undo,
         can_redo=can_redo,
     )

@@ -46,6 +46,7 @@ from .answers import (
 )
 from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
+from .lights import Light, lights_of
 from .question import LiveQuestion
 from .views import in_words, not_kept, unkept, view_of
 
@@ -275,6 +276,7 @@ class FullDesign:
     state: AnswerState
     design: CamDesign | None
     message: str = ""
+    lights: tuple[Light, ...] = ()
 
 
 def whole_design(
@@ -303,9 +305,9 @@ def whole_design(
         contour=contour,
     )  # fmt: skip
     try:
-        return FullDesign(
-            AnswerState.SOLVED, design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
-        )
+        design = design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
+        stage("asks whether it can be made, will hold and be known")
+        return FullDesign(AnswerState.SOLVED, design, lights=lights_of(design, keep))
     except InfeasibleError as error:
         return FullDesign(AnswerState.INFEASIBLE, None, str(error))
     except ConvergenceError as error:
@@ -328,7 +330,7 @@ def full_answer(
         reason = in_words(full.message, limits)
         sentence = f"the whole design came to no answer: {reason}; shown is the quick answer, unchecked"
         return replace(quick, source=AnswerSource.FULL, message=sentence)
-    view = view_of(question, quick.revision, full.design)
+    view = replace(view_of(question, quick.revision, full.design), lights=full.lights)
     missed = full.design.miss
     sentences = [*view.beyond, *([] if missed is None else [f"misses its target: {missed.words}"])]
     if missed is not None and missed.advice:

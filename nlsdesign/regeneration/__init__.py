@@ -20,6 +20,7 @@ from .range_remarks import usual_last as usual_last
 from .readiness import Readiness as Readiness
 from .readiness import errors_while_running as errors_while_running
 from .readiness import readiness
+from .regenerated_controller import RegeneratedController as RegeneratedController
 from .regenerated_observer import Regeneration, regenerate, write_regeneration
 from .watch_model import watch_plan
 from .watch_reading import WatchedChange, WatchVerdict, read_watch

@@ -38,6 +38,7 @@ def export_machine(
     *,
     sample_time: float,
     observer: FlatModel | None = None,
+    controller: FlatModel | None = None,
     spring: str | None = None,
     measured: str | None = None,
 ) -> ExportedMachine:
@@ -55,6 +56,8 @@ def export_machine(
         Of what is computed in steps, in s.
     observer
         Of the plant; by default the one that errs least over the spread of the deck.
+    controller
+        Of the plant; by default the one with the usual gains.
     spring, measured
         Series spring and measured state, where the structure leaves them open.
     """
@@ -68,7 +71,7 @@ def export_machine(
 
     @cache
     def controlling() -> FlatModel:
-        return torque_controller(plant, law=ScheduledTorque(), sample_time=sample_time)
+        return controller or torque_controller(plant, law=ScheduledTorque(), sample_time=sample_time)
 
     models: dict[str, Callable[[], FlatModel]] = {
         "plant": lambda: plant,

@@ -6,6 +6,7 @@ Readiness is found out with what the commands themselves call first.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +62,7 @@ def readiness(declared: Assembly) -> list[Readiness]:
     readings = [r.signal for r in model.readings if r.sensors]
     measured = [*(readings or [v.name for v in model.states]), *(v.name for v in model.inputs)]
 
+    @cache
     def observer() -> None:
         # Every other kind of observer needs the step of a cascade too, and any size of its table will do.
         grid = FixedGrid(-reach, reach, points=_POINTS)
@@ -70,6 +72,7 @@ def readiness(declared: Assembly) -> list[Readiness]:
         series_spring(model)
         rest_points(model, np.linspace(0.0, reach, _ANGLES), angle=swept_angle(model, None))
 
+    @cache
     def controller() -> None:
         torque_controller(model, law=ScheduledTorque(), sample_time=_SAMPLE_TIME)
 

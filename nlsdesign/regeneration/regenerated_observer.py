@@ -36,6 +36,7 @@ from ..foundation.work_sharing import parallel_map
 from ..model import FlatModel
 from ..model.roles import measured_motion, series_spring
 from ..simulation import declared_prior
+from .regenerated_controller import RegeneratedController, regenerated_controller
 from .watched_records import ObserverChoice, WatchedRecord
 
 DRAWS = 8
@@ -83,6 +84,8 @@ class Regeneration:
         designed.
     course
         Time, measured torque, and both estimates on the first of these records.
+    controller
+        The torque controller, and how the machine follows under it; ``None`` where there is none.
     """
 
     plant: FlatModel
@@ -96,6 +99,7 @@ class Regeneration:
     spread_before: tuple[float, ...] = ()
     spread_after: tuple[float, ...] = ()
     course: tuple[Array, Array, Array, Array] | None = None
+    controller: RegeneratedController | None = None
 
     @property
     def nominal(self) -> tuple[float, float]:
@@ -114,19 +118,24 @@ class Regeneration:
 
     def words(self) -> tuple[str, ...]:
         """Return the torque error before and after in sentences; none where nothing was compared."""
+        controller = self.controller.words() if self.controller else ()
         if not self.errors:
-            return ()
+            return controller
         pairs = {
             "with the nominal numbers": self.nominal,
             "over the spread": self.over_spread,
             "that learns": self.learning,
         }
-        return tuple(
-            f"Error of the observer of `{self.quantity}` {how}, before → after: "
-            f"{three_digits(pair[0])} → {with_unit(three_digits(pair[1]), self.unit)}."
-            for how, pair in pairs.items()
-            if all(map(math.isfinite, pair))
-        ) + ((f"Generated is the {self.chosen}.",) if self.chosen else ())
+        return (
+            tuple(
+                f"Error of the observer of `{self.quantity}` {how}, before → after: "
+                f"{three_digits(pair[0])} → {with_unit(three_digits(pair[1]), self.unit)}."
+                for how, pair in pairs.items()
+                if all(map(math.isfinite, pair))
+            )
+            + ((f"Generated is the {self.chosen}.",) if self.chosen else ())
+            + controller
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``regeneration.json``."""
@@ -141,6 +150,7 @@ class Regeneration:
             "records": [each._asdict() for each in self.errors],
             "corrected_records": [each._asdict() for each in self.corrected],
             "chosen": self.chosen,
+            "controller": self.controller.to_dict() if self.controller else None,
             "reasons": list(self.reasons),
         }
 
@@ -167,7 +177,7 @@ def regenerate(
     choice: ObserverChoice | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Regeneration:
-    """Design the observer again, and compare it with the one from the declared model.
+    """Design observer and controller again, and compare them with those from the declared model.
 
     Parameters
     ----------
@@ -186,9 +196,28 @@ def regenerate(
     Returns
     -------
     Regeneration
-        With reasons in words where no observer can be designed or nothing can be compared.
+        With reasons in words where something cannot be designed or compared.
     """
     choice = choice or ObserverChoice()
+    result = regenerated_observer(declared, better, records, fits=fits, choice=choice, progress=progress)
+    progress("designing the controllers, and following sines under both")
+    try:
+        controller = regenerated_controller(declared, better, choice.sample_time)
+    except NlsError as error:
+        return replace(result, reasons=(*result.reasons, f"no controller is compared: {error}"))
+    return replace(result, controller=controller)
+
+
+def regenerated_observer(
+    declared: FlatModel,
+    better: FlatModel,
+    records: RecordSet,
+    *,
+    fits: Sequence[Fit],
+    choice: ObserverChoice,
+    progress: Callable[[str], None],
+) -> Regeneration:
+    """Design the observer again, and compare it with the one from the declared model."""
     progress("designing the observer of the better model")
     try:
         after = _designed(better, choice)
@@ -348,7 +377,7 @@ def _drawn_error(
 
 
 def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration, dict[Path, str]]:
-    """Write the observer as C and FMU, the plant of the better model as FMU, and ``regeneration.json``.
+    """Write observer and controller as C and FMU, the better plant as FMU, and ``regeneration.json``.
 
     Parameters
     ----------
@@ -360,20 +389,22 @@ def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration
     Returns
     -------
     tuple
-        The result, with reasons for what could not be written too; and the files of observer and plant, with
+        The result, with reasons for what could not be written too; and the files of the three, with
         a few words on each.
     """
     from ..export import export_c, export_fmu  # here, as its libraries take time to load
 
     written: dict[Path, str] = {}
     reasons = list(result.reasons)
-    for name, model in {"observer": result.observer, "plant": result.plant}.items():
+    controller = result.controller.controller if result.controller else None
+    models = {"observer": result.observer, "controller": controller, "plant": result.plant}
+    for name, model in models.items():
         if model is None:
             continue
         try:
-            if name == "observer":
+            if name != "plant":
                 source = export_c(model, folder / "c", name=name)
-                written |= {source.source: "observer in C99", source.header: "its interface"}
+                written |= {source.source: f"{name} in C99", source.header: "its interface"}
             written[export_fmu(model, folder / f"{name}.fmu")] = f"{name} of the better model as FMU"
         except NlsError as error:
             reasons.append(f"the {name} is not exported: {error}")

@@ -20,10 +20,10 @@ from .events import Event, EventLog, Modes, branch_of
 from .input_signals import Drives
 from .runge_kutta import (
     LARGEST_ERROR,
-    NODES,
     SMALLEST_STEP,
     Stepper,
     limited_by_stability,
+    nodes,
     step_function,
 )
 
@@ -94,7 +94,7 @@ class ManySteps:
         self._step = ColumnEvaluator(
             step_function(branch_of(model.switching, model.equations)), 4, translate=translate
         )
-        self._moments = np.append(NODES, 0.5)
+        self._moments = nodes()
         self._nominal = np.array([[v.nominal] for v in model.states])
         self._proposed = np.full(count, drives.times[1] - drives.times[0])
         self._budget, self._done = np.full(count, 40 * 20.0), np.zeros(count)

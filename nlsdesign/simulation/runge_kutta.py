@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from scipy.integrate import DOP853
+import scipy
 
 from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError
@@ -21,8 +21,7 @@ from .buffered import Buffered, Translate, as_it_is
 from .events import LOCATED, Event, Modes, branch_of, locate_event
 from .input_signals import Drives
 
-STAGES = int(DOP853.n_stages)
-NODES: Array = np.asarray(DOP853.C[:STAGES], dtype=float)
+STAGES = 12
 SMALLEST_STEP = 1e-13
 """Shortest step relative to the distance of two samples or to the time itself."""
 
@@ -31,6 +30,12 @@ LARGEST_ERROR = 1e6
 
 WRITTEN_OUT = 2000
 """Right-hand sides with more operations than this are called, not written out twelve times."""
+
+
+def nodes() -> Array:
+    """Return the times of the stages and of the middle, as shares of a step."""
+    # SciPy loads the table at its first use, which takes 0.4 s.
+    return np.append(scipy.integrate.DOP853.C[:STAGES], 0.5)
 
 
 class TooStiffError(Exception):
@@ -58,16 +63,17 @@ def step_function(branch: ca.Function) -> ca.Function:
     x, u, p = ca.MX.sym("x", n), ca.MX.sym("u", m, STAGES + 1), ca.MX.sym("p", parameters)
     nominal, modes = ca.MX.sym("nominal", n), ca.MX.sym("m", switches)
     rates: list[ca.MX] = []
+    method = scipy.integrate.DOP853
 
     def weighted(weights: Array) -> ca.MX:
         return sum((float(w) * k for w, k in zip(weights, rates, strict=False) if w), start=ca.MX.zeros(n))
 
     for i in range(STAGES):
-        place = x + h * weighted(DOP853.A[i, :i])
-        rates.append(branch(t + float(NODES[i]) * h, place, u[:, i], p, modes)[0])
-    after = x + h * weighted(DOP853.B)
+        place = x + h * weighted(method.A[i, :i])
+        rates.append(branch(t + float(method.C[i]) * h, place, u[:, i], p, modes)[0])
+    after = x + h * weighted(method.B)
     scale = tolerance * (nominal + ca.fmax(ca.fabs(x), ca.fabs(after)))
-    fifth, third = ca.sumsqr(weighted(DOP853.E5) / scale), ca.sumsqr(weighted(DOP853.E3) / scale)
+    fifth, third = ca.sumsqr(weighted(method.E5) / scale), ca.sumsqr(weighted(method.E3) / scale)
     # The smallest normal number avoids 0/0.
     error = h * fifth / ca.sqrt(n * (fifth + 0.01 * third) + 2.3e-308)
     monitors = [ca.MX(1), ca.MX(1), ca.MX(0, 1)]
@@ -95,7 +101,7 @@ class Stepper:
     def __init__(
         self, model: FlatModel, drives: Drives, tolerance: float, modes: Array, translate: Translate
     ) -> None:
-        self._moments = np.append(NODES, 0.5)[: STAGES + (len(modes) > 0)]
+        self._moments = nodes()[: STAGES + (len(modes) > 0)]
         self._time, self._length = np.zeros(1), np.zeros(1)
         self.state, self._inputs = np.zeros(len(model.states)), np.zeros((STAGES + 1, len(model.inputs)))
         nominal = np.array([v.nominal for v in model.states])

@@ -22,7 +22,7 @@ from .merits import HIGH, Merits, merits_of
 from .ranking import PUBLISHED, Ranking, rankings
 from .report import write
 
-IN_FAST = ("PMC-770", "natural_rubber_treloar")
+IN_FAST = ("natural_rubber_treloar",)
 _SIZE = HIGH / np.sqrt(2.0)
 
 

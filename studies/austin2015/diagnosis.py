@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.bench.discrepancy import Verdict, effects
+from nlsdesign.bench.discrepancy import Effect, Verdict, effects
 from nlsdesign.foundation.progress import Progress
 
 from .._published import bench_records, with_bench_sensors
@@ -14,9 +15,11 @@ RIVALS = (effects.rate_independent_hysteresis, effects.second_relaxation)
 """What the loss of the rubber is most easily mistaken for, and it itself: enough for the fast way."""
 
 
-def diagnose_bench(actuator: nls.Assembly, out: Path, progress: Progress, *, fast: bool) -> Verdict:
+def diagnose_bench(
+    actuator: nls.Assembly, out: Path, progress: Progress, catalogue: Sequence[Effect] | None = None
+) -> Verdict:
     """Name what the records show and the declared actuator lacks; write verdict and better deck."""
-    bench, catalogue = with_bench_sensors(actuator), RIVALS if fast else None
+    bench = with_bench_sensors(actuator)
     verdict = nls.diagnose(bench, bench_records(bench), catalogue=catalogue, progress=progress.note)
     nls.write_verdict(verdict, out / "diagnosis")
     return verdict

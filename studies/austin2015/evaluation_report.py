@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.presentation.figures.loop_evaluation import passivity_words
 from nlsdesign.presentation.report import FigureSection, FoldedSection, Section, TableSection
 
-from .evaluation import AMPLITUDES, KP
-from .results import ActuatorResults, Results
+from .evaluation import AMPLITUDES, KP, LoopEvaluation
+from .results import Results
 
 
 def evaluation_sections(results: Results) -> list[Section]:
     """Show where the loop holds, and where it stops doing so, for both actuators; figures folded."""
-    figures = [figure for name, each in results.both.items() for figure in _of_one(name, each)]
-    return [_table(results), FoldedSection("Responses, margins and impedance", tuple(figures))]
+    judged = {name: each.evaluation for name, each in results.both.items() if each.evaluation is not None}
+    figures = [figure for name, each in judged.items() for figure in _of_one(name, each)]
+    return [_table(judged), FoldedSection("Responses, margins and impedance", tuple(figures))]
 
 
-def _of_one(name: str, results: ActuatorResults) -> list[Section]:
-    judged = results.evaluation
+def _of_one(name: str, judged: LoopEvaluation) -> list[Section]:
     signed = [*(judged.spread.findings() or [judged.spread.margins()]), *judged.spread.words()]
     lost = [
         f"{response.amplitude:g} N·m at {f:.2g} Hz: {verdict}"
@@ -57,10 +59,9 @@ def _of_one(name: str, results: ActuatorResults) -> list[Section]:
     ]
 
 
-def _table(results: Results) -> TableSection:
+def _table(evaluations: Mapping[str, LoopEvaluation]) -> TableSection:
     rows = []
-    for name, each in results.both.items():
-        judged = each.evaluation
+    for name, judged in evaluations.items():
         margin, linear = judged.least_gain_margin, judged.margins.linear
         unstable = int(np.sum(linear.reached & ~linear.stable()))
         rows.append(

@@ -10,7 +10,7 @@ from nlsdesign.presentation.report import FigureSection, FoldedSection, Section,
 from .results import ActuatorResults, Results
 from .tracking import AMPLITUDE, PROPORTIONAL, SETTLED
 
-_SHOWN = (45.0, 2.0)  # gain and Hz of the run that is drawn: the published actuator reaches its current limit
+_SHOWN = 45.0  # gain of the run that is drawn: with it the published actuator reaches its current limit
 
 
 def loop_sections(results: Results) -> list[Section]:
@@ -72,17 +72,16 @@ def _table(results: Results) -> TableSection:
 
 
 def _one_run(results: Results) -> FigureSection:
-    runs = {name: each.followed(*_SHOWN).run for name, each in reversed(results.both.items())}
-    wanted = results.published.followed(*_SHOWN).run
-    shown = (wanted.time >= SETTLED) & (wanted.time <= SETTLED + 0.5)
-    lines = {name: run["plant.motor.current"][shown] for name, run in runs.items()}
-    peaks = ", ".join(
-        f"{name} {each.followed(*_SHOWN).peak_current:.0f} A" for name, each in results.both.items()
-    )
+    hertz = results.published.following[0].frequency
+    drawn = {name: each.followed(_SHOWN, hertz) for name, each in reversed(results.both.items())}
+    time = drawn["published"].run.time
+    shown = (time >= SETTLED) & (time <= SETTLED + 0.5)
+    lines = {name: each.run["plant.motor.current"][shown] for name, each in drawn.items()}
+    peaks = ", ".join(f"{name} {drawn[name].peak_current:.0f} A" for name in results.both)
     return FigureSection(
-        f"Motor current at Kp {_SHOWN[0]:g} and {_SHOWN[1]:g} Hz",
-        nls.figures.over_time(wanted.time[shown], lines, quantity="current", unit="A"),
-        caption=f"One cycle. Largest: {peaks}.",
+        f"Motor current at Kp {_SHOWN:g} and {hertz:g} Hz",
+        nls.figures.over_time(time[shown], lines, quantity="current", unit="A"),
+        caption=f"Half a second. Largest: {peaks}.",
         means="The harder gain sets off a limit cycle with the published spring; with the designed one not "
         "at this frequency. The table above says where each holds.",
     )

@@ -21,13 +21,16 @@ def observer_sections(results: Results) -> list[Section]:
         _on_bench("designed", results.designed),
         _errors_with_known_numbers(results),
     )
-    proved = (_bounds(results), *(_proved(name, each) for name, each in results.both.items()))
+    certificates = (
+        TextSection(f"The certificate, {name}", " ".join(each.certificate.statement), drawing=each.hashes)
+        for name, each in results.proved.items()
+    )
     return [
         designed,
         _errors_in_numbers(results),
         FoldedSection("Observability and stability over the angle", _over_angle(results)),
         FoldedSection("More on the observers", more),
-        FoldedSection("What is proved", proved),
+        FoldedSection("What is proved", (_bounds(results), *certificates)),
     ]
 
 
@@ -141,11 +144,10 @@ def _generated(name: str, results: ActuatorResults) -> TextSection:
 
 def _bounds(results: Results) -> TableSection:
     rows = []
-    for name, each in results.both.items():
-        bound = each.spread.certificate.proof.torque
-        proved = "none" if isinstance(bound, str) else f"{1e3 * bound.total:.1f}"
-        decay, condition = each.spread.certificate.proof.decay, each.spread.certificate.proof.condition
-        rows.append((name, f"{decay:.1f}", three_digits(condition), proved))
+    for name, each in results.proved.items():
+        proof = each.certificate.proof
+        within = "none" if isinstance(proof.torque, str) else f"{1e3 * proof.torque.total:.1f}"
+        rows.append((name, f"{proof.decay:.1f}", three_digits(proof.condition), within))
     return TableSection(
         "What is proved of one constant gain",
         ("actuator", "decay in 1/s", "condition of P at most", "torque within, mN·m, exact numbers"),
@@ -153,9 +155,3 @@ def _bounds(results: Results) -> TableSection:
         caption="A second observer with one certified gain lies beside the generated one, with its C code "
         "and certificate.json; `nlsdesign observer verify` checks it again without the solver.",
     )
-
-
-def _proved(name: str, results: ActuatorResults) -> TextSection:
-    certificate = results.spread.certificate
-    hashes = "\n".join(f"{file}: SHA-256 {digest}" for file, digest in sorted(results.spread.hashes.items()))
-    return TextSection(f"The certificate, {name}", " ".join(certificate.statement), drawing=hashes)

@@ -102,7 +102,7 @@ def answers(results: Results) -> TableSection:
         )
         known.append(f"{median:.0f} mN·m rms, in nine of ten machines below {most:.0f}")
         followed.append(f"{100 * each.followed(32.0, 5.0).relative_error:.0f} % of a sine at 5 Hz, Kp 32")
-        margins.append(margins_in_words(each.evaluation.spread))
+        margins.append(margins_in_words(each.evaluation.spread) if each.evaluation else "not looked at")
     rows = (
         (
             "Which torque?", f"that of Fig. 8, the model within {numbers['fig8_rms_error_Nm']:.3f} N·m rms",
@@ -290,10 +290,10 @@ def file_sections(results: Results, out: Path) -> list[Section]:
                 source.selftest: f"its self-test with vectors, {name}",
             }
         files |= dict.fromkeys(loop.fmus, f"co-simulation FMU, {name}")
-    for name, each in results.both.items():
+    for name, proved in results.proved.items():
         files |= {
-            each.spread.code.source: f"certified observer in C99, {name}",
-            each.spread.file: f"its certificate, {name}",
+            proved.code.source: f"certified observer in C99, {name}",
+            proved.file: f"its certificate, {name}",
         }
     files |= dict.fromkeys(results.cam.files, "drawing of the designed cam")
     caption = "Decks, code, FMUs and drawings."

@@ -28,6 +28,22 @@ from .observer import ObserverComparison
 
 
 @dataclass(frozen=True, eq=False)
+class Proved:
+    """Certificate of one gain for all angles, its file, and the C code that it is about."""
+
+    certificate: Certificate[Contraction]
+    code: CSource
+    file: Path
+
+    @property
+    def hashes(self) -> str:
+        """SHA-256 of the certified C files by name, as the certificate has them."""
+        digests = hashes_of_code(self.code.source.parent)
+        files = sorted(path.name for path in (self.code.header, self.code.source))
+        return "\n".join(f"{file}: SHA-256 {digests[file]}" for file in files)
+
+
+@dataclass(frozen=True, eq=False)
 class ObserverOverSpread:
     """The observer that is generated, its errors over the spread, and the certified one beside it.
 
@@ -39,30 +55,20 @@ class ObserverOverSpread:
         Of ``best``, ``cascade`` and ``published form`` on one bench.
     drops
         Angles at which a state is not seen.
-    certificate
-        Of one gain for all angles, written with its C code.
-    code, file
-        That code, and the certificate.
+    proved
+        What is proved of one gain for all angles; ``None`` where nothing was to be.
     """
 
     chosen: ObserverOfChoice
     errors: SpreadErrors
     drops: RankDrops
-    certificate: Certificate[Contraction]
-    code: CSource
-    file: Path
-
-    @property
-    def hashes(self) -> dict[str, str]:
-        """SHA-256 of the certified C files by name, as the certificate has them."""
-        digests = hashes_of_code(self.code.source.parent)
-        return {path.name: digests[path.name] for path in (self.code.header, self.code.source)}
+    proved: Proved | None
 
 
 def over_spread(
-    model: nls.FlatModel, observers: ObserverComparison, deck: Path, out: Path, draws: int
+    model: nls.FlatModel, observers: ObserverComparison, draws: int, *, proved: Proved | None
 ) -> ObserverOverSpread:
-    """Compare the observers over the spread of a deck, and certify one gain."""
+    """Compare the observers over the spread of a deck."""
     chosen = choose_observer(model)
     compared = {
         "best": chosen.model, "cascade": observers.minimal.model, "published form": observers.published.model,
@@ -72,10 +78,14 @@ def over_spread(
     )
     angles = np.radians(np.linspace(-50.0, 50.0, 101))
     drops = rank_drops(model, angles=angles, angle="motor.angle", measured=("motor.angle",))
+    return ObserverOverSpread(chosen, errors, drops, proved)
+
+
+def certified(model: nls.FlatModel, deck: Path, out: Path) -> Proved:
+    """Certify one gain for all angles, and write the certificate beside its code."""
     design = nls.observer.design_observer_with_details(model, gain=CertifiedGain())
     text = deck.read_text(encoding="utf-8")
     proved = certify(model, design, assumptions=declared_assumptions(model, design), deck=(deck.stem, text))
     real = proved.proof.assumptions.real
     code = nls.export_c(proved.stated(design.model), out / "certified", name="observer", real=real)
-    file = proved.write_beside(code.header, code.source)
-    return ObserverOverSpread(chosen, errors, drops, proved, code, file)
+    return Proved(proved, code, proved.write_beside(code.header, code.source))

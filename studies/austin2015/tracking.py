@@ -57,12 +57,10 @@ class Following:
 def follow_sines(
     model: nls.FlatModel,
     observer: ObserverDesign,
-    *,
-    gains: Sequence[float] = PROPORTIONAL,
-    frequencies: Sequence[float] = FREQUENCIES,
+    frequencies: Sequence[float],
 ) -> tuple[Following, ...]:
     """Run the closed loop on sines, for each gain and frequency; all other gains are the defaults."""
-    return tuple(_follow(model, observer, kp, hertz) for kp in gains for hertz in frequencies)
+    return tuple(_follow(model, observer, kp, hertz) for kp in PROPORTIONAL for hertz in frequencies)
 
 
 def _follow(model: nls.FlatModel, observer: ObserverDesign, kp: float, hertz: float) -> Following:

@@ -54,6 +54,8 @@ def test_a_rough_load_cell_record_of_a_renamed_machine(tmp_path: Path) -> None:
     assert math.sqrt(np.mean(np.square(list(off.values())))) < 1.6
 
 
+# Four seconds; of the numbers that the torque follows from: the test above.
+@pytest.mark.slow
 def test_the_torque_of_a_calibrated_spring(tmp_path: Path) -> None:
     found = found_on(("load_cell",), 3, PLAIN, tmp_path)
     angles = np.linspace(0.1, 0.5, 9)

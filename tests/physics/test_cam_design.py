@@ -39,7 +39,7 @@ def test_no_cam_nearby_is_better(free: list[str]) -> None:
     draw = np.random.default_rng(7)
     worse = 0
     for scale in (0.3, 0.1, 0.03, 0.01):
-        for _ in range(60):
+        for _ in range(20):
             # Neighbours keep the limits: radii above 1 mm, the end at least at 53°, no more strain.
             other = np.maximum(radii * np.exp(scale * draw.normal(size=radii.size)), 1e-3)
             slope = first * (1 + 0.1 * scale * draw.normal())
@@ -50,7 +50,7 @@ def test_no_cam_nearby_is_better(free: list[str]) -> None:
                 # The smoothness of the contour may cost a thousandth.
                 assert found > best * (1 - 1e-3)
                 worse += 1
-    assert worse > 60
+    assert worse > 20
 
 
 def _strain(nodes: np.ndarray, radii: np.ndarray, first: float, pretension: float) -> float:

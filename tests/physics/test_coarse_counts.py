@@ -132,7 +132,7 @@ def test_filters_are_widths_in_time_and_held_out_records_do_not_move_them() -> N
         runs = [record(h, f"r{k}", rate, 4096, k) for k, h in enumerate(histories)]
         last = record(motion(5, fastest=4.0), "held", rate, 64, 5) if fast else runs[1]
         records = RecordSet((*runs, replace(last, name="held", role="held_out")), COLUMNS)
-        return Bench(records, blocks_of(model, records.signals)).filters["stage"][:2]
+        return Bench(records, blocks_of(model, records.signals)).block_noise["stage"].filters[:2]
 
     fine, coarse = filters_of(1000.0), filters_of(200.0)
     assert coarse == pytest.approx(fine, rel=0.5)
@@ -185,7 +185,9 @@ def test_rates_follow_sharp_reversals_as_closely_as_the_counts_of_an_encoder_all
     spans, unbalanced = [], []
     for quantum in (1e-6, 1e-3, 2e-2):
         records = reversed_sharply(quantum)
-        spans.append(Bench(records, blocks_of(flatten(truth), records.signals)).filters["stage"].span)
+        spans.append(
+            Bench(records, blocks_of(flatten(truth), records.signals)).block_noise["stage"].filters.span
+        )
         short_of = gaussian_filter1d(predict(truth, records, "b")["stage.unbalanced"], 8.0)[200:-200]
         unbalanced.append(float(np.sqrt(np.mean(short_of**2))))
         assert np.max(np.abs(list(scores(refit(declared(), records)).values()))) < 3.0

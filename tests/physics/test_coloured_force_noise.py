@@ -62,7 +62,7 @@ def judged(declared: Assembly, records: RecordSet) -> tuple[Bench, dict[str, tup
     bench = Bench(records, blocks_of(flatten(declared), records.signals))
     comparison = Comparison(bench, typical_sizes(declared, bench.records))
     found = excesses(comparison.base(declared), bench, Criteria())
-    return bench, {name: (e.mean_square, e.open) for name, e in found.items() if name in bench.units}
+    return bench, {name: (e.mean_square, e.open) for name, e in found.items() if name in bench.block_noise}
 
 
 @pytest.mark.long_cases("0.02-1.0", "0.1-1.0", "0.02-3.0")

@@ -126,7 +126,7 @@ def test_practice_records_get_the_right_verdict(
     if expected:
         bench = Bench(records, blocks_of(flatten(rig), records.signals))
         predicted = predict(reread, bench.records, found.course.record)[found.course.quantity]
-        rows = bench.floors[found.block, found.course.record].filter
+        rows = bench.block_noise[found.block].floors[found.course.record].filter
         assert np.allclose(rows @ predicted, found.course.after, atol=1e-6)
 
 

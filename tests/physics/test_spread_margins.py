@@ -134,7 +134,7 @@ def test_the_default_loses_to_no_pid_over_the_spread(deck: str) -> None:
         loop = loop_of(deck, **law)
         amplitude = 0.5 * largest_torque(loop.plant)
         drawn = loop_over_spread(
-            loop, amplitude=amplitude, frequency=2.0, draws=12, seed=31, translate=quickest()
+            loop, amplitude=amplitude, frequency=2.0, draws=8, seed=31, translate=quickest()
         )
         return drawn.quantile(0.5)
 

@@ -172,7 +172,7 @@ def test_the_motor_torque_moves_the_motor_as_claimed(joint: str) -> None:
         return [x[1], (120.0 * at(fine.torque, time) - resisting) / DRIVE.reflected_inertia]
 
     start = [cycle.angle[0] + fine.deflection[0], fine.speed[0] / 120.0]
-    run = solve_ivp(rates, (0.0, 0.5 * period), start, rtol=1e-8, atol=1e-10, max_step=period / 2000)
+    run = solve_ivp(rates, (0.0, 0.25 * period), start, rtol=1e-8, atol=1e-10, max_step=period / 2000)
     claimed = np.interp(run.t, cycle.time, cycle.angle + fine.deflection)
     assert np.max(np.abs(run.y[0] - claimed)) < 0.01 * np.ptp(cycle.angle)
 
@@ -217,7 +217,7 @@ def test_more_freedom_is_never_worse() -> None:
 
 def test_peak_power_against_every_linear_spring() -> None:
     task = WALKING["ankle"]
-    curve = curve_for_task(task, DRIVE, TaskProblem(goal=LeastPeakPower(), pieces=16))
+    curve = curve_for_task(task, DRIVE, TaskProblem(goal=LeastPeakPower(), pieces=8))
     cycle = task.sampled(2000)
     again = fourier_rate(fourier_rate(cycle.torque, cycle.period), cycle.period)
 
@@ -234,7 +234,7 @@ def test_peak_power_against_every_linear_spring() -> None:
 
 def test_peak_power_against_another_solver() -> None:
     """The same unknowns and samples in SLSQP, from the spring of least energy: it finds nothing better."""
-    problem = TaskProblem(goal=LeastPeakPower(), pieces=16)
+    problem = TaskProblem(goal=LeastPeakPower(), pieces=8)
     program = problem.program(WALKING["ankle"], DRIVE)
     start = LeastEnergy().best(program).unknowns
     (a, b), (c, d) = (program.affine()[name] for name in ("torque", "speed"))

@@ -318,7 +318,7 @@ def own_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.long_cases("600-2000")
-@pytest.mark.parametrize(("count", "draws"), [(150, 500), (600, 2000)])
+@pytest.mark.parametrize(("count", "draws"), [(80, 300), (600, 2000)])
 def test_quantiles_agree_with_an_independent_monte_carlo(count: int, draws: int) -> None:
     result = tolerance_analysis(actuator(), target=TARGET, rules=RULES, draws=draws, seed=3)
     for own, quantiles in zip(own_errors(count), (result.quantiles, result.trims[0].quantiles), strict=True):
@@ -354,10 +354,10 @@ def test_the_trim_is_the_least_error_that_scipy_finds() -> None:
 def test_a_trim_stops_at_the_end_of_its_range() -> None:
     ends = (3.9e-3, 4.1e-3)
     trims = [Trim("spring.pretension", *ends)]
-    result = tolerance_analysis(actuator(), target=TARGET, draws=200, trims=trims)
+    result = tolerance_analysis(actuator(), target=TARGET, draws=60, trims=trims)
     settings = result.trims[0].settings
     assert (settings.min(), settings.max()) == pytest.approx(ends)
-    free = tolerance_analysis(actuator(), target=TARGET, draws=200)
+    free = tolerance_analysis(actuator(), target=TARGET, draws=60)
     assert np.all(free.trims[0].errors <= result.trims[0].errors + 1e-9)
 
 

@@ -32,6 +32,7 @@ SERVO_BANDWIDTH = 75.0  # rad/s
 SERVO_DAMPING = 0.8
 CURRENT_LIMIT = 12.0  # A
 CAM_GRID = 5.0e-4  # rad
+CONTROLLED = round(1.0e-3 / STEP)  # steps from one call of a controller to the next
 CAM_END = 1.35  # rad; nothing turns as far as this
 SPOT_PLACE, SPOT_WIDTH = 0.25, 0.06  # rad, of the rubbing spot
 BUMP_PLACE, BUMP_WIDTH = 0.4, 0.15  # rad, of the error of the contour
@@ -63,6 +64,7 @@ class History:
     current: np.ndarray  # A
     force: np.ndarray  # N, cable
     extension: np.ndarray  # m, rubber
+    torque: np.ndarray  # N·m, of the cable on the cam
 
 
 def _cam_tables(cam: Cam, bump: float) -> tuple[list[float], list[float]]:
@@ -144,8 +146,18 @@ def _feeds(servo: Servo, hidden: Hidden, command: Command) -> Iterator[tuple[flo
     return zip(feed.tolist(), push.tolist(), (load + hidden.cam_offset).tolist(), strict=True)
 
 
-def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) -> History:
-    """Run one record from rest."""
+def simulate(
+    built: Actuator,
+    hidden: Hidden,
+    servo: Servo,
+    command: Command,
+    controller: Callable[[float, float], float] | None = None,
+) -> History:
+    """Run one record from rest.
+
+    A controller, where there is one, takes the place of the servo: every millisecond it is given time (s) and
+    angle of the motor (rad), and its current (A) is held to the next.
+    """
     drive = built.drivetrain
     per_ampere, viscosity, inertia = drive.torque_per_ampere, drive.viscosity, drive.inertia
     k_p, k_d, limit = servo.stiffness, servo.damping, servo.limit
@@ -158,6 +170,7 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
     act, pass_on, drag, per_grid = acting_current(hidden), capstan(hidden), hidden.drag, 1.0 / CAM_GRID
     motor = cam = speed = cam_speed = friction = 0.0
     rows: list[tuple[float, ...]] = []
+    held = 0.0
 
     for wanted, push, offset in _feeds(servo, hidden, command):
         angle = cam - offset
@@ -171,9 +184,13 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
         at_cam = force if pass_on is None else pass_on(force, asked)
         load = arm * at_cam if angle >= 0.0 else -arm * at_cam
         current = wanted - k_p * motor - k_d * speed
+        if controller is not None:
+            if len(rows) % CONTROLLED == 0:
+                held = controller(len(rows) * STEP, motor)
+            current = held
         if not -limit <= current <= limit:
             current = limit if current > 0.0 else -limit
-        rows.append((motor, cam, speed, current, force, extension))
+        rows.append((motor, cam, speed, current, force, extension, load))
 
         push += per_ampere * (current if act is None else act(current)) - viscosity * speed
         if drag:

@@ -15,6 +15,10 @@ from studies.alternative_rubber.bench import Bench, Measured, Rubber, Run
 from studies.alternative_rubber.candidates import BRANCHES, TARGET, Candidate, candidates, designed
 from studies.alternative_rubber.merits import METRICS, Merits, bandwidths, largest_gains
 from studies.alternative_rubber.ranking import rankings
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 NAME = "alternative_rubber"
 
@@ -26,12 +30,12 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, f
 
 
 def test_the_study_keeps_its_claims(results: tuple[Path, dict[str, float]]) -> None:
-    """Of two rubbers and two losses; what is ranked among all is claimed of the whole study."""
+    """Of one rubber and one loss; what is ranked among all is claimed of the whole study."""
     out, numbers = results
     expected = claims(NAME)
     alone = {name: value for name, value in numbers.items() if not name.startswith(("first_two", "missed"))}
     alone.pop("estimate_exact_at_most_percent")
-    assert len(alone) > 15
+    assert len(alone) > 10
     alone.pop("between_points_percent")
     assert numbers["between_points_percent"] < 4.0
     assert not_as_claimed(alone, {name: expected[name] for name in alone}) == {}

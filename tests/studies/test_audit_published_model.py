@@ -20,6 +20,10 @@ from scipy.optimize import brentq
 
 from nlsdesign.cli.studies import claims, run_study
 from studies.audit_published_model import figures, law, paper
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 NAME = "audit_published_model"
 A, BRANCH, VISCOSITY = 8e-3, 0.58e6, 411.0

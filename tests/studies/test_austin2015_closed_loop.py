@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from nlsdesign.cli import studies as runner
 from studies.austin2015_closed_loop import main
 from studies.austin2015_closed_loop.statement import NOT_REPRODUCED, OTHERWISE, REPRODUCED
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 OUTCOMES = {
     "Fig. 8": REPRODUCED,

@@ -13,6 +13,10 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.design import equilibrium_torque
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.mark.slow

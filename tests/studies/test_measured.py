@@ -9,6 +9,10 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli.studies import claims, run_study
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 NAMES = ("emps", "vhb4910")
 BOUNDS = {

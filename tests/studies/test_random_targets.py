@@ -8,6 +8,10 @@ import pytest
 import nlsdesign as nls
 from benchmarks.random_targets import DECKS, FREE, KEEP, Line, lines, random_target
 from nlsdesign.design.optimisation.loosening import Freed
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 QUICK = [(DECKS[0], 4), (DECKS[1], 2)]
 SLOW = [(DECKS[0], 3), (DECKS[0], 5), (DECKS[1], 4), (DECKS[1], 5)]

@@ -6,12 +6,13 @@ import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import ALL, diagnose, predict, refit, write_refit, write_verdict
-from nlsdesign.bench.identification import load_records
+from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.design import design_cam
@@ -24,12 +25,14 @@ from nlsdesign.presentation.report import verdict_sections, write_report
 from nlsdesign.simulation import Sine, simulate
 from tests.cam_cases import KEEP, TARGET
 from tests.command_line import Run, run
-from tests.diagnosed import declared_rig
+from tests.diagnosed import rig_set
+from tests.hand_machines import Level, Machine, made
 from tests.renamed import SCHEMES, Renamed, Scheme, exchanged, in_words, nested, renamed
-from tests.rig import ACTUATORS, make_records, write_declaration, write_records
 from tests.selection import quick_only
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 DECKS = ("austin2015_figure_consistent", "austin2015_soft_spring", "one_sided_cable_drive")
 UNSEEN = ("first", "last", "eigenvalues")
@@ -201,32 +204,52 @@ def test_design(run: Run, tmp_path: Path) -> None:
     assert list(drawn.quantities()) == [machine.name(name) for name in published().quantities()]
 
 
-# --- against records of the independent rig ---------------------------------------------------------
+# --- against records of a small joint and of the independent rig ------------------------------------
 
 
-@pytest.fixture(scope="module")
-def benches(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Assembly, Renamed]:
-    """Records of a rig with dry friction that its deck does not declare, the deck, and the same renamed."""
+class Bench(NamedTuple):
+    """A deck and its records, and the same with other names."""
+
+    deck: Assembly
+    records: RecordSet
+    machine: Renamed
+    same: RecordSet
+
+    @property
+    def both(self) -> tuple[tuple[Assembly, RecordSet], tuple[Assembly, RecordSet]]:
+        return (self.deck, self.records), (self.machine.assembly, self.same)
+
+
+# The rig has more names, and is fitted and diagnosed ten times as long as the joint.
+@pytest.fixture(scope="module", params=["joint", pytest.param("rig", marks=pytest.mark.slow)])
+def benches(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    """Records of a machine with dry friction that its deck does not declare, the deck, and both renamed."""
     folder = tmp_path_factory.mktemp("bench")
-    only = ("sine_15deg_5.0Hz",)
-    write_declaration(folder, ACTUATORS["arm"])
-    write_records(folder / "records", make_records(ACTUATORS["arm"], {"coulomb_friction": 1.0}, 5, only=only))
-    deck = declared_rig(folder / "rig.toml", folder / "cam.csv")
-    return folder / "records", deck, renamed(deck, exchanged)
+    if request.param == "rig":
+        deck, records = rig_set(folder, "arm", {"coulomb_friction": 1.0}, 5, only=("sine_15deg_5.0Hz",))
+        machine = renamed(deck, exchanged)
+        return Bench(deck, records, machine, load_records(folder, flatten(machine.assembly)))
+    level: Level = lambda rate, angle, load: 0.12  # noqa: E731
+    deck, records = made(Machine(stiffness=60.0, size=0.3, friction=level), folder, records=2)
+    machine = renamed(deck, exchanged)
+    for file in sorted(folder.glob("*.csv")):
+        head, rows = file.read_text(encoding="utf-8").split("\n", 1)
+        columns = [name.rpartition("_") for name in head.split(",")]
+        other = ",".join(f"{machine.name(name)}_{unit}" for name, _, unit in columns)
+        (folder / "renamed").mkdir(exist_ok=True)
+        (folder / "renamed" / file.name).write_text(f"{other}\n{rows}", encoding="utf-8")
+    return Bench(deck, records, machine, load_records(folder / "renamed", flatten(machine.assembly)))
 
 
-def test_simulate_a_record(benches: tuple[Path, Assembly, Renamed]) -> None:
-    records, deck, machine = benches
-    predicted = []
-    for assembly in (deck, machine.assembly):
-        measured = load_records(records, flatten(assembly))
-        predicted.append(predict(assembly, measured, measured.records[0].name).signals)
+def test_simulate_a_record(benches: Bench) -> None:
+    machine = benches.machine
+    predicted = [predict(deck, seen, seen.records[0].name).signals for deck, seen in benches.both]
     equal(machine.keys(predicted[0]), predicted[1], tolerance=1e-9)
 
 
-def test_fit(benches: tuple[Path, Assembly, Renamed], tmp_path: Path) -> None:
-    records, deck, machine = benches
-    fits = [refit(a, load_records(records, flatten(a))) for a in (deck, machine.assembly)]
+def test_fit(benches: Bench, tmp_path: Path) -> None:
+    deck, _, machine, _ = benches
+    fits = [refit(*each) for each in benches.both]
     fitted, errors = ([{n.name: getattr(n, field) for n in fit.numbers} for fit in fits]
                       for field in ("fitted", "standard_error"))  # fmt: skip
     equal(machine.keys(fitted[0]), fitted[1], tolerance=1e-6)
@@ -238,11 +261,8 @@ def test_fit(benches: tuple[Path, Assembly, Renamed], tmp_path: Path) -> None:
     }
 
 
-def test_diagnose_and_report(benches: tuple[Path, Assembly, Renamed], tmp_path: Path) -> None:
-    records, deck, machine = benches
-    verdicts = [
-        diagnose(a, load_records(records, flatten(a)), catalogue=CATALOGUE) for a in (deck, machine.assembly)
-    ]
+def test_diagnose_and_report(benches: Bench, tmp_path: Path) -> None:
+    verdicts = [diagnose(*each, catalogue=CATALOGUE) for each in benches.both]
     assert [[effect.name for effect in verdict.effects] for verdict in verdicts] == [["coulomb_friction"]] * 2
     for number, verdict in enumerate(verdicts):
         write_verdict(verdict, tmp_path / f"verdict{number}")

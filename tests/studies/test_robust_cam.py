@@ -7,6 +7,10 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli import studies as runner
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 # A minute; that the robust design is a third better is held by tests/physics/test_tolerance_goal.py too.

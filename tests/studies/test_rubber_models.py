@@ -7,6 +7,10 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli.studies import claims, run_study
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 LINEAR = ("Hooke", "Kelvin_Voigt", "Maxwell", "standard_linear_solid", "Burgers")
 

@@ -7,6 +7,10 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli.studies import claims, load_study, not_as_claimed, run_study
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 # Half a minute; the fast way below runs the same steps for fewer ratios.

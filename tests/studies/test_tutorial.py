@@ -11,8 +11,10 @@ import pytest
 
 from tests import tutorial
 from tests.command_line import Run, run, two_machines
+from tests.undrawn import undrawn
 
-__all__ = ["run", "two_machines"]
+__all__ = ["run", "two_machines", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 SMALLER = {
     "nlsdesign design": ["--draws", "0", "--starts", "1"],
     "nlsdesign simulate": ["--dry-run"],

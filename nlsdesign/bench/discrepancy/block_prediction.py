@@ -152,7 +152,7 @@ def _range_warnings(block: Block, record: Record, bench: Bench) -> tuple[RangeWa
     model, time = block.model, record.trace.time
     if not any(v.bounded for v in model.signals + model.states):
         return ()
-    rows = measured_inputs(block, record, bench.filters[block.name].span)
+    rows = measured_inputs(block, record, bench.block_noise[block.name].filters.span)
     s = model.symbols()
     if any(v.bounded for v in model.states) or depends(s.signal, s.state):
         inputs = {v.name: row for v, row in zip(model.inputs, rows, strict=True)}

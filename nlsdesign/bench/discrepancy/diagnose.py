@@ -326,8 +326,13 @@ def _verdict(
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)
+    judged, better, base = (
+        each.as_known_beside(open_blocks)
+        for each, open_blocks in ((judged, left), (better, left), (base, before))
+    )
     worst = _furthest([n for n in before if n != DECLARED], before)
-    unpredictable = [k for k in case.bench.floors if k in better.unpredictable]
+    read = [(b, r) for b, each in case.bench.block_noise.items() for r in each.floors]
+    unpredictable = [key for key in read if key in better.unpredictable]
     # From here on, nothing is chosen any more.
     every = Comparison(case.bench.with_records(records), case.comparison.sizes)
     experiment = _experiment(case, base, outcome, decision)

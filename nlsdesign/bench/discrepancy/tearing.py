@@ -232,11 +232,7 @@ def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
     """
     used = _sorted(model, measured_signals(model, signals))
     drives, efforts = used.drives, used.efforts
-    opened = cut(model, [e.shown for e in efforts], keep=True) if efforts else model
-    acting = _acting(model, drives, efforts)
-    fed = (
-        opened if acting == efforts else cut(model, [e.shown for e in acting], keep=True) if acting else model
-    )
+    opened, fed, acting = _cut_open(model, used)
     blocks = [_reading_block(fed, target, [*drives, *acting]) for target in (*efforts, *used.targets)]
     blocks += [
         _balance_block(opened, lead, used.accelerations.get(lead.body.name), [*drives, *efforts])
@@ -345,26 +341,36 @@ def _what_to_measure(
     return f"measure for instance {example}; measured are: {', '.join(signals)}"
 
 
-def _acting(model: FlatModel, drives: Sequence[Measured], efforts: Sequence[Measured]) -> list[Measured]:
-    """Return the measured efforts that may act on bodies inside a block that predicts one.
+class _Cut(NamedTuple):
+    """A model cut at measured efforts, with its expressions and their names."""
+
+    model: FlatModel
+    s: Symbols
+    known: Mapping[str, Expression]
+
+
+def _cut_open(model: FlatModel, used: _Sorted) -> tuple[_Cut, _Cut, list[Measured]]:
+    """Return the model cut at all measured efforts, and at those that may act inside a block, with these.
 
     Where a measured effort acts on a body whose motion is not measured, and nothing else holds it, the body
     would integrate the errors of the measurement; there the model's own effort acts.
     """
-    acting, s = list(efforts), model.symbols()
+    acting, s = used.efforts, model.symbols()
     states = [v.name for v in model.states]
-    led = {m.body.name for m in drives if m.body}
+    led = {m.body.name for m in used.drives if m.body}
+    opened = fed = cut(model, [e.shown for e in acting], keep=True) if acting else model
     for body in model.bodies:
         if body.prescribed or body.name in led or not acting:
             continue
         motion, rate = states.index(body.motion), states.index(body.rate)
-        fed = cut(model, [e.shown for e in acting], keep=True)
         inside = fed.symbols()
         closed = ca.depends_on(s.derivative[rate], s.state[motion])
         if closed and not ca.depends_on(inside.derivative[rate], inside.state[motion]):
             places = {v.name: inside.input[i] for i, v in enumerate(fed.inputs)}
             acting = [e for e in acting if not ca.depends_on(inside.derivative[rate], places[e.shown])]
-    return acting
+            fed = cut(model, [e.shown for e in acting], keep=True) if acting else model
+    first, second = (_Cut(each, s := each.symbols(), named(each, s)) for each in (opened, fed))
+    return first, second, acting
 
 
 class _Result(NamedTuple):
@@ -377,10 +383,10 @@ class _Result(NamedTuple):
     moving: str | None
 
 
-def _reading_block(model: FlatModel, target: Measured, given: Sequence[Measured]) -> Block:
+def _reading_block(fed: _Cut, target: Measured, given: Sequence[Measured]) -> Block:
     """Return the block that predicts a measured signal."""
     # Where an effort acts back on a body inside, the measured one acts; what is predicted does not.
-    s, inputs = model.symbols(), [v.name for v in model.inputs]
+    model, s, inputs = fed.model, fed.s, [v.name for v in fed.model.inputs]
     states = {v.name for v in model.states}
     own_state = target.shown in states and target.body is None
     given = [m for m in given if not (own_state and m.shown == target.shown)]
@@ -389,8 +395,8 @@ def _reading_block(model: FlatModel, target: Measured, given: Sequence[Measured]
     torn = {v.name for v in model.signals} & set(inputs)
     used = [m for m in given if m.shown not in torn or ca.depends_on(own, s.input[inputs.index(m.shown)])]
     signal = target.signal
-    tearing = _Tearing(model, s, used, signal)
-    values = tearing.known | {v.name: s.signal[i] for i, v in enumerate(model.signals)}
+    tearing = _Tearing(fed, used, signal)
+    values = {**tearing.known, **{v.name: s.signal[i] for i, v in enumerate(model.signals)}}
     part = top_part(target.shown)
     return tearing.block(_Result(part, model.variable(signal), values[signal], signal, None))
 
@@ -403,14 +409,14 @@ def _given(measured: Measured) -> tuple[str, ...]:
 
 
 def _balance_block(
-    model: FlatModel, lead: Measured, accelerated: Measured | None, given: Sequence[Measured]
+    opened: _Cut, lead: Measured, accelerated: Measured | None, given: Sequence[Measured]
 ) -> Block:
     """Return the block that balances the efforts on a body: inertia times acceleration less all of them."""
     body = lead.body
     assert body is not None
     output = f"{body.name}.unbalanced"
-    s = model.symbols()
-    tearing = _Tearing(model, s, given, output)
+    model, s = opened.model, opened.s
+    tearing = _Tearing(opened, given, output)
     inertia = tearing.known[str(body.inertia)]
     efforts = inertia * s.derivative[[v.name for v in model.states].index(body.rate)]
     seen = tearing.inferred(accelerated, 0) if accelerated else tearing.inferred(lead, 2 - lead.order)
@@ -423,9 +429,9 @@ def _balance_block(
 class _Tearing:
     """A model in which the measured variables are replaced by what their readings say of them."""
 
-    def __init__(self, model: FlatModel, s: Symbols, given: Sequence[Measured], output: str) -> None:
-        self._model, self._s, self._given, self._output = model, s, given, output
-        self.known = named(model, s)
+    def __init__(self, at: _Cut, given: Sequence[Measured], output: str) -> None:
+        self._model, self._s, self.known = at
+        self._given, self._output = given, output
         self._drives: dict[str, Drive] = {}
         self._inputs: dict[str, tuple[Variable, Expression]] = {}
         self._replaced = dict(self._replacements())

@@ -5,6 +5,7 @@ the records, longer than the residuals remember, and the gradients of the segmen
 scatter (Liang and Zeger 1986), each as it would be if its segment had not been fitted (Bell and McCaffrey
 2002): H⁻¹·(Σ g·gᵀ + P)·H⁻¹, with the information H = JᵀJ + P, the part P of the priors in it, and for each
 segment s the gradient g = (1 − Hₛ·H⁻¹)⁻¹·Jₛᵀ·r.
+Where a model is known to lack something, the segments are whole records.
 Nothing is taken as better known than residuals of that size and colour allow where they are independent of
 the slopes.
 """
@@ -17,12 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...foundation.arrays import Array
+from ...foundation.arrays import Array, Indices
 from .residuals import autocorrelation
 
 _SEGMENTS = 60
 """Segments of all records together that are aimed at: enough for a variance to a fifth."""
 _LEAST_ROWS = 8
+_LEAST_RECORDS = 3
 _LEAST_INFORMATION = 1e-6
 """Information on the fitted scale that is taken for granted, so that a covariance is never infinite."""
 _LEAST_STRENGTH = 1e-13
@@ -48,34 +50,52 @@ def robust_covariance(rows: Sequence[Piece], prior: Array) -> Array:
 
     ``prior``: slopes of the residuals of the priors, shape (priors, parameters).
     """
-    information = sum((r.slope.T @ r.slope for r in rows), start=prior.T @ prior)
-    # In the axes and units in which the information is one: the symmetric root.
-    powers, directions = np.linalg.eigh(inverse_information(information))
-    root: Array = (directions * np.sqrt(np.maximum(powers, 0.0))) @ directions.T
-    scatter = root @ (prior.T @ prior) @ root
     # Slopes and residuals of each segment, all blocks of a record together.
     spans: dict[str, float] = {}
     for each in rows:
         if len(each.time):
             spans[each.record] = max(spans.get(each.record, 0.0), float(each.time[-1]))
     length = sum(spans.values()) / _SEGMENTS
-    parts: dict[tuple[str, int], tuple[list[Array], list[Array]]] = {}
+    segments = []
     for each in rows:
         count = max(1, round(spans.get(each.record, 0.0) / length)) if length > 0.0 else 1
         place = np.minimum(count * each.time / max(spans.get(each.record, 0.0), 1e-300), count - 1)
-        place = place.astype(int)
+        segments.append(place.astype(int))
+    return _at_least(_scatter(rows, prior, segments), independent_covariance(rows, prior))
+
+
+def covariance_by_records(rows: Sequence[Piece], prior: Array, known: Array) -> Array:
+    """Return the covariance where residuals hold what a model lacks, at least what is known without that.
+
+    That misses alike in all segments of a record, whose motion is one and mostly repeats itself, so the
+    records alone are independent of each other. Fewer than three tell nothing of a scatter.
+    """
+    if len({each.record for each in rows}) < _LEAST_RECORDS:
+        return known
+    return _at_least(_scatter(rows, prior, [np.zeros(len(each.time), dtype=int) for each in rows]), known)
+
+
+def _scatter(rows: Sequence[Piece], prior: Array, segments: Sequence[Indices]) -> Array:
+    """Return the covariance that the gradients of segments tell, by the segment in its record of each row."""
+    information = sum((r.slope.T @ r.slope for r in rows), start=prior.T @ prior)
+    # In the axes and units in which the information is one: the symmetric root.
+    powers, directions = np.linalg.eigh(inverse_information(information))
+    root: Array = (directions * np.sqrt(np.maximum(powers, 0.0))) @ directions.T
+    scatter = root @ (prior.T @ prior) @ root
+    parts: dict[tuple[str, int], tuple[list[Array], list[Array]]] = {}
+    for each, place in zip(rows, segments, strict=True):
         for k in np.unique(place):
             slopes, residuals = parts.setdefault((each.record, int(k)), ([], []))
             slopes.append(each.slope[place == k])
             residuals.append(each.residual[place == k])
-    segments = [(np.vstack(s), np.concatenate(r)) for s, r in parts.values()]
-    for slope, residual in segments:
-        scaled = slope @ root
+    for slopes, residuals in parts.values():
+        scaled = np.vstack(slopes) @ root
         strength, axes = np.linalg.eigh(scaled.T @ scaled)
-        freed = (axes.T @ (scaled.T @ residual)) / (1.0 - np.minimum(strength, _OWN_SHARE))
+        freed = (axes.T @ (scaled.T @ np.concatenate(residuals))) / (1.0 - np.minimum(strength, _OWN_SHARE))
         gradient = axes @ freed
         scatter += np.outer(gradient, gradient)
-    return _at_least(root @ scatter @ root, independent_covariance(rows, prior))
+    result: Array = root @ scatter @ root
+    return result
 
 
 def independent_covariance(rows: Sequence[Piece], prior: Array) -> Array:

@@ -13,7 +13,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.ndimage import correlate1d
 
 from ...foundation.arrays import Array, Mask
 
@@ -25,6 +24,8 @@ _DEGREE, _POINTS = 8, 9
 differences of eighth order: true to 0.1 % at six samples a period."""
 _LEAST_POINTS = 13
 """Points from which a quartic is quieter than that, over the same time."""
+_BLUR_REACH = 2.0
+"""Spans to each side of a sample in which it has a part in what the span of a rate takes."""
 _ROUNDING_SHARE = 0.35
 """Of the span of a rate, the span over which rounding is removed from a motion."""
 
@@ -52,7 +53,8 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
         return smooth
     beyond = min(half, len(signal) - 1)
     longer = np.pad(signal, beyond, mode="reflect", reflect_type="odd")
-    result: Array = correlate1d(longer, weights[::-1], mode="nearest")[beyond : beyond + len(signal)]
+    whole = scipy.ndimage.correlate1d(longer, weights[::-1], mode="nearest")
+    result: Array = whole[beyond : beyond + len(signal)]
     if order == 2:
         result[:half] = 0.0
         result[len(result) - half :] = 0.0
@@ -72,6 +74,14 @@ def blurred(signal: Array, step: float, *, span: float) -> Array:
         finer = make_interp_spline(clock, signal, k=5)(np.arange((len(signal) - 1) * times + 1) / times)
     over: Array = derivative(finer, step / times, order=1, span=span)[::times]
     return derivative(signal, step, order=1) - over
+
+
+def blur_weights(width: float, step: float, span: float) -> Array:
+    """Return the weights of the samples of a signal in what a span takes from its rate, behind a filter."""
+    one = np.zeros(2 * math.ceil(_BLUR_REACH * span / step) + 1)
+    one[len(one) // 2] = 1.0
+    weights: Array = np.convolve(kernel(width / step), blurred(one, step, span=span))
+    return weights
 
 
 def smoothed(signal: Array, step: float, *, order: int, span: float) -> Array:

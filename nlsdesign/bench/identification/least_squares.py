@@ -24,7 +24,7 @@ from scipy.optimize import lsq_linear
 
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ConvergenceError, ValueRangeError
-from .covariance import Piece, inverse_information, robust_covariance
+from .covariance import Piece, covariance_by_records, inverse_information, robust_covariance
 from .equation_error.evidence import Evidence
 from .parameters import Parameter as Parameter
 from .parameters import box
@@ -300,11 +300,14 @@ class Fit:
     # white: what the covariance would be if the residuals were white noise of unit size, the information
     # inverted; None where that is not told
     white: Array | None = None
+    # by_records: the covariance where the residuals hold what a model lacks; None where that is not told
+    by_records: Array | None = None
 
     def standard_error(self, name: str) -> float:
-        """Return the standard error of a parameter in SI."""
+        """Return the standard error of a parameter in SI, with what no record tells from it."""
         i = [p.name for p in self.parameters].index(name)
-        return float(np.sqrt(self.covariance[i, i])) * abs(self.parameters[i].slope(self.values[name]))
+        fitted = float(np.sqrt(self.covariance[i, i])) * abs(self.parameters[i].slope(self.values[name]))
+        return math.hypot(fitted, self.parameters[i].confounded)
 
     def correlation(self) -> Array:
         """Return the correlation matrix of the parameters."""
@@ -400,9 +403,10 @@ def fit(
         parts.append(Piece(block, record.name, time, own, slope[place:behind]))
         place = behind
     covariance = robust_covariance(parts, slope[: len(parameters)])
+    by_records = covariance_by_records(parts, slope[: len(parameters)], covariance)
     white = inverse_information(slope.T @ slope)
     values = rows.values(ended.x)
-    return Fit(tuple(parameters), values, covariance, ended.cost, misfit, ended.converged, white)
+    return Fit(tuple(parameters), values, covariance, ended.cost, misfit, ended.converged, white, by_records)
 
 
 class Promise(NamedTuple):

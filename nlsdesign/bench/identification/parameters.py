@@ -41,6 +41,9 @@ class Parameter:
         Typical size, for the linear scale.
     spread
         As declared; exact where nothing is known before.
+    confounded
+        Standard deviation, in SI, of what no record tells from it and is not fitted beside it, as a shift of
+        channels within a sample is beside a delay.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Parameter:
     scale: Literal["log", "linear"]
     size: float = 1.0
     spread: Spread = EXACT
+    confounded: float = 0.0
 
     @property
     def known(self) -> bool:

@@ -14,7 +14,7 @@ from ...model import FlatModel
 from ...model.roles import driven_body, series_spring
 from .numbers import in_si, plain
 from .target import Target
-from .task import Task, TaskCycle
+from .task import MixedTask, Task, TaskCycle
 
 _SOFTEST = 1e-3
 """Share of the mean stiffness below which a spring cannot serve a task: the deflection would jump there."""
@@ -88,21 +88,23 @@ class MotorAndGear:
         return replace(self, gear_ratio=ratio)
 
 
-def motor_and_gear(model: FlatModel) -> MotorAndGear:
+def motor_and_gear(model: FlatModel, *, resistance: Quantity | float | None = None) -> MotorAndGear:
     """Return motor and gear of an actuator, as its model declares them.
 
-    The gear ratio is that between the motor and the body at the near end of the series spring. Friction,
+    The gear ratio is that between the rotor and the body at the near end of the series spring. Friction,
     damping and the losses of the gear are not taken over.
 
     Parameters
     ----------
     model
         As flattened, continuous.
+    resistance
+        Of the winding in Ohm, for a model that declares none.
 
     Raises
     ------
     ArrangementError
-        If the model declares no motor, or no resistance of its winding.
+        If the model declares no motor, or no resistance of its winding while none is given.
     """
     body = driven_body(model)
     if body.motor is None:
@@ -111,8 +113,8 @@ def motor_and_gear(model: FlatModel) -> MotorAndGear:
             next_step="give its numbers: MotorAndGear(inertia=..., torque_constant=..., resistance=..., ...)",
         )  # fmt: skip
     numbers = model.values
-    resistance = f"{body.name}.resistance"
-    if resistance not in numbers:
+    winding = numbers.get(f"{body.name}.resistance", resistance)
+    if winding is None:
         raise ArrangementError(
             f"model '{model.name}', motor '{body.name}'",
             "declares no resistance of its winding, and without it there is no Joule heat",
@@ -129,11 +131,12 @@ def motor_and_gear(model: FlatModel) -> MotorAndGear:
         declared.get(str(body.inertia)) or model.evaluate([v.start for v in model.states])[str(body.inertia)]
     )
     infinite = float("inf")
+    geared = declared.get(str(body.motor.gear_ratio), 1.0)  # of a motor that is declared behind its gear
     return MotorAndGear(
-        inertia=rotor,
+        inertia=rotor / geared**2,
         torque_constant=declared[body.motor.torque_constant],
-        resistance=declared[resistance],
-        gear_ratio=abs(ratio),
+        resistance=winding,
+        gear_ratio=abs(ratio) * geared,
         output_inertia=max(total - rotor, 0.0) * ratio**2,
         current_limit=declared.get(body.motor.current_limit, infinite),
         voltage_limit=declared.get(f"{body.name}.voltage_limit", infinite),
@@ -206,7 +209,7 @@ class MotorCycle:
 
 
 def motor_cycle(
-    task: Task,
+    task: Task | MixedTask,
     drive: MotorAndGear,
     *,
     spring: Target | None = None,

@@ -10,8 +10,8 @@ from typing import overload
 
 import casadi as ca
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
 from ...foundation.arrays import Array, Mask
@@ -278,7 +278,7 @@ class TabulatedTorque(Target):
         points = table_of_curve("target table", "torque", self.angles, self.torques)
         if points[1, 0] != 0.0:
             raise ValueRangeError("target table", "torques must start at zero")
-        work = cumulative_trapezoid(points[1], points[0])
+        work = scipy.integrate.cumulative_trapezoid(points[1], points[0])
         given = np.flatnonzero(work < -EXACT * np.max(np.abs(work)))
         if len(given):
             raise ValueRangeError(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.csv_tables import heads_with_units, read_csv
@@ -147,7 +147,7 @@ def read_target(path: Path | str) -> Target:
             next_step="keep one of them" if kinds else "name it 'torque [N*m]', or read a band by read_band",
         )
     _ascending_from_zero(table)
-    work = cumulative_trapezoid(table.values[kinds[0]], table.values["angle"])
+    work = scipy.integrate.cumulative_trapezoid(table.values[kinds[0]], table.values["angle"])
     given = np.flatnonzero(work < -EXACT * np.max(np.abs(work)))
     if kinds == ["stiffness"]:
         _nowhere_negative(table, "stiffness")

@@ -18,6 +18,7 @@ from .target_files import read_columns
 _WORST_MISFIT = 0.05
 """Largest misfit of a record that passes as periodic, rms over its range; noise and rounding are below."""
 _WALKING = "bovi2011"
+_LEAST_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +198,59 @@ class Task:
         return replace(self, torque=share * self._columns[2])
 
 
+@dataclass(frozen=True, eq=False)
+class MixedTask:
+    """Several tasks of one joint, each for its share of the time: what an actuator has to do over a day.
+
+    Energies are means over one second, so that they are powers in W.
+
+    Parameters
+    ----------
+    shares
+        Each task with its share; the shares are scaled so that they add up to one.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is no task, or a share is less than a hundredth of all.
+
+    Examples
+    --------
+    >>> ankle, knee = (walking_task(joint, body_mass=75.0).scaled(0.05) for joint in ("ankle", "knee"))
+    >>> mixed = MixedTask(((ankle, 3.0), (knee, 1.0))).sampled()
+    >>> round(float(mixed.torque.max() / ankle.sampled().torque.max()), 3)
+    1.0
+    """
+
+    shares: tuple[tuple[Task, float], ...]
+
+    def __post_init__(self) -> None:
+        whole = sum(share for _, share in self.shares)
+        for number, (_, share) in enumerate(self.shares, start=1):
+            if not _LEAST_SHARE * whole <= share <= whole:
+                raise ValueRangeError(
+                    f"share {number} of the time = {share:g}", f"must be at least {_LEAST_SHARE:g} of all",
+                    next_step="leave the task out",
+                )  # fmt: skip
+        if not self.shares:
+            raise ValueRangeError("mixed task", "holds no task", next_step="give one with its share")
+
+    def sampled(self, count: int = 1200) -> TaskCycle:
+        """Return all tasks one after the other, with as many times each as its share is large.
+
+        Parameters
+        ----------
+        count
+            Number of times; more where the smallest share has too few of them for its harmonics.
+        """
+        whole, most = sum(share for _, share in self.shares), max(t.harmonics for t, _ in self.shares)
+        count = max(count, int(np.ceil(8 * most * whole / min(share for _, share in self.shares))))
+        cycles = [task.sampled(round(count * share / whole)) for task, share in self.shares]
+        names = ("angle", "speed", "acceleration", "torque", "torque_rate", "torque_acceleration")
+        columns = {name: np.concatenate([getattr(cycle, name) for cycle in cycles]) for name in names}
+        return TaskCycle(time=np.arange(len(columns["angle"])) / len(columns["angle"]), period=1.0, **columns)
+
+
 def read_task(
     path: Path | str,
     *,
@@ -258,6 +312,12 @@ def read_task(
         raise error.at(table.file) from None
 
 
+def walking_tables() -> dict[str, Path]:
+    """Return the files of walking by joint."""
+    files = (folder("models") / "gait").glob(f"{_WALKING}_*.csv")
+    return {file.stem.partition("_")[2]: file for file in files}
+
+
 def walking_task(joint: str, *, body_mass: Quantity | float) -> Task:
     """Return one stride of walking at a natural speed, means of 20 healthy adults.
 
@@ -281,9 +341,7 @@ def walking_task(joint: str, *, body_mass: Quantity | float) -> Task:
     >>> round(walking_task("ankle", body_mass=75.0).period, 3)
     1.101
     """
-    tables = {
-        file.stem.partition("_")[2]: file for file in (folder("models") / "gait").glob(f"{_WALKING}_*.csv")
-    }
+    tables = walking_tables()
     if joint not in tables:
         raise unknown_name("joint", joint, tables)
     return read_task(tables[joint], body_mass=body_mass)

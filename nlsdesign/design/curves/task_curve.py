@@ -15,7 +15,7 @@ from .compliance import OddSpring, SpringSymmetry, TwoBranchSpring
 from .motor_and_gear import MotorAndGear, MotorCycle, motor_cycle
 from .numbers import in_si, plain
 from .target import TabulatedTorque
-from .task import Task
+from .task import MixedTask, Task
 from .task_program import TaskOptimum, TaskProgram, least_energy, least_peak_power
 
 _RIGID = 0.01
@@ -209,7 +209,7 @@ class TaskProblem:
     limits: SpringLimits = field(default_factory=SpringLimits)
     pieces: int = 48
 
-    def program(self, task: Task, drive: MotorAndGear) -> TaskProgram:
+    def program(self, task: Task | MixedTask, drive: MotorAndGear) -> TaskProgram:
         """Return the program.
 
         Parameters
@@ -241,7 +241,9 @@ class TaskProblem:
         )
 
 
-def curve_for_task(task: Task, drive: MotorAndGear, problem: TaskProblem | None = None) -> TaskCurve:
+def curve_for_task(
+    task: Task | MixedTask, drive: MotorAndGear, problem: TaskProblem | None = None
+) -> TaskCurve:
     """Return the torque curve of the series spring that serves a task best.
 
     Unknown is the compliance over the torque, a spline with many pieces; motor torque and speed are affine in

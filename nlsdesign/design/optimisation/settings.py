@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ...foundation.errors import ValueRangeError
+from ...foundation.errors import ValueRangeError, brief
 from ..curves.numbers import in_si
 from ..statics.contour import Contour
 from ..tolerance.monte_carlo import FEWEST_DRAWS, MOST_DRAWS
@@ -85,6 +85,6 @@ class DesignSettings:
             )
         if self.draws and not FEWEST_DRAWS <= self.draws <= MOST_DRAWS:
             raise ValueRangeError(
-                f"draws = {self.draws}", f"a tolerance needs {FEWEST_DRAWS} to {MOST_DRAWS} draws",
+                f"draws = {brief(self.draws)}", f"a tolerance needs {FEWEST_DRAWS} to {MOST_DRAWS} draws",
                 next_step="take 200, or 0 for no tolerance",
             )  # fmt: skip

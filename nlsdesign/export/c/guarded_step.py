@@ -15,11 +15,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...model.flat import FlatModel, Variable
+from ...simulation.buffered import Buffered
 from .c_text import Real
 
 INPUT_HELD = 1 << 0
@@ -212,6 +214,11 @@ class GuardedModel:
             if numbers is not None:
                 self._guards[i] = ReadingGuard(numbers, self.real, self._inputs[i])
         self._movers = {i: mover(model, model.inputs[i]) for i in self._guards}
+        symbols = model.equations.sx_in()
+        self._given = [np.zeros(max(1, each.numel())) for each in symbols]
+        self._given[3][: len(self._parameters)] = self._parameters
+        results = [ca.densify(each) for each in model.equations(*symbols)[:2]]
+        self._computed = Buffered(ca.Function("step", symbols, results), self._given)
 
     def step(self, inputs: Sequence[float]) -> tuple[list[float], int]:
         """Advance by one sample of any numbers, shape (inputs,); return the outputs and the status word."""
@@ -271,8 +278,10 @@ class GuardedModel:
         at |= {v.name: u for v, u in zip(model.inputs, self._inputs, strict=True)}
         if any(not table.ends[0] <= at[table.argument] <= table.ends[1] for table in model.tables):
             status |= OUT_OF_TABLE
-        f, y, _, _ = model.equations(0.0, self.state, used, self._parameters, w)
-        following, outputs = np.array(f, dtype=float).ravel(), np.array(y, dtype=float).ravel()
+        for place, values in ((1, self.state), (2, used), (4, w)):
+            self._given[place][: len(values)] = values
+        self._computed.evaluate()
+        following, outputs = (result.copy() for result in self._computed.results)
         if np.all(np.abs(following) <= self.real.largest):
             self.state = following
         else:

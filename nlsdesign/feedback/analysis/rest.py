@@ -13,7 +13,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ConvergenceError, unknown_name
 from ...foundation.quantity import with_unit
-from ...foundation.symbolic import Expression
+from ...foundation.symbolic import Expression, depends
 from ...model import FlatModel
 from ...model.flat import Symbols
 from ...model.roles import measured_motion
@@ -41,6 +41,7 @@ def rest_states(
     *,
     angle: str | None = None,
     consistent: Mapping[str, str] | None = None,
+    unmoved: bool = False,
     tolerance: float = 1e-9,
 ) -> Array:
     """Return the states in which everything rests while the angle is held, at many angles at once.
@@ -48,9 +49,21 @@ def rest_states(
     ``model``: continuous; inputs are at their start values. ``angle``: state that is held, its rate at zero;
     by default the motion of the driven body. ``consistent``: states that have to agree with a signal of the
     same model, such as the extension of the published form with ``"spring.rubber.extension.geometric"``;
-    state name to signal name.
+    state name to signal name. ``unmoved``: whether states that no state moves at standstill, as those of
+    hysteresis that the speed leads, stay as they start; else they are an error.
     """
-    return RestSolver(model, angle=angle, consistent=consistent)(model, angles, tolerance)
+    return RestSolver(model, angle=angle, consistent=consistent, unmoved=unmoved)(model, angles, tolerance)
+
+
+def unmoved_states(model: FlatModel, rate: str) -> list[str]:
+    """Return the states that no state moves at standstill: of hysteresis that the speed leads, of a clock."""
+    s, names = model.symbols(), [v.name for v in model.states]
+    still = ca.substitute(s.derivative, s.state[names.index(rate)], 0)
+    return [
+        name
+        for name, moved in zip(names, ca.vertsplit(still), strict=True)
+        if name != rate and not depends(moved, s.state)
+    ]
 
 
 class RestSolver:
@@ -60,7 +73,12 @@ class RestSolver:
     """
 
     def __init__(
-        self, model: FlatModel, *, angle: str | None = None, consistent: Mapping[str, str] | None = None
+        self,
+        model: FlatModel,
+        *,
+        angle: str | None = None,
+        consistent: Mapping[str, str] | None = None,
+        unmoved: bool = False,
     ) -> None:
         angle = measured_motion(model, angle)
         names, tied = [v.name for v in model.states], dict(consistent or {})
@@ -72,6 +90,8 @@ class RestSolver:
             (names.index(name), ca.Function("follow", arguments, [known[signal]]))
             for name, signal in tied.items()
         ]
+        if unmoved:
+            held |= {names.index(name) for name in unmoved_states(model, names[self._rate])}
         self._free = free = [i for i in range(len(names)) if i not in held]
         rate = ca.vertcat(*[s.derivative[i] for i in free])
         slope = ca.jacobian(rate, ca.vertcat(*[s.state[i] for i in free])) if free else ca.SX(0, 0)

@@ -7,6 +7,7 @@ import { announce, byId, make, text } from "./elements.js";
 import { MechanismPicture } from "./mechanism.js";
 import { AtAngle, Panels, sitsOn } from "./panels.js";
 import { Questions } from "./questions.js";
+import { TaskCard } from "./task.js";
 import { TargetEditor, torqueRange } from "./target_editor.js";
 import { interpolated } from "./chart.js";
 import { factorOf, plain, withUnit } from "./units.js";
@@ -46,6 +47,7 @@ const atAngle = new AtAngle(byId("linear-row"), ask);
 const compare = new Compare(ask);
 const tolerance = new Tolerance(ask);
 const diagnosis = new Diagnosis(ask);
+const task = new TaskCard(byId("task"), edit);
 const limits = new Rows(byId("limits"), "limit", {
   change: (limit, value, last) => edit({ edit: "ChangeLimit", limit, value }, { drag: `limit ${limit}`, last }),
   drop: (limit) => edit({ edit: "DropLimit", limit }),
@@ -82,7 +84,7 @@ const live = new Connection(receive, (words, lost) => {
 function receive(message) {
   const kinds = {
     gallery: () => showGallery(message), answer: () => takeAnswer(message), at: () => takeAngle(message),
-    refused: () => refuse(message), work: () => takeWork(message.work), kept: () => compare.show(message.kept, present()),
+    refused: () => refuse(message), work: () => takeWork(message.work), motor: () => takeMotor(message.motor), kept: () => compare.show(message.kept, present()),
   };
   kinds[message.what]?.();
   if (typeof message.number === "number") questions.answered(message.number);
@@ -144,12 +146,18 @@ function takeWork(work) {
 
 let lastCloud = null;
 
+function takeMotor(motor) {
+  task.showMotor(motor);
+  if (answer && !editor.moving) showCurve(false);
+}
+
 // --- what is shown --------------------------------------------------------------------------------
 
 function showAnswer() {
   const { controls, design } = answer;
   const frozen = editor.moving;
   table.show(controls.points.map((each) => [each[0], each[1]]));
+  task.show(controls);
   showCurve(frozen);
   limits.show(controls.limits.map(limitRow));
   showKinds();
@@ -169,6 +177,7 @@ function showAnswer() {
     slider(design.columns[0].values);
     if (!frozen) compare.show(null, present());
   }
+  showLights(design);
   showTitle();
   showAdvice();
   const earlier = answer.stale ? (design ? "Deck, drawings, C and FMU are those of the last good design, of an earlier question: the question of now has no design." : "") : "";
@@ -227,6 +236,7 @@ function showCurve(frozen) {
     series.push({ name: answer.stale ? "target of the design shown" : "target", x: column("angle"), y: column("target"), tone: "ink", dash: "dashed" });
     series.push({ name: answer.stale ? "last good design" : "design", x: column("angle"), y: column("torque"), tone: "blue" });
   }
+  series.push(...task.curve);
   const wanted = torqueRange([points.map((each) => each[1]), ...series.map((each) => each.y)]);
   const room = { x: [0, 1.08 * Math.max(last, ...series.map((each) => each.x.at(-1)))], y: [wanted[0], wanted[1] * 1.15] };
   editor.bounds = { angle: [0, 6.28], torque: [0, 1e5], firstHeld: true };
@@ -273,6 +283,21 @@ function numberRow([name, value, unit, , free, , , source]) {
     margin: free && chosen ? `chosen: ${withUnit(chosen.value, unit)}` : "" };
 }
 
+// Three questions, one light: green where all are answered yes. They are answered by the check.
+const MARKS = { yes: "✓", no: "✗", unknown: "?" };
+const ASKED = ["can be made", "will hold", "will be known"];
+function lightsOf(design) {
+  const known = design?.lights.length && !answer.stale ? design.lights : [];
+  return ASKED.map((asked) => known.find((each) => each.asked === asked) ?? { asked, answer: "", words: "comes with the check" });
+}
+
+function showLights(design) {
+  const lights = lightsOf(design), answers = lights.map((each) => each.answer), place = byId("lights");
+  const worst = ["no", "", "unknown"].find((each) => answers.includes(each)) ?? "yes";
+  place.className = `lights ${worst || "open"}`;
+  place.replaceChildren(...lights.map((each) => make("li", { class: each.answer || "open", title: each.words }, make("span", { "aria-hidden": "true" }, MARKS[each.answer] ?? "…"), `${each.asked}${each.answer === "yes" ? "" : `: ${each.answer || "not yet"}`}`)));
+}
+
 function showNumbers(design) {
   const rows = [
     ["torque error, 95 % of made springs", design.made_error === null ? (design.checked ? "not known: no number is spread" : "comes with the check") : `${withUnit(design.made_error, "N*m", 3)} rms`],
@@ -282,6 +307,7 @@ function showNumbers(design) {
     ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
     ...(answer.controls.can_undo ? [["answered in", `${plain(1e3 * answer.seconds, 2)} ms`]] : []),
   ];
+  byId("reasons").replaceChildren(...lightsOf(design).map(({ asked, answer, words }) => make("p", {}, make("strong", {}, answer ? `${asked}: ${answer}` : asked), ` – ${words}`)));
   byId("numbers").replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
 }
 
@@ -348,7 +374,7 @@ function later() {
 
 function fade(old = false) {
   const stale = old || document.body.classList.contains("lost") || answer === null || answer.stale || answer.state !== "solved";
-  for (const name of ["torque", "mechanism", "panels", "linear", "numbers", "limits", "sizes", "laws", "angle-bar"]) byId(name).classList.toggle("stale", stale);
+  for (const name of ["torque", "mechanism", "panels", "linear", "numbers", "reasons", "limits", "sizes", "laws", "angle-bar", "lights", "task"]) byId(name).classList.toggle("stale", stale);
   // Observability and poles come when the hand rests.
   if (answer?.design && !atAngle.holds(answer.design.revision, angle)) byId("linear").classList.add("stale");
 }
@@ -401,6 +427,7 @@ function showAngle(at) {
 
 function showGallery(message) {
   ({ cards, materials, limits: kinds } = message);
+  task.offer(message.joints);
   if (answer) showKinds();
   const select = byId("gallery");
   const group = (label, chosen) => make("optgroup", { label }, ...chosen.map((each) => make("option", { value: each.name, disabled: each.reason !== "", title: each.line }, each.name)));

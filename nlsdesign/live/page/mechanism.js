@@ -50,10 +50,11 @@ export class MechanismPicture {
       put(`guide${k}`, "circle", { class: "guide", cx: guide[0], cy: guide[1], r: size });
       put(`contact${k}`, "circle", { class: "contact", cx: contact[0], cy: contact[1], r: size });
     });
+    put("reach", "circle", { class: "reach-circle", cx: 0, cy: 0, r: radius });
     put("centre", "circle", { class: "centre", cx: 0, cy: 0, r: size });
     for (const [name, part] of this.parts) if (!used.has(name)) { part.remove(); this.parts.delete(name); }
     this.frame(wide, high, mechanism.halves.length > 1, Number(radius.toPrecision(2)));
-    text(this.now, withUnit(mechanism.angle, "rad", 3));
+    text(this.now, `${withUnit(mechanism.angle, "rad", 3)} · radius of the cam ${plain(radius, 3)} mm`);
     text(this.remark, mechanism.remark);
     set(this.whole, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}: cam radius ${plain(radius, 3)} mm, lever arm ${plain(arm, 3)} mm` });
   }

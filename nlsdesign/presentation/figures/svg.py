@@ -20,6 +20,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import Collection, LineCollection, PathCollection, PolyCollection
 from matplotlib.container import BarContainer
 from matplotlib.figure import Figure
@@ -64,14 +65,15 @@ def _svg_on_nothing(figure: Figure) -> str:
     if figure.stale or figure not in _drawn:
         stream = io.StringIO()
         metadata = {"Date": None, "Creator": None, "Description": _NO_XML.sub(" ", alternative_text(figure))}
-        with mpl.rc_context(STYLE), _any_letters():
-            figure.savefig(stream, format="svg", metadata=metadata)
+        # ``savefig`` would draw a second time, to lay out what drawing itself lays out; the same bytes.
+        with mpl.rc_context(STYLE), _drawing(figure):
+            FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)  # type: ignore[no-untyped-call]
         numbers: dict[str, int] = {}
         _drawn[figure] = _HASHED.sub(
             lambda match: f"{match[1] or match[2]}{numbers.setdefault(match[0], len(numbers))}",
             stream.getvalue(),
         )
-        # Saving changes colours and layout and puts them back, which matplotlib takes for a change.
+        # Drawing changes colours and layout and puts them back, which matplotlib takes for a change.
         figure.stale = False
     return _drawn[figure]
 
@@ -140,11 +142,19 @@ def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = 
 
 
 @contextmanager
-def _any_letters() -> Iterator[None]:
-    """Accept letters that matplotlib's font lacks: text stays text, and who shows it has fonts of its own."""
+def _drawing(figure: Figure) -> Iterator[None]:
+    """Take the background away while a figure is drawn, and accept letters that matplotlib's font lacks.
+
+    Text stays text, and who shows it has fonts of its own.
+    """
+    face, edge = figure.get_facecolor(), figure.get_edgecolor()
+    figure.set(facecolor="none", edgecolor="none")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
-        yield
+        try:
+            yield
+        finally:
+            figure.set(facecolor=face, edgecolor=edge)
 
 
 def _content(figure: Figure, suffix: str) -> bytes:

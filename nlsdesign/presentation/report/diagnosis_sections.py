@@ -363,7 +363,7 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
     """Return the chapter on the observer: torque error before and after, and the files."""
     sections: list[Section] = [
         Chapter(
-            "Observer from the better model",
+            "Observer and controller from the better model",
             "The torque observer, designed from the declared (before) and from the better model (after). "
             "Both read the measured signals and are compared with the torque that the records show.",
         )
@@ -382,10 +382,19 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
                 assumed="The measured torque is what the better model says is behind the readings.",
             )
         )  # fmt: skip
+    if result.controller:
+        rows = [tuple(three_digits(value) for value in sine) for sine in result.controller.sines]
+        columns = ("amplitude in N·m", "frequency in Hz", "before in N·m", "after in N·m")
+        caption = (
+            "Root mean square torque error of the better model over the last period of a sine of the wanted "
+            "torque, under observer and controller of the declared and of the better model. "
+            f"{result.controller.words()[1]}"
+        )
+        sections.append(TableSection("Tracking of the torque", columns, tuple(rows), caption=caption))
     if result.reasons:
-        rows = tuple((reason,) for reason in result.reasons)
+        reasons = tuple((reason,) for reason in result.reasons)
         caption = "Why something is lacking here."
-        sections.append(TableSection("Not done", ("reason",), rows, caption=caption))
+        sections.append(TableSection("Not done", ("reason",), reasons, caption=caption))
     if files:
         sections.append(FileSection("Files", files, caption="Written beside this report."))
     return sections

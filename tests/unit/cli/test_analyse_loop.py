@@ -26,8 +26,10 @@ from nlsdesign.feedback.control.laws.known_drive import only_side
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from tests.command_line import two_machines
+from tests.undrawn import undrawn
 
-__all__ = ["two_machines"]
+__all__ = ["two_machines", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 FINGER = str(Path(__file__).parents[3] / "models" / "templates" / "one-sided-finger.toml")
 
 
@@ -42,6 +44,12 @@ def loops(deck: str) -> tuple[ClosedLoop, ClosedLoop]:
 def five_frequencies(monkeypatch: pytest.MonkeyPatch) -> None:
     """A quarter of the sines, and none that takes ten seconds."""
     monkeypatch.setattr(whole_evaluation, "FREQUENCIES", (0.5, 11.0, 5))
+
+
+@pytest.fixture
+def two_frequencies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few sines, where responses are not looked at."""
+    monkeypatch.setattr(whole_evaluation, "FREQUENCIES", (2.0, 8.0, 2))
 
 
 def run(out: Path, *options: str) -> tuple[int, dict]:
@@ -78,16 +86,18 @@ def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp
     )
 
 
-@pytest.mark.usefixtures("five_frequencies")
-def test_the_default_has_a_margin_and_the_controller_is_that_of_export(tmp_path: Path) -> None:
+@pytest.mark.long_cases("austin2015_figure_consistent")
+@pytest.mark.parametrize("deck", ["austin2015_stiff_spring", "austin2015_figure_consistent"])
+@pytest.mark.usefixtures("two_frequencies")
+def test_the_default_has_a_margin_and_the_controller_is_that_of_export(deck: str, tmp_path: Path) -> None:
     """Where no gain is stated: 6 dB and 30° over the spread, and all of 40 machines settle after a kick."""
-    _, found = run(tmp_path, "--deck", "austin2015_figure_consistent", "--amplitude", "0.5 N*m")
+    _, found = run(tmp_path, "--deck", deck, "--amplitude", "0.5 N*m")
     assert not [line for line in found["findings"] if "spread" in line]
     spread = found["margins_over_spread"]
     assert spread["gain"] == "controller.bandwidth"
     assert spread["value_with_6_dB_30_deg"] == spread["value"]
     assert spread["limit_cycling_after_kick"] == 0.0
-    plant = loops("austin2015_figure_consistent")[0].plant
+    plant = loops(deck)[0].plant
     exported, margins = controller_of(plant, 1e-3, law="scheduled", bandwidth=None, velocity_bandwidth=None)
     judged, _ = cascade_loops(plant, plant, delay=1, sample_time=1e-3, law=ScheduledTorque())
     assert judged.controller.values == exported.values

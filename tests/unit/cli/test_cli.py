@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from tests.command_line import Run, files_in, run
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 DECK = "austin2015_figure_consistent"
 
 

@@ -17,8 +17,10 @@ from nlsdesign.model import flatten
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.side_by_side import torque_at_rest
 from tests.command_line import Run, run
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 SOFT, STIFF = "austin2015_soft_spring", "austin2015_stiff_spring"
 DESIGN = {
     "met": True, "torque_error_rms": 0.0123, "miss": None, "active_limits": ["MaximumCamRadius"],

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import pytest
+from click.testing import CliRunner
 
+from nlsdesign.cli.export import export
 from nlsdesign.components import declare, write_deck
 from nlsdesign.foundation.deck import load_deck
 from tests.blocks import BETTER
@@ -17,12 +20,20 @@ __all__ = ["run", "two_machines"]
 DECK = "austin2015_figure_consistent"
 
 
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    """Export the observer of the published machine with blocks, once."""
+    folder = tmp_path_factory.mktemp("exported")
+    usual = ("c", "--deck", DECK, "--kind", "cascade", "--real", "float", "--out", str(folder / "code"))
+    done = CliRunner().invoke(export, [*usual, "--block"])
+    assert done.exit_code == 0, done.output
+    return folder / "code"
+
+
 @pytest.fixture
-def code(run: Run):
-    """Export the observer of the published machine with blocks, and return the folder."""
-    usual = ("--deck", DECK, "--kind", "cascade", "--real", "float", "--out", "code")
-    status, _, err = run("export", "c", *usual, "--block")
-    assert status == 0, err
+def code(exported, tmp_path):
+    """Return that code in the folder of a test."""
+    shutil.copytree(exported, tmp_path / "code")
     return "code/observer_block.json"
 
 

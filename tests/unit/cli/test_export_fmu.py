@@ -38,6 +38,7 @@ def test_all_that_the_deck_allows_is_written_with_its_author_and_date(run: Run, 
         found = described(tmp_path / "o" / name)
         assert (found.author, found.license) == ("A. Maker", "CC0")
         assert found.generationDateAndTime == "2026-03-04T12:00:00Z"
+    assert "speed by tangent stiffness" in described(tmp_path / "o" / "controller.fmu").description
     joint = described(tmp_path / "o" / "observer_and_controller.fmu")
     assert {v.name for v in joint.modelVariables if v.causality == "input"} == {
         "motor.angle",
@@ -49,13 +50,19 @@ def test_all_that_the_deck_allows_is_written_with_its_author_and_date(run: Run, 
     assert (tmp_path / "again" / "plant.fmu").read_bytes() == first
 
 
-def test_the_law_is_that_of_the_c_code(run: Run, tmp_path: Path) -> None:
+# The default in C: test_controller.py; in an FMU: the test above.
+@pytest.mark.long_cases("default")
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [((), "speed by tangent stiffness"), (("--law", "pid"), "PID on the")],
+    ids=["default", "pid"],
+)
+def test_the_law_is_that_of_the_c_code(run: Run, tmp_path: Path, law: tuple[str, ...], words: str) -> None:
     asked = ("--what", "controller", "--out", "o")
-    for law, words in (((), "speed by tangent stiffness"), (("--law", "pid"), "PID on the")):
-        assert run(*WORDS, "--deck", LINEAR, *asked, *law)[0] == 0
-        assert words in described(tmp_path / "o" / "controller.fmu").description
-        assert run("export", "c", "--deck", LINEAR, "--what", "controller", "--out", "c", *law)[0] == 0
-        assert words in (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
+    assert run(*WORDS, "--deck", LINEAR, *asked, *law)[0] == 0
+    assert words in described(tmp_path / "o" / "controller.fmu").description
+    assert run("export", "c", "--deck", LINEAR, "--what", "controller", "--out", "c", *law)[0] == 0
+    assert words in (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
 
 
 def test_what_is_asked_for_is_written_once_with_its_reference(run: Run, tmp_path: Path) -> None:

@@ -22,10 +22,12 @@ from nlsdesign.model import flatten
 from tests.command_line import Run, run
 from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, truth, write_declaration, write_records
+from tests.undrawn import undrawn
 from tests.unit.bench.identification.test_shooting import NOISE, TRUE
 from tests.unit.bench.identification.test_shooting import truth as slide_record
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 PARTS = ("observer", "controller", "torque_loop")
 SHORT = "sine_15deg_5.0Hz"
 """Three seconds are enough where it does not matter how well the numbers are known."""

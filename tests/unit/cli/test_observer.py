@@ -23,8 +23,10 @@ from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.regeneration import fitted_poles
 from tests.command_line import Run, run
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 DECK = "austin2015_soft_spring"
 
 

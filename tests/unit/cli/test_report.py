@@ -15,8 +15,10 @@ from nlsdesign.sweeps.sweep_parts import Parts
 from nlsdesign.sweeps.sweep_table import about_text, read_sweep
 from tests.command_line import Run, run
 from tests.sweep_tables import AREA, DECK, spread_table
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("SALib")

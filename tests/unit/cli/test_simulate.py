@@ -15,8 +15,10 @@ from nlsdesign.cli.typed_signals import read_driving_signal
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.simulation import Sine, StepAt
 from tests.command_line import Run, run
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 DECK = "austin2015_soft_spring"
 QUICK = ("simulate", "--table-only")
 STIFFNESS, TORQUE_CONSTANT, SLIDING = 1.7, 4 * 0.055, 0.02

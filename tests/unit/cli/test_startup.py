@@ -14,8 +14,8 @@ from nlsdesign.cli.main import program
 
 HEAVY = {"casadi", "numpy", "sympy", "control", "scipy", "matplotlib", "fmpy", "rich", "jinja2"}
 DECK = "austin2015_figure_consistent"
-SLOW_PARTS = {"scipy.signal", "scipy.stats"}
-"""Of SciPy, half a second each, which SciPy loads at their first use."""
+SLOW_PARTS = {"scipy.signal", "scipy.stats", "scipy.integrate", "scipy.ndimage"}
+"""Of SciPy, up to half a second each, which SciPy loads at their first use."""
 AT_THE_END = f"""
 import atexit, sys
 atexit.register(lambda: print(
@@ -111,6 +111,8 @@ NOT_NEEDED = {
 }
 
 
+# What the rooms load that analyse uses: test_a_room_loads_sympy_and_python_control_only_when_it_uses_them.
+@pytest.mark.long_cases("analyse --deck")
 @pytest.mark.parametrize("words", NOT_NEEDED, ids=lambda words: " ".join(words[:2]))
 def test_a_command_does_not_load_what_it_does_not_use(loaded: Loaded, words: tuple[str, ...]) -> None:
     modules, shown = loaded(COMMAND.format(words=words))
@@ -158,7 +160,7 @@ server.asyncio.run = lambda run: run.close()
 
 
 @pytest.mark.long_cases("report", "observer")
-@pytest.mark.parametrize("room", ["report", "discrepancy", "observer", "control"])
+@pytest.mark.parametrize("room", ["report", "discrepancy", "observer", "control", "analysis"])
 def test_a_room_loads_sympy_and_python_control_only_when_it_uses_them(loaded: Loaded, room: str) -> None:
     modules, _ = loaded(f"import nlsdesign as nls; nls.{room}")
     assert "casadi" in modules

@@ -12,6 +12,10 @@ from click.testing import CliRunner
 from nlsdesign.cli.main import program
 from nlsdesign.cli.options import workers_option
 from nlsdesign.foundation.work_sharing import Processes, parallel_map, spread_over
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 linux = pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="processes are forked on Linux only")
 

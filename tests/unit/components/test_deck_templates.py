@@ -27,6 +27,10 @@ from nlsdesign.foundation.spread import RelativeSpread
 from nlsdesign.regeneration import readiness
 from tests.command_line import Run
 from tests.command_line import run as run
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 TEMPLATES = template_names()
 

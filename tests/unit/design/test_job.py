@@ -137,6 +137,7 @@ def test_a_target_may_follow_from_a_task() -> None:
         ("[goals]", "[gaols]", UnknownNameError, r"did you mean 'goals'"),
         ("seed = 3", "sede = 3", UnknownNameError, r"job\.toml:\d+:1.*did you mean 'seed'"),
         ("starts = 12", "starts = 0", ValueRangeError, r"starts = 0"),
+        ("draws = 60", f"draws = 0x{'f' * 4000}", ValueRangeError, r"draws = a number of thousands"),
         ('free = ["spring', 'free = "["#["spring', DeckError, r"job\.toml:2:1: free: is not a list of names"),
         ("shape = 1.0", "shape = 0.0", ValueRangeError, r"job\.toml:6:1.*straight line"),
         ('maximum = "5 N*m", ', "", DeckError, r"lacks maximum"),

@@ -111,7 +111,7 @@ def test_each_limit_says_what_it_bounds(limit: Limit, text: str) -> None:
 
 
 # Each limit that binds must hold in the finished assembly, measured on it and not in the optimiser.
-@pytest.mark.long_cases("radius", "strain", "tension", "stress")
+@pytest.mark.long_cases("radius", "strain", "tension", "stress", "pretension")
 @pytest.mark.parametrize(
     ("limit", "measure"),
     [

@@ -10,6 +10,7 @@ import pytest
 
 import nlsdesign as nls
 from nlsdesign.design import (
+    MixedTask,
     MotorAndGear,
     OneSidedSpring,
     PowerTorque,
@@ -160,6 +161,40 @@ def test_an_unknown_joint() -> None:
         walking_task("ankel", body_mass=75.0)
 
 
+# --- several tasks --------------------------------------------------------------------------------
+
+
+def test_each_task_counts_by_its_share_of_the_time() -> None:
+    other = Task(time=PHASE / 3.0, angle=0.2 * np.sin(PHASE), torque=2.5 * np.cos(PHASE))
+    mixed = MixedTask(((SWING, 3.0), (other, 1.0)))
+    cycles = {each: motor_cycle(each, MOTOR) for each in (mixed, SWING, other)}
+    mean = {each: cycle.heat / cycle.cycle.period for each, cycle in cycles.items()}
+    assert mean[mixed] == pytest.approx(0.75 * mean[SWING] + 0.25 * mean[other], rel=1e-9)
+    assert cycles[mixed].peak_power == pytest.approx(
+        max(cycles[each].peak_power for each in (SWING, other)), rel=1e-3
+    )
+    assert cycles[mixed].cycle.period == 1.0
+    rare = MixedTask(((SWING, 0.98), (other, 0.02))).sampled()
+    assert len(rare.time) >= 50 * 8 * SWING.harmonics
+
+
+def test_the_curve_for_several_tasks_is_the_best_for_all_together() -> None:
+    joints = {name: walking_task(name, body_mass=75.0).scaled(0.03) for name in ("ankle", "knee")}
+    mixed = MixedTask(tuple((task, 1.0) for task in joints.values()))
+    best = curve_for_task(mixed, MOTOR)
+    assert best.gap is not None
+    assert best.gap < 1e-3
+    of_ankle = curve_for_task(joints["ankle"], MOTOR).target  # the ankle's torque is the larger one
+    assert best.best.energy < motor_cycle(mixed, MOTOR, spring=of_ankle).energy
+    assert best.best.energy < best.rigid.energy
+
+
+@pytest.mark.parametrize("shares", [(), (1.0, 0.005), (1.0, -0.5), (1.0, float("nan"))])
+def test_a_share_that_is_none_is_refused(shares: tuple[float, ...]) -> None:
+    with pytest.raises(ValueRangeError):
+        MixedTask(tuple((SWING, share) for share in shares))
+
+
 # --- the motor ------------------------------------------------------------------------------------
 
 
@@ -180,6 +215,21 @@ def test_a_motor_without_a_resistance_is_refused() -> None:
         ArrangementError, match=r"no resistance of its winding.*MotorAndGear\(\.\.\., resistance"
     ):
         motor_and_gear(model)
+
+
+def test_a_motor_that_is_declared_behind_its_gear_moves_the_same_load() -> None:
+    """At the output: n·k_T·I against the inertia that the deck declares there."""
+    model = nls.flatten(nls.models.cam_rubber_actuator(nls.load_deck("austin2015_figure_consistent")))
+    motor, numbers = motor_and_gear(model, resistance=0.4), model.values
+    assert motor.resistance == 0.4
+    assert motor.gear_ratio == pytest.approx(numbers["motor.gear_ratio"])
+    assert motor.reflected_inertia == pytest.approx(numbers["motor.inertia"])
+    cycle = motor_cycle(SWING, motor)
+    needed = cycle.cycle.torque + numbers["motor.inertia"] * cycle.cycle.acceleration
+    per_ampere = numbers["motor.gear_ratio"] * numbers["motor.torque_constant"]
+    assert cycle.current == pytest.approx(needed / per_ampere)
+    declared = nls.flatten(nls.models.one_sided_cable_drive(nls.load_deck("one_sided_cable_drive")))
+    assert motor_and_gear(declared, resistance=9.0).resistance == pytest.approx(0.3)  # the deck knows it
 
 
 @pytest.mark.parametrize(

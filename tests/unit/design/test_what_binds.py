@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +25,7 @@ from nlsdesign.design import (
     TabulatedTorque,
     design_cam,
 )
+from nlsdesign.design.optimisation.loosening import Loosened
 from nlsdesign.design.statics.energy import energy_profile, unmakeable_parts
 from nlsdesign.foundation.errors import InfeasibleError
 from nlsdesign.foundation.quantity import quantity
@@ -110,6 +114,39 @@ def promised(
     return str(caught.value), {name for name, _, _ in FREED.findall(cure[0])}, float(cure[1])
 
 
+class Sizes(Loosened):
+    """What could give, without a program: only certain sizes together are enough."""
+
+    def __init__(self, enough: set[str], cost: dict[str, float]) -> None:
+        self.candidates, self.every, self.enough, self.cost = tuple(cost), (0,), enough, cost
+
+    def least(self, names: Sequence[str], slacks: Sequence[int], start: object = None) -> Any:
+        left = 0.0 if self.enough <= set(names) else min(self.cost[name] for name in names)
+        return SimpleNamespace(solved=True, cost=left)
+
+    def several(self, questions: Sequence[tuple[Sequence[str], Sequence[int]]], start: object = None) -> Any:
+        return [self.least(*question) for question in questions]
+
+    def kept(self, outcome: Any) -> bool:
+        return bool(outcome.cost == 0.0)
+
+    def designed(self, names: Sequence[str], outcome: object) -> Any:
+        return set(names)
+
+    freed = designed
+
+
+def test_as_few_sizes_are_freed_as_are_enough_and_no_idle_one() -> None:
+    cost = {"pretension": 0.3, "area": 0.1, "length": 0.2, "elements": 0.4}
+    for enough in ({"area"}, {"pretension", "area"}, {"area", "length", "elements"}, {*cost}):
+        tried = Sizes(enough, cost).sizes_tried()
+        assert tried.enough == (enough,), "a single one, or the fewest of the best"
+        assert (tried.everything is None) == (len(enough) == 1)
+    assert Sizes({"another"}, cost).sizes_tried().enough == ()
+
+
+# Fifteen seconds; the search for the sizes, on what each leaves: the test above.
+@pytest.mark.slow
 def test_a_conflict_names_several_sizes_where_no_single_one_is_enough() -> None:
     limits = [MinimumRadiusOfCurvature(1e-3), MaximumCamRadius(12e-3), MaximumStrain(0.6)]
     keep = [*limits, MaximumTorqueError(50e-3)]

@@ -93,7 +93,7 @@ def schema(folder: str, name: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(str(SCHEMAS / folder / name)))
 
 
-@pytest.mark.long_cases("plant-2.0", "observer-2.0", "controller-2.0", "observer-3.0")
+@pytest.mark.long_cases("plant-2.0", "observer-2.0", "controller-2.0", "observer-3.0", "controller-3.0")
 @both
 @each_model
 def test_the_sources_in_the_archive_compile_without_a_warning(name, version, units, tmp_path):

@@ -27,10 +27,12 @@ def controller(tmp_path_factory: pytest.TempPathFactory) -> CSource:
     return export_c(model, tmp_path_factory.mktemp("c"), real="float", name="step")
 
 
-def broken(source: CSource, folder: Path, pattern: str, instead: str) -> CSource:
-    """Return the code with one place written differently."""
-    code, count = re.subn(pattern, instead, source.source.read_text(encoding="utf-8"), count=1)
-    assert count == 1, pattern
+def broken(source: CSource, folder: Path, *faults: tuple[str, str, str]) -> CSource:
+    """Return the code with some places written differently: pattern, and what stands instead."""
+    code = source.source.read_text(encoding="utf-8")
+    for pattern, instead, _ in faults:
+        code, count = re.subn(pattern, instead, code, count=1)
+        assert count == 1, pattern
     for file in (source.header, source.source):
         (folder / file.name).write_bytes(file.read_bytes())
     (folder / source.source.name).write_text(code, encoding="utf-8")
@@ -47,29 +49,36 @@ def test_nothing_is_undefined_and_all_stays_finite(controller: CSource) -> None:
     assert proof.reached >= 0.95 * proof.statements > 100
 
 
+BROKEN = [
+    # The numbers of a table are read without the ends of its range.
+    (r"const float place_0 = above_0 < [^;]*;", "const float place_0 = above_0;", "alarms"),
+    # The next states are taken whether they are finite or not.
+    (r"if \((?:\(f\d+ - f\d+\)(?: \+ )?)+ >= 0\.0f\)", "if (f0 >= f0 - 1.0f || f0 < 1.0f)", "open_members"),
+    # An output is written behind the limit, or only sometimes.
+    (r"(outputs->motor\.current) = y0;", r"\1 = 1e30f;", "beyond"),
+    (r"(outputs->motor\.current) = y0;", r"if (y0 > 0.5f) { \1 = y0; }", "open_members"),
+    (r"(    const float u0 = [^\n]*\n)", r"\1    while (u0 > 0.5f) { }\n", "loops"),
+]
+
+
 @needs_prover
-@pytest.mark.parametrize(
-    ("pattern", "instead", "what"),
-    [
-        # The numbers of a table are read without the ends of its range.
-        (r"const float place_0 = above_0 < [^;]*;", "const float place_0 = above_0;", "alarms"),
-        # The next states are taken whether they are finite or not.
-        (
-            r"if \((?:\(f\d+ - f\d+\)(?: \+ )?)+ >= 0\.0f\)",
-            "if (f0 >= f0 - 1.0f || f0 < 1.0f)",
-            "open_members",
-        ),
-        # An output is written behind the limit, or only sometimes.
-        (r"(outputs->motor\.current) = y0;", r"\1 = 1e30f;", "beyond"),
-        (r"(outputs->motor\.current) = y0;", r"if (y0 > 0.5f) { \1 = y0; }", "open_members"),
-        (r"(    const float u0 = [^\n]*\n)", r"\1    while (u0 > 0.5f) { }\n", "loops"),
-    ],
-)
+def test_what_guards_keep_off_is_found_without_them(controller: CSource, tmp_path: Path) -> None:
+    faults = [BROKEN[i] for i in (0, 1, 2, 4)]
+    proof = prove_step(broken(controller, tmp_path, *faults))
+    for _, _, what in faults:
+        assert getattr(proof, what), what
+    assert not proof.holds
+
+
+# All of them in one proof: the test above.
+@pytest.mark.slow
+@needs_prover
+@pytest.mark.parametrize("fault", BROKEN, ids=lambda fault: fault[2])
 def test_what_a_guard_keeps_off_is_found_without_it(
-    controller: CSource, tmp_path: Path, pattern: str, instead: str, what: str
+    controller: CSource, tmp_path: Path, fault: tuple[str, str, str]
 ) -> None:
-    proof = prove_step(broken(controller, tmp_path, pattern, instead))
-    assert getattr(proof, what), what
+    proof = prove_step(broken(controller, tmp_path, fault))
+    assert getattr(proof, fault[2]), fault
     assert not proof.holds
 
 

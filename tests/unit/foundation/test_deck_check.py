@@ -15,6 +15,10 @@ from nlsdesign.foundation.errors import DeckError
 from nlsdesign.regeneration import readiness
 from tests.command_line import Run
 from tests.command_line import run as run
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 DECKS = [*deck_names(), *template_names()]
 COMMANDS: dict[str, tuple[str, ...]] = {

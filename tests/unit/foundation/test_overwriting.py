@@ -21,9 +21,10 @@ from nlsdesign.foundation.text_files import (
     write_text,
 )
 from tests.command_line import Run, run, two_machines
+from tests.undrawn import undrawn
 
-__all__ = ["run", "two_machines"]  # the fixtures
-pytestmark = pytest.mark.usefixtures("two_machines")
+__all__ = ["run", "two_machines", "undrawn"]  # the fixtures
+pytestmark = pytest.mark.usefixtures("two_machines", "undrawn")
 DECK = "austin2015_soft_spring"
 CALL = ("simulate", "--deck", DECK, "--stop", "20 ms", "--signals", "motor.angle", "--out", "o/run.csv")
 

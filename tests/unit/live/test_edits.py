@@ -33,6 +33,7 @@ from nlsdesign.live.gallery import gallery_cards, gallery_question, question_of_
 from nlsdesign.live.question import MOST_POINTS, LiveQuestion
 from nlsdesign.live.saved import SavedDesign, reopened, saved
 from nlsdesign.live.session_news import choices
+from nlsdesign.live.tasks import drop_task, follow_tasks, set_motor, set_task
 from nlsdesign.live.views import not_kept, unkept
 
 
@@ -256,6 +257,10 @@ def test_every_edit_is_read_from_its_message() -> None:
         edit(hold_number, "a.b"),
         edit(choose_material, "PMC-770"),
         edit(choose_deck, "test_rig"),
+        edit(set_task, 0, "ankle", 75.0, 0.01, 1.0),
+        edit(drop_task, 0),
+        edit(set_motor, "resistance", 0.3),
+        edit(follow_tasks),
     ):
         names = {change: name for name, change in EDITS.items()}
         message = {"edit": names[step.change], **step.fields}
@@ -278,6 +283,9 @@ def test_a_saved_question_reads_back_to_the_last_digit(question: LiveQuestion) -
         edit(set_number, "spring.rubber.rest_length", 0.0411),
         edit(free_number, "spring.rubber.area", 4e-5, 7e-5),
         edit(change_limit, "MaximumCamRadius", 0.0301),
+        edit(set_task, 0, "ankle", 71.3, 0.1 + 0.2),
+        edit(set_task, 1, "knee", 80.0, 0.01, 0.25),
+        edit(set_motor, "resistance", 0.31),
     ):
         asked = step.applied(asked)
     again, values = reopened(saved(asked, {"spring.pretension": 0.1 + 0.2}))
@@ -287,12 +295,18 @@ def test_a_saved_question_reads_back_to_the_last_digit(question: LiveQuestion) -
     assert again.free == asked.free
     assert again.ranges == asked.ranges
     assert again.title == asked.title
+    assert (again.tasks, again.motor) == (asked.tasks, asked.motor)
     assert {n: s.value for n, s in again.numbers.items()} == {n: s.value for n, s in asked.numbers.items()}
     texts = saved(asked, {})
     for changed in (
         SavedDesign(texts.deck, texts.job + 'MaximumTorqueError = {rms = "1 mN*m"}\n'),
         SavedDesign(texts.deck, texts.job.replace("spring.rubber.area", "spring.rubber.aera")),
         SavedDesign(texts.deck, texts.job, "title = "),
+        SavedDesign(texts.deck, texts.job, 'tasks = [["ankle", 75.0, "much", 1.0]]'),
+        SavedDesign(texts.deck, texts.job, 'tasks = [["ankle", 75.0]]'),
+        SavedDesign(texts.deck, texts.job, 'tasks = [["elbow", 75.0, 0.1, 1.0]]'),
+        SavedDesign(texts.deck, texts.job, "[motor]\ncolour = 1.0"),
+        SavedDesign(texts.deck, texts.job, "[motor]\nresistance = -1.0"),
         SavedDesign(texts.deck, "#" * 500_000),
     ):
         with pytest.raises(NlsError):

@@ -144,3 +144,74 @@ def test_the_list_says_once_why_some_decks_are_not_opened(tab: Tab) -> None:
     )
     said = [(label, set(disabled)) for label, disabled in groups if disabled]
     assert sorted(said) == sorted((f"cannot be opened: {reason}", names) for reason, names in closed.items())
+
+
+LIGHTS = "[...document.querySelectorAll('#lights li')].map((each) => [each.className, each.textContent])"
+CHOOSE = """(() => {{
+  const select = document.querySelectorAll('.task select')[{0}];
+  select.value = {1!r};
+  select.dispatchEvent(new Event('change'));
+}})()"""
+CELLS = "(row) => [...row.children].map((cell) => cell.textContent)"
+PAID = f"[...document.querySelectorAll('.paid tbody tr')].map({CELLS})"
+TYPED = """(() => {{
+  const field = document.querySelector('[aria-label^="{0}"]');
+  field.value = {1!r};
+  field.dispatchEvent(new Event('change'));
+}})()"""
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_one_light_of_three_questions_stands_at_one_place_before_the_check_and_after(
+    tab: Tab, width: int
+) -> None:
+    tab.look(width, height=850)
+    tab.until(CHECKED, seconds=120)
+    tab.until(f"{LIGHTS}.every((each) => each[0] === 'yes')")
+    place = "['top', 'height'].map((side) => document.getElementById('lights').getBoundingClientRect()[side])"
+    checked = tab.evaluate(place)
+    assert [words for _, words in tab.evaluate(LIGHTS)] == ["✓can be made", "✓will hold", "✓will be known"]
+    assert tab.evaluate("document.getElementById('lights').classList.contains('yes')")
+    assert "bench" in tab.evaluate("document.getElementById('reasons').textContent")
+    before = tab.evaluate("document.querySelectorAll('.point:not(.names):not(.scale) input')[3].value")
+    tab.evaluate(TYPED.format("Point 2: torque", "0.079"))
+    tab.until(f"{LIGHTS}.every((each) => each[0] === 'open')")
+    assert tab.evaluate("document.getElementById('lights').classList.contains('open')")
+    assert tab.evaluate(place) == checked
+    cut = "[...document.querySelectorAll('#lights li')].some((each) => each.scrollWidth > each.clientWidth)"
+    assert not tab.evaluate(cut)
+    tab.evaluate(TYPED.format("Point 2: torque", before))
+    tab.until(CHECKED, seconds=120)
+
+
+def test_a_joint_is_chosen_and_what_the_motor_pays_stands_beside_the_curve(tab: Tab) -> None:
+    tab.look(1400, height=850)
+    assert tab.evaluate("document.querySelector('.paid').parentElement.hidden")
+    tab.evaluate(CHOOSE.format(0, "ankle"))
+    tab.until(f"{PAID}.length === 5", seconds=60)
+    assert all(row[1] == "–" for row in tab.evaluate(PAID) if len(row) == 4)
+    assert "no resistance" in tab.evaluate(
+        "document.querySelector('#task .row > :last-child .job').textContent"
+    )
+    tab.evaluate(TYPED.format("Motor: winding resistance", "0,3"))
+    tab.until(f"{PAID}.some((row) => Number(row[1]) > 0)", seconds=60)
+    tab.evaluate(
+        "[...document.querySelectorAll('#task button')].find((b) => b.textContent.startsWith('Take')).click()"
+    )
+    tab.until("document.querySelectorAll('.point:not(.names):not(.scale)').length > 7", seconds=60)
+    tab.until(f"{PAID}.at(-1).length === 4 && Number({PAID}.at(-1)[1]) > 0", seconds=60)
+    rows = {name: [float(each) for each in numbers] for name, *numbers in tab.evaluate(PAID)}
+    assert rows["least heat"][0] <= rows["this design"][0] < rows["no spring"][0]
+    assert "least heat for the task" in tab.evaluate("document.querySelector('#torque .key').textContent")
+    tab.evaluate(TYPED.format("Task 1: assistance", "much"))
+    assert "no number" in tab.evaluate("document.querySelector('#task .wrong').textContent")
+    tab.evaluate(CHOOSE.format(1, "knee"))
+    tab.until("document.querySelectorAll('.task').length === 3", seconds=60)
+    tab.look(390, height=850)
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    tab.look(1400, height=850)
+    for _ in range(2):
+        tab.evaluate("document.querySelector('.task button').click()")
+        tab.until("document.body.dataset.busy === 'false'")
+    tab.until("document.querySelectorAll('.task').length === 1")
+    assert tab.evaluate("document.querySelector('.paid').parentElement.hidden")

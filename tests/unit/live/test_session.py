@@ -414,6 +414,10 @@ EDITS: list[dict[str, Any]] = [
     {"edit": "HoldNumber", "name": "spring.cam.contour"},
     {"edit": "FreeNumber", "name": "spring.cam.contour"},
     {"edit": "ChooseMaterial", "material": "Dragon_Skin_30"},
+    {"edit": "SetTask", "index": 0, "joint": "ankle", "body_mass": 75.0},
+    {"edit": "SetMotor", "name": "resistance", "value": 0.3},
+    {"edit": "FollowTasks"},
+    {"edit": "DropTask", "index": 0},
     {"edit": "ChooseDeck", "name": "one-sided-finger"},
 ]
 

@@ -139,6 +139,7 @@ VIEWS: dict[str, Callable[[FlatModel], FlatModel]] = {
 }
 
 
+@pytest.mark.long_cases("default observer")
 @pytest.mark.parametrize("view", VIEWS)
 def test_what_is_derived_from_a_model_carries_its_origin(view: str) -> None:
     plant = flatten(bundled())

@@ -50,8 +50,10 @@ from tests import observed as ob
 from tests.cam_cases import KEEP, TARGET
 from tests.command_line import Run, run
 from tests.selection import quick_only
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def motor() -> GearedMotor:
@@ -251,7 +253,7 @@ def test_records_of_another_machine_are_used_or_one_sentence_says_why(
 ) -> None:
     """A drive of two inertias, its encoder and the torque on its rotor: one record of its own motion."""
     drive = declare(load_deck(decks["two_inertias"]))
-    time = np.arange(0.0, 2.0, 1e-3)
+    time = np.arange(0.0, 1.0, 1e-3)
     torque = 0.3 * np.sin(40.0 * time)
     trace = simulate(flatten(drive), time, inputs={"rotor.torque": torque})
     reading = measure(trace, drive, seed=1)["dial.reading"]

@@ -14,6 +14,10 @@ from nlsdesign.presentation.sweep_report.shown_points import shown_unit
 from nlsdesign.sweeps import FunctionQuestion, GridAxis, LatinHypercube, SobolSample, sweep
 from nlsdesign.sweeps.axes import AxisSet
 from tests.sweeping import AREA, INERTIA, actuator
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 pytest.importorskip("SALib")
 

@@ -176,7 +176,7 @@ def test_every_effect_changes_its_machine_and_scales_with_its_strength() -> None
         built(KINDS["belt_axis"], ("no_such",), 1.0, 1)
 
 
-@pytest.mark.long_cases("elastic_joint", "direct_drive", "belt_axis", "screw_carriage")
+@pytest.mark.long_cases("elastic_joint", "direct_drive", "belt_axis", "screw_carriage", "rack_carriage")
 @pytest.mark.parametrize("kind", [name for name in ALL_KINDS if not name.startswith("mujoco")])
 def test_the_files_of_a_case_are_what_the_package_reads(kind: str, tmp_path: Path) -> None:
     condition = CONDITIONS[ALL_KINDS.index(kind) % len(CONDITIONS)]

@@ -16,18 +16,25 @@ from nlsdesign.bench.identification.parameters import declared_parameter
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import ROTATION, Assembly, Encoder, Fixed, GearedMotor, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.feedback.control import ClosedLoop, torque_controller
+from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.foundation.quantity import Quantity
-from nlsdesign.model import flatten
+from nlsdesign.model import FlatModel, flatten
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.diagnosis_sections import regeneration_sections
 from nlsdesign.regeneration import (
     ObserverChoice,
     Regeneration,
     regenerate,
+    regenerated_controller,
     regenerated_observer,
     write_regeneration,
 )
 from nlsdesign.simulation import Trace
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 TIME = np.arange(800) * 0.002
 ANGLE = 0.3 * np.sin(4.0 * TIME)
@@ -94,17 +101,30 @@ def test_over_the_spread_the_declared_numbers_scatter_and_the_fitted_hardly(resu
 
 
 def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Path) -> None:
-    nominal, spread, learning, generated = result.words()
+    nominal, spread, learning, generated, tracked, taken = result.words()
     assert nominal.startswith("Error of the observer of `spring.torque` with the nominal numbers")
     assert nominal.endswith(" N·m.")
     assert "over the spread" in spread
     assert "that learns" in learning
     assert "on the records that decide (fit)" in generated
+    assert "before → after" in tracked
+    assert taken.startswith("The controller is that of the better model")
     assert (len(result.observer.states) > 20) == generated.startswith("Generated is the corrected")
     written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert written["nominal"]["before"] == result.nominal[0]
     page = report.write_report(tmp_path / "r.html", *regeneration_sections(result, {}), title="t")
     assert nominal.partition(": ")[2].removesuffix(".") in page.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def observer_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One draw of the numbers and no controller, whose margins take seconds."""
+
+    def none(*_: object) -> None:
+        raise ArrangementError("the controller", "is not the point here")
+
+    monkeypatch.setattr(regenerated_observer, "DRAWS", 1)
+    monkeypatch.setattr(regenerated_observer, "regenerated_controller", none)
 
 
 def with_records(*records: tuple[str, float]) -> RecordSet:
@@ -117,9 +137,9 @@ def with_records(*records: tuple[str, float]) -> RecordSet:
     return RecordSet(tuple(made), bench(*ALL).columns)
 
 
-def test_held_out_records_decide_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("observer_alone")
+def test_held_out_records_decide_nothing() -> None:
     """On the selection the better model is right; the record held out is of the declared machine."""
-    monkeypatch.setattr(regenerated_observer, "DRAWS", 1)
     records = with_records(("fit", TRUE), ("selection", TRUE), ("held_out", DECLARED))
     declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
     found = regenerate(declared, better, records, choice=CHOICE)
@@ -130,8 +150,8 @@ def test_held_out_records_decide_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
     assert "not replaced" not in found.chosen
 
 
-def test_an_observer_that_would_be_worse_replaces_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(regenerated_observer, "DRAWS", 1)
+@pytest.mark.usefixtures("observer_alone")
+def test_an_observer_that_would_be_worse_replaces_nothing() -> None:
     records = with_records(("fit", TRUE), ("selection", DECLARED), ("held_out", TRUE))
     declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
     found = regenerate(declared, better, records, choice=CHOICE)
@@ -146,11 +166,52 @@ def test_observer_and_plant_are_written(
 ) -> None:
     monkeypatch.setattr(export, "export_fmu", lambda model, path: path)
     written, files = write_regeneration(result, tmp_path)
-    assert {p.name for p in files} >= {"observer.c", "observer.h", "observer.fmu", "plant.fmu"}
+    assert {p.name for p in files} >= {
+        "observer.c",
+        "controller.c",
+        "observer.fmu",
+        "controller.fmu",
+        "plant.fmu",
+    }
     assert written.reasons == ()
     saved = json.loads((tmp_path / "regeneration.json").read_text(encoding="utf-8"))
     assert saved["files"] == [str(path) for path in files]
     assert (tmp_path / "c" / "observer.c").is_file()
+
+
+def test_the_controller_of_the_better_model_follows_it_better(result: Regeneration) -> None:
+    """The torque of a spring that is a fifth stiffer than declared is estimated a sixth too small."""
+    controller = result.controller
+    assert controller is not None
+    assert controller.kept == ""
+    assert controller.controller.origin == result.plant.origin
+    for sine in controller.sines:
+        wanted = sine.amplitude / math.sqrt(2.0)
+        assert sine.after < 0.5 * sine.before
+        assert sine.before > (1.0 - DECLARED / TRUE) * 0.8 * wanted
+    assert controller.words()[0].startswith("Torque error of the better model under observer and controller")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "stays"),
+    [(1.0, 1.01, False), (1.0, 1.03, True), (1.0, math.nan, True), (math.nan, 1.0, False)],
+)
+def test_a_controller_that_follows_worse_or_hunts_replaces_nothing(
+    before: float, after: float, stays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def error(loop: ClosedLoop, *_: float) -> float:
+        return after if loop.controller.origin == better.origin else before
+
+    def usual(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
+        return torque_controller(model, sample_time=sample_time), "margins"
+
+    monkeypatch.setattr(regenerated_controller, "sine_error", error)
+    monkeypatch.setattr(regenerated_controller, "usual_controller", usual)
+    declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
+    chosen = regenerated_controller.regenerated_controller(declared, better, 2e-3)
+    assert bool(chosen.kept) == stays
+    assert chosen.controller.origin == (declared if stays else better).origin
+    assert chosen.words()[1].startswith("The controller stays" if stays else "The controller is that of the")
 
 
 def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:
@@ -164,6 +225,7 @@ def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:
     assert regeneration_sections(lacking, {})
 
 
+@pytest.mark.usefixtures("observer_alone")
 def test_without_a_measured_torque_there_is_an_observer_but_no_error() -> None:
     model = flatten(machine(TRUE))
     lacking = regenerate(model, model, bench(*ALL[:2]), choice=CHOICE)

@@ -18,8 +18,10 @@ from nlsdesign.sweeps import (
 )
 from nlsdesign.sweeps.sweep_file import read_sweep_file
 from tests.command_line import Run, run
+from tests.undrawn import undrawn
 
-__all__ = ["run"]
+__all__ = ["run", "undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 AXES = """
 [[axes]]
 GridAxis = {name = "motor.inertia", lower = "1e-6 kg*m^2", upper = "2 mg*m^2", count = 3}

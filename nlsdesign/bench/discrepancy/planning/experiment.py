@@ -25,8 +25,8 @@ from ....model import FlatModel, flatten
 from ....model.readings import reading_of
 from ....model.structure import MovingBody, body_moved_by
 from ....simulation import Trace, simulate
-from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_noise import LEAST_ROWS, BlockNoise, block_noise
+from ...identification.equation_error.block import Block, NoiseFloor
+from ...identification.equation_error.block_noise import LEAST_ROWS, noise_floor
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import Record
@@ -399,12 +399,12 @@ class _Plan:
         score = sum(math.log1p(0.5 * s.standard_errors**2) for s in separations)
         return _Judged(record, tuple(separations), score)
 
-    def _floors(self, record: Record) -> dict[str, BlockNoise]:
+    def _floors(self, record: Record) -> dict[str, NoiseFloor]:
         bench = self._bench
         floors = {
-            b.name: block_noise(b, record, bench.noise, bench.filters[b.name])
+            b.name: noise_floor(b, record, bench.noise, bench.block_noise[b.name].filters)
             for b in self._blocks
-            if b.name in self._open and b.name in bench.filters
+            if b.name in self._open and b.name in bench.block_noise
         }
         return {name: f for name, f in floors.items() if len(f.sigma) >= LEAST_ROWS}
 
@@ -458,7 +458,7 @@ def _noise(best: Hypothesis, bench: Bench) -> Values:
     """
     fitted = {r.name for r in bench.records.of("fit")}
     result = {}
-    for name in dict.fromkeys(block for block, _ in bench.floors):
+    for name in bench.block_noise:
         own = [t for (block, record), t in best.tallies.items() if block == name and record in fitted]
         rows = sum(t.rows for t in own)
         size = sum(t.squares for t in own) / max(rows, 1)

@@ -22,7 +22,7 @@ import scipy
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError
-from ...identification.equation_error.block_noise import BlockNoise
+from ...identification.equation_error.block import NoiseFloor
 from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit
@@ -67,7 +67,7 @@ class ReadyHypothesis:
     information: Mapping[str, Array]
     values: tuple[Values, ...]  # fitted numbers, and others with which it explains the records so far as well
 
-    def responses(self, record: Record, floors: Mapping[str, BlockNoise]) -> list[dict[str, BlockResponse]]:
+    def responses(self, record: Record, floors: Mapping[str, NoiseFloor]) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of the numbers that the hypothesis may have.
 
         ``floors``: by the name of the block; blocks without one are left out.
@@ -75,7 +75,7 @@ class ReadyHypothesis:
         return self.at(record, floors, self.values)
 
     def at(
-        self, record: Record, floors: Mapping[str, BlockNoise], values: Sequence[Values]
+        self, record: Record, floors: Mapping[str, NoiseFloor], values: Sequence[Values]
     ) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of some numbers."""
         result: list[dict[str, BlockResponse]] = [{} for _ in values]
@@ -213,7 +213,8 @@ class _Total:
         total = float(np.sum(np.square(deviations)))
         gradient, matrix = weights * np.array(deviations), np.diag(weights**2)
         for record in bench.records.of("fit"):
-            floors = {b: f for (b, n), f in bench.floors.items() if n == record.name and b in blocks}
+            read = {b: bench.block_noise[b].floors for b in bench.block_noise if b in blocks}
+            floors = {b: each[record.name] for b, each in read.items() if record.name in each}
             try:
                 (answers,) = rival.at(record, floors, [values])
             except ConvergenceError:

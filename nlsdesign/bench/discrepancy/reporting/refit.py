@@ -22,7 +22,7 @@ from ...identification.equation_error.evidence import Bench
 from ...identification.least_squares import Fit
 from ...identification.multiple_shooting import coloured_sigma, fit_by_simulation, predict_in_windows
 from ...identification.parameters import declared_parameter
-from ...identification.records.measurement import Record, RecordSet, in_canonical_order
+from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.residuals import rmse
 from ...identification.simulation_error import Shots, Weights
@@ -247,7 +247,7 @@ def refit(
     """
     progress("refitting the declared numbers")
     bench = Bench(records, blocks_of(flatten(actuator), records.signals))
-    records = in_canonical_order(records)
+    records = records.in_canonical_order()
     comparison = Comparison(bench, typical_sizes(actuator, bench.records))
     fitted = comparison.base(actuator)
     if not any(fit.parameters for fit in fitted.fits.values()):

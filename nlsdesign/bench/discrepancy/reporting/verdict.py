@@ -541,4 +541,6 @@ def _shapes(hypothesis: Hypothesis, comparison: Comparison, block: str) -> dict[
     signals = {s: gathered(s, 0) for s in bench.records.signals}
     motion = next((s for s in bench.records.signals if bench.noise.rounded[s]), bench.records.signals[0])
     time = np.concatenate([(e.record.trace.time - e.record.trace.time[0])[e.floor.places] for e in judged])
-    return shapes(error, signals, speed=gathered(motion, 1), time=time, step=bench.filters[block].spacing)
+    return shapes(
+        error, signals, speed=gathered(motion, 1), time=time, step=bench.block_noise[block].filters.spacing
+    )

@@ -6,6 +6,7 @@ A hypothesis is fitted in groups of blocks that share free numbers.
 from __future__ import annotations
 
 import itertools
+import math
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,8 +19,7 @@ from ....foundation.errors import ConvergenceError, unknown_name
 from ....foundation.quantity import Quantity
 from ....foundation.work_sharing import parallel_map
 from ....model import Variable, flatten
-from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_noise import BlockNoise
+from ...identification.equation_error.block import Block, NoiseFloor
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.least_squares import Fit
@@ -186,6 +186,8 @@ class HypothesisFit:
             min(high, variable.maximum),
             "log" if log else "linear",
             1.0 if log else 0.1 * (high - low),
+            # Up to that size something plainer may be a part of the number, each size as likely.
+            confounded=least / math.sqrt(3.0),
         )
 
 
@@ -212,7 +214,7 @@ class Judged:
     # block, record, floor: which block, which record, and how it is read
     block: Block
     record: Record
-    floor: BlockNoise
+    floor: NoiseFloor
     predicted: Array  # unfiltered output over the record
     residual: Array  # filtered error in units of the noise floor
 

@@ -76,6 +76,19 @@ class Hypothesis:
         errors = {p.name: fit.standard_error(p.name) for fit in self.fits.values() for p in fit.parameters}
         return replace(self, values={n: to_resolution(v, errors.get(n, 0.0)) for n, v in self.values.items()})
 
+    def as_known_beside(self, left: Mapping[str, Excess]) -> Hypothesis:
+        """Return the hypothesis with its numbers as known as they are beside what blocks leave open.
+
+        ``left``: excess by block. What a model lacks misses alike throughout a record, as noise does not.
+        """
+        fits = {
+            names: replace(fit, covariance=fit.covariance if fit.by_records is None else fit.by_records)
+            if any(left[name].open for name in names if name in left)
+            else fit
+            for names, fit in self.fits.items()
+        }
+        return replace(self, fits=fits)
+
     def with_names_held(self) -> Hypothesis:
         """Return the hypothesis with the numbers of its effects in the assembly, where no fit moves them."""
         names = [u.name for u in self.unknowns]
@@ -107,14 +120,15 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Cr
     rows = sum(t.rows for t in tallies.values())
     effective = sum(t.effective_size for t in tallies.values())
     fitted, predicted = sum(t.squares for t in tallies.values()), sum(t.predicted for t in tallies.values())
-    floor, known_from = bench.typical_floor(block), bench.known_from(block)
+    read = bench.block_noise[block]
+    floor, known_from = read.typical, read.known
 
     def is_open(squares: float, count: int, independent: float) -> bool:
         return criteria.is_beyond_noise(squares / max(count, 1), independent, known_from)
 
     return Excess(
         block,
-        bench.units[block],
+        read.block.unit,
         floor,
         floor * math.sqrt(fitted / max(rows, 1)),
         floor * math.sqrt(predicted / max(rows, 1)),

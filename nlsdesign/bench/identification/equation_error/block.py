@@ -5,16 +5,18 @@ A signal may come late: the block then reads it ahead, by a number that may be f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from ....foundation.arrays import Array
-from ....foundation.errors import MeasurementError
 from ....model import FlatModel
+from ..filters import Smoothing
 
 
 class Drive(NamedTuple):
@@ -68,25 +70,71 @@ class Block:
         return self.model.outputs[0].unit
 
 
-def advanced(time: Array, signal: Array, delay: Array) -> tuple[Array, Array]:
-    """Return a signal read later by linear interpolation, and the slope of the line it is read from."""
-    slopes = np.append(np.diff(signal) / np.diff(time), 0.0)
-    place = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
-    return np.interp(time + delay, time, signal), slopes[place]
+class Filters(NamedTuple):
+    """How a block reads its records."""
+
+    width: float  # standard deviation in s of the zero-phase Gaussian filter that every term passes
+    span: float  # time in s over which rates are taken
+    spacing: float  # time in s from one row to the next
+    straightened: tuple[str, ...] = ()  # names of the inputs whose noise the block rectifies, see rectified
 
 
-def late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
-    """Return the drives that a free parameter shifts in time."""
-    return [d for d in block.drives.values() if set(d.shifted_by) & set(free)]
+@dataclass(frozen=True, eq=False)
+class NoiseFloor:
+    """What a block makes of the noise of a record: the filter it reads through, and the floor behind it.
+
+    ``filter`` is a zero-phase filter, thinned, without the rows that say nothing; its shape is (rows, n).
+    ``sigma`` is the noise floor of each row in the unit of the block, ``raw_sigma`` that of each unfiltered
+    sample, shape (n,), which only blocks with a target use. Its own noise makes at most ``independent``
+    independent rows of them. The floor is known from ``known`` effective squares of that noise. Both are
+    infinite where the noise is white. The rows hold the share ``covered`` of the power of the motion.
+    """
+
+    filter: Smoothing
+    sigma: Array
+    raw_sigma: Array
+    independent: float = math.inf
+    known: float = math.inf
+    covered: float = 1.0
+    # shares: of the variance of the floor, from the noise of each signal that is taken as it is
+    shares: Mapping[str, float] = field(default_factory=dict)
+    width: float = 0.0  # standard deviation of the filter in s
+
+    @property
+    def typical(self) -> float:
+        """Noise floor over the rows, root mean square, in the unit of the block."""
+        return float(np.sqrt(np.mean(self.sigma**2)))
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Index of the sample in the middle of each row."""
+        return self.filter.places
 
 
-def free_delay(drive: Drive, free: Sequence[str]) -> str:
-    """Return the one delay of a signal that is free; of several, records show the sum alone."""
-    names = [name for name in drive.shifted_by if name in free]
-    if len(names) > 1:
-        raise MeasurementError(
-            f"signal '{drive.signal}'",
-            f"is delayed by {' and by '.join(names)}, both free, which cannot be told apart",
-            next_step="let one of them free, and give the other a number without a spread",
-        )
-    return names[0]
+@dataclass(frozen=True, eq=False)
+class BlockNoise:
+    """How a block reads the records of a bench, and what it makes of their noise.
+
+    ``floors``: by name of the record; one that says nothing of the block has none.
+    """
+
+    block: Block
+    filters: Filters
+    floors: Mapping[str, NoiseFloor]
+
+    @property
+    def typical(self) -> float:
+        """Noise floor over all records, root mean square, in the unit of the block."""
+        rows = np.concatenate([floor.sigma for floor in self.floors.values()])
+        return float(np.sqrt(np.mean(rows**2)))
+
+    @property
+    def known(self) -> float:
+        """Effective squares of noise from which the floor is known."""
+        # One estimate of the noise serves all records, so more of them make it no better.
+        doubt = float(np.mean([1.0 / floor.known for floor in self.floors.values()]))
+        return 1.0 / doubt if doubt else math.inf
+
+    def read_by(self, block: Block) -> BlockNoise:
+        """Return the same of another model of the block, in the scale of the declared one."""
+        return replace(self, block=block.scaled_to(self.block.effort_per_drive))

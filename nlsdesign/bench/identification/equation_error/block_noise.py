@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -42,11 +42,11 @@ from numpy.typing import NDArray
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
-from ..filters import Smoothing, blurred, difference, filter_weights, filtered, kernel, smoothing
+from ..filters import Smoothing, blur_weights, difference, filter_weights, filtered, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
 from .batch import ColumnFunction
-from .block import Block, Drive
+from .block import Block, BlockNoise, Drive, Filters, NoiseFloor
 from .noise import Noise, NoisePart, independent_number
 
 READING, BALANCE = 0.1, 0.2
@@ -74,8 +74,6 @@ _LIMIT_NOISE = 0.3
 _LEAST_SPAN = 8.0
 """Samples in such a span, at least."""
 _STEP = 2.0**0.25
-_BLUR_REACH = 2.0
-"""Spans to each side of a sample in which it has a part in what the span of a rate takes."""
 _BLURRED = 0.05
 """Mean square of what the span of a rate takes from a residual, in that of its noise, up to which it is let
 pass: a block is open from a mean square of about 1.2 on."""
@@ -100,94 +98,77 @@ LEAST_COVERED = 0.25
 standard errors of what is in proportion to it are then twice those of the whole motion."""
 
 
-class Filters(NamedTuple):
-    """How a block reads its records."""
-
-    width: float  # standard deviation in s of the zero-phase Gaussian filter that every term passes
-    span: float  # time in s over which rates are taken
-    spacing: float  # time in s from one row to the next
-    straightened: tuple[str, ...] = ()  # names of the inputs whose noise the block rectifies, see rectified
-
-
-@dataclass(frozen=True, eq=False)
-class BlockNoise:
-    """What a block makes of the noise of a record: the filter it reads through, and the floor behind it.
-
-    ``filter`` is a zero-phase filter, thinned, without the rows that say nothing; its shape is (rows, n).
-    ``sigma`` is the noise floor of each row in the unit of the block, ``raw_sigma`` that of each unfiltered
-    sample, shape (n,), which only blocks with a target use. Its own noise makes at most ``independent``
-    independent rows of them. The floor is known from ``known`` effective squares of that noise. Both are
-    infinite where the noise is white. The rows hold the share ``covered`` of the power of the motion.
-    """
-
-    filter: Smoothing
-    sigma: Array
-    raw_sigma: Array
-    independent: float = math.inf
-    known: float = math.inf
-    covered: float = 1.0
-    # shares: of the variance of the floor, from the noise of each signal that is taken as it is
-    shares: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def typical(self) -> float:
-        """Noise floor over the rows, root mean square, in the unit of the block."""
-        return float(np.sqrt(np.mean(self.sigma**2)))
-
-    @property
-    def places(self) -> NDArray[np.int64]:
-        """Index of the sample in the middle of each row."""
-        return self.filter.places
-
-
 def noise_of_blocks(
     blocks: Sequence[Block], records: RecordSet, noise: Noise, given: Mapping[str, Filters]
-) -> tuple[dict[str, Filters], dict[tuple[str, str], BlockNoise]]:
-    """Return the filters of each block, and its noise on each record, by block and record.
+) -> dict[str, BlockNoise]:
+    """Return how each block reads the records, by its name.
 
     Filters that were given are not chosen again. A MeasurementError is raised if no record moves enough to
     say anything about a block, or if the channel that a block predicts has no noise.
     """
-    filters = dict(given)
-    new = [block for block in blocks if block.name not in filters]
-    pace_by_order = paces(new, records.deciding, noise)
+    new = [block for block in blocks if block.name not in given]
+    pace_by_order, filters = paces(new, records.deciding, noise), dict(given)
     for block in blocks:
         _check_alive(block, records, noise)
         if block.name not in filters:
             filters[block.name] = chosen_filters(block, records.deciding, noise, pace_by_order)
-    floors: dict[tuple[str, str], BlockNoise] = {}
-    for block in blocks:
-        seen = {r.name: block_noise(block, r, noise, filters[block.name]) for r in records.records}
-        floors |= {(block.name, r): floor for r, floor in seen.items() if len(floor.sigma) >= LEAST_ROWS}
-        if not any(name == block.name for name, _ in floors):
-            raise MeasurementError(
-                f"block '{block.name}'",
-                "no record moves enough to say anything about it",
-                next_step=_needed_motion(block, records, noise, filters[block.name]),
-            )
-    for block in new:
-        straightened = set[str]()
-        for record in records.deciding:
-            if (block.name, record.name) in floors:
-                shifts = rectified(block, record, noise, filters[block.name].span)
-                most = _RECTIFIED * floors[block.name, record.name].typical
-                straightened |= {name for name, shift in shifts.items() if shift > most}
-        filters[block.name] = filters[block.name]._replace(straightened=tuple(sorted(straightened)))
-    return filters, floors
+    read = {block.name: block_noise(block, records, noise, filters[block.name]) for block in blocks}
+    return read | {b.name: _straightened(read[b.name], records.deciding, noise) for b in new}
 
 
-def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) -> BlockNoise:
+def block_noise(block: Block, records: RecordSet, noise: Noise, filters: Filters) -> BlockNoise:
+    """Return how a block reads records through some filters; a MeasurementError if none says anything."""
+    floors = {record.name: noise_floor(block, record, noise, filters) for record in records.records}
+    floors = {name: floor for name, floor in floors.items() if len(floor.sigma) >= LEAST_ROWS}
+    if not floors:
+        raise MeasurementError(
+            f"block '{block.name}'",
+            "no record moves enough to say anything about it",
+            next_step=_needed_motion(block, records, noise, filters),
+        )
+    return BlockNoise(block, filters, floors)
+
+
+def _straightened(read: BlockNoise, records: Sequence[Record], noise: Noise) -> BlockNoise:
+    """Return the same with the inputs whose noise the block rectifies by too much of its floor."""
+    inputs = set[str]()
+    for record in (r for r in records if r.name in read.floors):
+        shifts = rectified(read.block, record, noise, read.filters.span)
+        most = _RECTIFIED * read.floors[record.name].typical
+        inputs |= {name for name, shift in shifts.items() if shift > most}
+    return replace(read, filters=read.filters._replace(straightened=tuple(sorted(inputs))))
+
+
+class _Course(NamedTuple):
+    """A block along a record."""
+
+    inputs: Array  # shape (inputs, n)
+    slopes: Array  # of the output by each input, on every k-th sample
+    at: NDArray[np.int64]  # which of these stands for each sample, shape (n,)
+    spacing: float  # time between them in s
+
+
+def _course(block: Block, record: Record, filters: Filters) -> _Course:
+    stride = max(1, round(filters.spacing / record.step))
+    inputs = measured_inputs(block, record, filters.span)
+    slopes = output_slopes(block, inputs, stride)
+    at = np.minimum(np.arange(inputs.shape[1]) // stride, slopes.shape[1] - 1)
+    return _Course(inputs, slopes, at, stride * record.step)
+
+
+def noise_floor(
+    block: Block, record: Record, noise: Noise, filters: Filters, course: _Course | None = None
+) -> NoiseFloor:
     """Return what a block makes of the noise of a record.
 
     The noise of each input is carried to the output by the slope of the output with respect to it. Slow
-    noise is remembered only where the block does not take rates of it.
+    noise is remembered only where the block does not take rates of it. ``course``: of the block along the
+    record, where it is known.
     """
     step, width, span = record.step, filters.width, filters.span
+    inputs, gains, at, spacing = course or _course(block, record, filters)
     noise = noise.in_record(record.name)
-    stride = max(1, round(filters.spacing / step))
-    inputs = measured_inputs(block, record, span)
     rows, covered = _rows(block, record, noise, filters, inputs)
-    gains = output_slopes(block, inputs, stride)
     own = noise.behind(block.target, step, width=width) if block.target else 0.0
     variance = np.full(gains.shape[1], own**2)
     raw = np.full(gains.shape[1], noise.deviation(block.target) ** 2 if block.target else 0.0)
@@ -211,8 +192,7 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
             powers[drive.signal] = powers.get(drive.signal, 0.0) + power
             parts = noise.memory(drive.signal, step, width=width)
             memory += [NoisePart(float(np.mean(gains[i] ** 2)) * p.variance, p.time) for p in parts]
-    every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
-    variance, raw, spacing = variance[every_row], raw[every_row], stride * step
+    variance, raw = variance[at], raw[at]
     shares = [NoisePart(p.variance / float(np.mean(variance)), p.time) for p in memory]
     heard = {drive.signal for drive in block.drives.values() if drive.order == 0}
     heard |= {block.target} if block.target else set()
@@ -224,7 +204,7 @@ def block_noise(block: Block, record: Record, noise: Noise, filters: Filters) ->
     known = min(squares, default=math.inf)
     sigma = np.sqrt(variance[rows.places])
     own_shares = {signal: power / float(np.mean(sigma**2)) for signal, power in powers.items() if len(sigma)}
-    return BlockNoise(rows, sigma, np.sqrt(raw), independent, known, covered, own_shares)
+    return NoiseFloor(rows, sigma, np.sqrt(raw), independent, known, covered, own_shares, width)
 
 
 def _rows(
@@ -516,22 +496,16 @@ def _blur(block: Block, record: Record, noise: Noise, filters: Filters) -> Array
 
     Less what noise alone makes of them; so they may be negative.
     """
-    step, span = record.step, filters.span
-    floor, inputs = block_noise(block, record, noise, filters), measured_inputs(block, record, span)
-    stride = max(1, round(filters.spacing / step))
-    gains = output_slopes(block, inputs, stride)
-    every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
-    taken, own = np.zeros(inputs.shape[1]), np.zeros(len(floor.sigma))
-    one = np.zeros(2 * math.ceil(_BLUR_REACH * span / step) + 1)
-    one[len(one) // 2] = 1.0
-    of_noise = np.convolve(kernel(filters.width / step), blurred(one, step, span=span))
+    step, span, course = record.step, filters.span, _course(block, record, filters)
+    floor = noise_floor(block, record, noise, filters, course)
+    taken, own = np.zeros(len(record.trace)), np.zeros(len(floor.sigma))
+    of_noise = float(np.linalg.norm(blur_weights(filters.width, step, span)))
     for i, variable in enumerate(block.model.inputs):
         drive = block.drives.get(variable.name)
         if drive is not None and drive.order == 1:
-            gain = gains[i][every_row]
-            taken += gain * blurred(record.at_samples(drive.signal), step, span=span)
-            scatter = noise.deviation(drive.signal) * float(np.linalg.norm(of_noise))
-            own += (gain[floor.places] * scatter) ** 2
+            gain = course.slopes[i][course.at]
+            taken += gain * record.blur(drive.signal, span)
+            own += (gain[floor.places] * (noise.deviation(drive.signal) * of_noise)) ** 2
     squares: Array = ((floor.filter @ taken) ** 2 - own) / floor.sigma**2
     return squares
 

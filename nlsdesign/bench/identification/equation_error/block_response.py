@@ -9,13 +9,13 @@ import casadi as ca
 import numpy as np
 
 from ....foundation.arrays import Array, Indices
-from ....foundation.errors import ConvergenceError, unknown_name
+from ....foundation.errors import ConvergenceError, MeasurementError, unknown_name
 from ....foundation.symbolic import Expression, dependence
 from ..filters import smoothed, without_rounding
 from ..records.measurement import Record
 from .batch import ChainFunction, ColumnFunction, PointFunction
-from .block import Block, advanced, free_delay, late_drives
-from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, placed, rosenbrock_step, stages_of
+from .block import Block, Drive
+from .stepping import STIFF, BlockEquations, stages_of, step_functions
 
 _PROBES = 50
 """Samples at which it is looked how fast a block is."""
@@ -57,21 +57,12 @@ class _Walk(NamedTuple):
     instructions: int
 
 
-class _Equations(NamedTuple):
-    """A block's expressions: f(x, v, p), y(x, v, p), and v as functions of inputs and their rates.
+class _Digest(NamedTuple):
+    """What neither states nor free parameters enter, as functions of inputs and their rates: v."""
 
-    Everything that neither state nor free parameter enters is worked out once per record: that is v.
-    """
-
-    state: Expression
-    digested: Expression
-    parameter: Expression
-    now: Expression
-    derivative: Expression
-    output: Expression
-    digest: ca.Function
-    shifted: Indices  # which of v come from an input that a free delay shifts
-    digest_shifted: ca.Function  # these alone
+    whole: ca.Function
+    late: Indices  # which of v come from an input that a free delay shifts
+    of_late: ca.Function  # these alone
 
 
 class DrivenBlock:
@@ -105,10 +96,11 @@ class DrivenBlock:
         drives = block.drives
         kept = {name for name in straightened if name in drives and not drives[name].shifted_by}
         self._straightened = [i for i, v in enumerate(block.model.inputs) if v.name in kept]
-        e = _equations(block, self.free, self._straightened)
-        self._equations, self._size, self._shifted = e, e.state.numel(), e.shifted
-        self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
-        functions = (e.digest, e.digest_shifted, *_output_functions(e))
+        late = _late_drives(block, self.free)
+        e, digest = _equations(block, self.free, late=late, straightened=self._straightened)
+        self._equations, self._size, self._shifted = e, e.state.numel(), digest.late
+        self._late = list(late.values())
+        functions = (digest.whole, digest.of_late, *_output_functions(e))
         self._digest, self._digest_shifted, self._output, self._plain_output = map(ColumnFunction, functions)
         self._sloped = _sloped(block)
         self._walk: _Walk | None = None
@@ -170,7 +162,11 @@ class DrivenBlock:
             if drive.shifted_by:
                 now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
                 delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
-                inputs[i], rates[i] = advanced(record.trace.time, inputs[i], delay)
+                # Read later by linear interpolation, with the slope of the line it is read from.
+                time, signal = record.trace.time, inputs[i]
+                before = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, n - 1)
+                rates[i] = np.append(np.diff(signal) / np.diff(time), 0.0)[before]
+                inputs[i] = np.interp(time + delay, time, signal)
             if set(drive.stretched_by) & set(self._late):
                 rates[i] = rates[i] * since  # what a change of the rate shifts grows with time
         return inputs, rates
@@ -197,6 +193,16 @@ class DrivenBlock:
         states, mean = (np.zeros((0, n)), None) if self._walk is None else self._states(self._walk, given, p)
         result = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
         _require_finite(self.block, result)
+        # Where a state moves faster than the steps, as hysteresis that yields within a sample, it stays
+        # bounded while its slopes grow from step to step, beyond all sense: by them a change of a number in
+        # its last digit would change the output by more than all of it.
+        largest, relative = np.max(np.abs(result[0])), np.abs(p[: len(self.free), None] * result[1:])
+        if largest > 0.0 and np.max(relative, initial=0.0) * np.finfo(float).eps > largest:
+            raise ConvergenceError(
+                f"block '{self.block.name}'",
+                "its response has no derivative: a state is faster than the samples",
+                next_step="narrow the bounds of the parameters",
+            )
         return Response(result[0], result[1:].T)
 
     def output(self, given: Samples, values: Mapping[str, float]) -> Array:
@@ -253,14 +259,8 @@ class DrivenBlock:
         ]
         # What jumps within a step is not seen at its ends; a balance of efforts counts the impulse.
         mean = any(stiff) and self.block.target is None
-        tables, step, slopes = _walk_functions(self._equations, self._stages, stiff, mean=mean)
-        # The derivatives of the states one step later.
-        before, by = (ca.SX.sym(name, self._size, len(self.free)) for name in ("before", "by_parameter"))
-        by_state = ca.SX.sym("by_state", self._size, self._size)
-        both = ca.vertcat(ca.vec(by_state), ca.vec(by))
-        carried = ca.Function("carried", [ca.vec(before), both], [ca.vec(by_state @ before + by)])
-        rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
-        near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
+        functions, near = step_functions(self._equations, self._stages, stiff, mean=mean)
+        tables, step, slopes, carried = functions
         instructions = sum(each.n_instructions() for each in (step, slopes, carried))
         return _Walk(
             PointFunction(tables), ChainFunction(step), ColumnFunction(slopes), ChainFunction(carried),
@@ -356,24 +356,41 @@ def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
     return tuple(n for n in free if n in late or ca.depends_on(together, s.parameter[names.index(n)]))
 
 
-def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -> _Equations:
+def _late_drives(block: Block, free: Sequence[str]) -> dict[Drive, str]:
+    """Return the drives that a free delay shifts, with its name; of several delays records show the sum."""
+    late = {}
+    for drive in block.drives.values():
+        names = [name for name in drive.shifted_by if name in free]
+        if len(names) > 1:
+            raise MeasurementError(
+                f"signal '{drive.signal}'",
+                f"is delayed by {' and by '.join(names)}, both free, which cannot be told apart",
+                next_step="let one of them free, and give the other a number without a spread",
+            )
+        if names:
+            late[drive] = names[0]
+    return late
+
+
+def _equations(
+    block: Block, free: Sequence[str], *, late: Mapping[Drive, str], straightened: Sequence[int]
+) -> tuple[BlockEquations, _Digest]:
     model, s = block.model, block.model.symbols()
     names = [v.name for v in model.parameters]
     place = [names.index(n) for n in free]
     rest = [i for i in range(len(names)) if i not in place]
     p = ca.SX(ca.vertcat(*[s.parameter[i] for i in place]))
     rates = ca.SX.sym("rate", s.input.shape)
-    late = late_drives(block, free)
     now, moved = ca.SX.sym("now", len(late)), list[Expression]()
     together = ca.vertcat(s.derivative, s.output) if s.state.numel() else s.output
     fixed = ca.vertcat(*[s.parameter[i] for i in rest])
     together = ca.substitute(together, fixed, ca.DM(np.array([model.parameters[i].start for i in rest])))
     for i, variable in enumerate(model.inputs):
         drive = block.drives.get(variable.name)
-        if drive in late:
+        if drive is not None and drive in late:
             # The samples were advanced by the present delay; its derivative is that of the signal.
-            k, moved = late.index(drive), [*moved, s.input[i], rates[i]]
-            shift = (p[list(free).index(free_delay(drive, free))] - now[k]) * rates[i]
+            k, moved = list(late).index(drive), [*moved, s.input[i], rates[i]]
+            shift = (p[list(free).index(late[drive])] - now[k]) * rates[i]
             together = ca.substitute(together, s.input[i], s.input[i] + shift)
     if straightened:
         n = s.state.numel()
@@ -397,10 +414,11 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     )
     n = s.state.numel()
     digested = ca.SX(ca.vertcat(*symbols)) if symbols else ca.SX(0, 1)
-    return _Equations(s.state, digested, p, now, core[:n], core[n:], digest, shifted, digest_shifted)
+    equations = BlockEquations(s.state, digested, p, now, core[:n], core[n:])
+    return equations, _Digest(digest, shifted, digest_shifted)
 
 
-def _output_functions(e: _Equations) -> tuple[ca.Function, ca.Function]:
+def _output_functions(e: BlockEquations) -> tuple[ca.Function, ca.Function]:
     """Return the output with its derivatives from the states and theirs, and the output alone."""
     slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
     total = ca.jacobian(e.output, e.parameter) + ca.jacobian(e.output, e.state) @ slope
@@ -410,92 +428,3 @@ def _output_functions(e: _Equations) -> tuple[ca.Function, ca.Function]:
         ca.Function("output", [ca.vertcat(e.state, ca.vec(slope)), *given], [column]),
         ca.Function("output", [e.state, *given], [ca.densify(e.output)]),
     )
-
-
-class _Step(NamedTuple):
-    """One step of the states: what they are later, and the mean output over it where that is asked for.
-
-    ``tables`` are those of the exact steps, ``symbols`` stand for them; ``matrices`` are the derivatives of
-    the stages that take theirs from the start of the record. ``guesses`` are symbols of iterates and what
-    they stand for, earlier ones first.
-    """
-
-    later: Expression
-    tables: Expression
-    symbols: Expression
-    matrices: Expression
-    guesses: list[tuple[Expression, Expression]]
-
-
-def _step(
-    e: _Equations,
-    stages: Sequence[Stage],
-    stiff: Sequence[bool],
-    *,
-    right: Expression,
-    h: Expression,
-    mean: bool,
-) -> _Step:
-    """Return a step of length ``h`` to the samples ``right``, stage after stage.
-
-    With ``mean`` it gives out the mean of the output over a stiff stage's short steps as well.
-    """
-    tables, symbols, matrices, outputs = [], [], [], []
-    guesses: list[tuple[Expression, Expression]] = []
-    new = ca.SX(e.state)
-    for stage, fast in zip(stages, stiff, strict=True):
-        inner = ca.SX(ca.vertcat(*[e.state[i] for i in stage.states]))
-        rate = ca.SX(ca.vertcat(*[e.derivative[i] for i in stage.states]))
-        n, ends = inner.numel(), (ca.vertcat(e.state, e.digested), ca.vertcat(new, right))
-        at = placed(rate, (e.state, e.digested), stage.states)
-        if stage.linear:
-            table = ca.SX.sym("table", n, 3 * n)
-            tables.append(ca.vec(ca.densify(exact_step(ca.jacobian(rate, inner), h))))
-            symbols.append(ca.vec(table))
-            zero = ca.SX.zeros(n)
-            later = table @ ca.vertcat(inner, at(zero, ends[0]), at(zero, ends[1]))
-        elif fast:
-            short_steps = implicit_steps(at, inner, ends, h)
-            later = short_steps.states[-1]
-            guesses += zip(short_steps.guess, short_steps.guessed, strict=True)
-            seen, count = placed(e.output, (e.state, e.digested), stage.states), len(short_steps.states)
-            corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
-            outputs += [seen(x, v) / count for x, v in zip(short_steps.states, corners, strict=True)]
-        else:
-            w = None if is_short(rate) else ca.SX.sym("w", n, n)
-            matrices += [] if w is None else [ca.vec(w)]
-            later = rosenbrock_step(at, inner, ends, w, h)
-        for k, i in enumerate(stage.states):
-            new[i] = later[k]
-    later = ca.vertcat(new, sum(outputs, start=ca.SX(0))) if mean else new
-    return _Step(later, _column(tables), _column(symbols), _column(matrices), guesses)
-
-
-def _walk_functions(
-    e: _Equations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
-) -> tuple[ca.Function, ca.Function, ca.Function]:
-    """Return the tables of the exact steps over the parameters, one step, and its slopes.
-
-    Slopes are those by the states at its beginning and by the free parameters, column after column.
-    """
-    h, free, right = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now), ca.SX.sym("right", e.digested.shape)
-    step = _step(e, stages, stiff, right=right, h=h, mean=mean)
-    dependence = ca.jacobian(step.tables, e.parameter)
-    prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(step.tables, dependence))])
-    along = ca.SX.sym("along", *dependence.shape)
-    by_table = ca.jacobian(step.later, step.symbols) @ ca.project(along, dependence.sparsity())
-    by = ca.horzcat(ca.jacobian(step.later, e.state), ca.jacobian(step.later, e.parameter) + by_table)
-    columns = [step.later, ca.vec(ca.densify(by))]
-    # Backwards: each symbol stands for an expression of those before it.
-    for symbol, value in reversed(step.guesses):
-        columns = ca.substitute(columns, [symbol], [value])
-    before = ca.vertcat(e.state, ca.SX.sym("before")) if mean else e.state
-    constant = ca.vertcat(free, step.symbols, ca.vec(along), step.matrices, h)
-    given = [before, e.digested, right, constant]
-    named = zip(("step", "slopes"), columns, strict=True)
-    one, slopes = (ca.Function(name, given, [ca.cse(ca.densify(column))]) for name, column in named)
-    return prepare, one, slopes
-
-
-def _column(items: Sequence[Expression]) -> Expression:
-    return ca.SX(ca.vertcat(*items)) if items else ca.SX(0, 1)

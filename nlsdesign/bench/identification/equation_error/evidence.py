@@ -8,19 +8,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from ....foundation.arrays import Array
 from ....simulation import Trace
 from ..filters import derivative, every
-from ..records.measurement import Record, RecordSet, in_canonical_order
+from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..records.sampling import Sampling
-from .between_samples import BlockRecord, floor_on_clock, on_clock, resolving_step
-from .block import Block
-from .block_noise import BlockNoise, Filters, noise_of_blocks, slowest_rate
+from .between_samples import noise_on_clock, on_clock, resolving_step
+from .block import Block, Filters, NoiseFloor
+from .block_noise import noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
-from .inferred_sampling import Missing, SeenBlock, plain_terms, with_inferred_sampling, with_sampling
+from .inferred_sampling import Missing, plain_terms, with_inferred_sampling
 from .input_noise import with_colour_of_inputs
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
@@ -39,7 +39,7 @@ class Evidence:
 
     driven: DrivenBlock
     record: Record
-    floor: BlockNoise
+    floor: NoiseFloor
     samples: Samples
     # asked: last answers, by the free numbers: a fit begins and is judged where it was asked before
     asked: dict[tuple[float, ...], tuple[Array, Array]] = field(default_factory=dict, init=False, repr=False)
@@ -78,12 +78,12 @@ class Bench:
     """The records as every hypothesis sees them: same order, same filter, same rows, same noise floor.
 
     ``records``: all records; their order and their names make no difference, see
-    :func:`~.in_canonical_order`. ``blocks``: of the declared model; they fix rows and noise floor. ``noise``:
-    of the measured signals, where it is known from other records of the same bench. ``filters``: by name of
-    the block, where they were chosen for other records of the same bench. ``clock``: time in s between
-    samples at which the blocks show what they do, where that is known from other records of the same bench.
-    ``sampling``: how inputs run between their samples, where that is known from other records of the same
-    bench.
+    :meth:`.RecordSet.in_canonical_order`. ``blocks``: of the declared model; they fix rows and noise floor.
+    ``noise``: of the measured signals, where it is known from other records of the same bench. ``filters``:
+    by name of the block, where they were chosen for other records of the same bench. ``clock``: time in s
+    between samples at which the blocks show what they do, where that is known from other records of the same
+    bench. ``sampling``: how inputs run between their samples, where that is known from other records of the
+    same bench.
     """
 
     def __init__(
@@ -97,23 +97,22 @@ class Bench:
         sampling: Mapping[str, Sampling] | None = None,
     ) -> None:
         self._blocks = tuple(blocks)
-        self.records = in_canonical_order(with_sampling(records, sampling or {}))
+        self.records = records.read_as(sampling or {}).in_canonical_order()
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
         self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
-        self.filters, self.floors = noise_of_blocks(blocks, self.records, self.noise, filters or {})
-        self._scales = {block.name: block.effort_per_drive for block in blocks}
-        self._as_measured, self._floors_as_measured = self.records, dict(self.floors)
+        read = noise_of_blocks(blocks, self.records, self.noise, filters or {})
+        chosen = {name: each.filters for name, each in read.items()}
         if noise is None:
-            coloured = with_colour_of_inputs(self.noise, self.records, self._seen(blocks))
+            coloured = with_colour_of_inputs(self.noise, self.records, list(read.values()))
             if coloured is not self.noise:
-                self.noise = coloured
-                self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
-                self._floors_as_measured = dict(self.floors)
+                self.noise, read = coloured, noise_of_blocks(blocks, self.records, coloured, chosen)
+        self._as_measured = self.records, read
         if sampling is None:
-            self.records = self.inferred(blocks)
-        if self.records is not self._as_measured:
+            self.records = with_inferred_sampling(self.records, list(read.values()), plain_terms)
+        if self.records is not self._as_measured[0]:
             self.noise = self.noise.read_as(self.records)
-            self.floors = noise_of_blocks(blocks, self.records, self.noise, self.filters)[1]
+            read = noise_of_blocks(blocks, self.records, self.noise, chosen)
+        self.block_noise = read
         sparse = tuple(
             Finding(
                 f"block '{name}'",
@@ -125,16 +124,13 @@ class Bench:
         )
         self.records = replace(self.records, remarks=(*self.records.remarks, *sparse))
         self._remarks = self.records.remarks
-        self.units = {block.name: block.unit for block in blocks}
-        self._thin: dict[tuple[str, str, bool], tuple[Record, BlockNoise]] = {}
+        self._thin: dict[tuple[str, str, bool], tuple[Record, NoiseFloor]] = {}
         if clock is None:
-            clock = resolving_step(_block_records(self, blocks))
+            driven = [self.driven(block, []) for block in blocks]
+            clock = resolving_step(driven, read, self.records.deciding)
         self.clock = clock
-        for (block_name, record_name), floor in self.floors.items():
-            record = next(r for r in self.records.records if r.name == record_name)
-            width = self.filters[block_name].width
-            self.floors[block_name, record_name] = floor_on_clock(floor, record, width, clock)
-        self.records = on_clock(self.records, clock)
+        self.block_noise = {n: noise_on_clock(each, self.records, self.clock) for n, each in read.items()}
+        self.records = on_clock(self.records, self.clock)
 
     def with_records(self, records: RecordSet) -> Bench:
         """Return other records of the same bench as they are seen with the same noise and filters."""
@@ -143,7 +139,7 @@ class Bench:
             replace(records, remarks=(*records.remarks, *own)),
             self._blocks,
             noise=self.noise,
-            filters=self.filters,
+            filters={name: each.filters for name, each in self.block_noise.items()},
             clock=self.clock,
             sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
         )
@@ -154,20 +150,9 @@ class Bench:
         ``blocks``: of the declared model, or of a better one with the same names. ``missing``: what they may
         lack, see :mod:`.inferred_sampling`.
         """
-        return with_inferred_sampling(self._as_measured, self._seen(blocks), missing)
-
-    def _seen(self, blocks: Sequence[Block]) -> list[SeenBlock]:
-        """Return how blocks with the names of the declared ones read the records."""
-        floors = self._floors_as_measured
-        return [
-            SeenBlock(
-                block.scaled_to(self._scales[block.name]),
-                self.filters[block.name],
-                {record: floor for (name, record), floor in floors.items() if name == block.name},
-            )
-            for block in blocks
-            if block.name in self.filters
-        ]
+        records, read = self._as_measured
+        asked = [read[block.name].read_by(block) for block in blocks if block.name in read]
+        return with_inferred_sampling(records, asked, missing)
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
@@ -177,10 +162,10 @@ class Bench:
         ``block``, ``free``, ``values``: as for :class:`~.block_response.DrivenBlock`. The records that fits
         may see decide what is stiff; if there are none, as where a finished model is only looked at, all do.
         """
-        filters = self.filters.get(block.name)
-        span, straightened = (filters.span, filters.straightened) if filters else (0.0, ())
-        records = self.records.of("fit") or self.records.records
-        block = block.scaled_to(self._scales.get(block.name, block.effort_per_drive))
+        records, read = self.records.of("fit") or self.records.records, self.block_noise.get(block.name)
+        if read is None:
+            return DrivenBlock(block, free, records=records, values=values)
+        block, span, straightened = read.read_by(block).block, read.filters.span, read.filters.straightened
         return DrivenBlock(block, free, records=records, values=values, span=span, straightened=straightened)
 
     def evidence(
@@ -198,39 +183,30 @@ class Bench:
         are faster than a sample are simulated on all.
         """
         name, thin = driven.block.name, coarse and driven.block.target is not None
-        result = []
+        read = self.block_noise.get(name)
+        result, floors = [], read.floors if read else {}
         for record in records:
-            if (name, record.name) in self.floors:
-                seen, floor = record, self.floors[name, record.name]
+            if record.name in floors:
+                seen, floor = record, floors[record.name]
                 if thin:
                     seen, floor = self._thinned(name, record, whole=driven.stiff)
                 result.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
         return result
 
-    def typical_floor(self, block: str) -> float:
-        """Return the noise floor of a block over all records, root mean square, in its unit."""
-        rows = np.concatenate([f.sigma for (name, _), f in self.floors.items() if name == block])
-        return float(np.sqrt(np.mean(rows**2)))
-
-    def known_from(self, block: str) -> float:
-        """Return the effective squares of noise from which the floor of a block is known."""
-        # One estimate of the noise serves all records, so more of them make it no better.
-        doubt = float(np.mean([1.0 / f.known for (name, _), f in self.floors.items() if name == block]))
-        return 1.0 / doubt if doubt else math.inf
-
     def covered(self) -> dict[str, float]:
         """Return by block the share of the power of its motion in the rows of the records that decide."""
-        deciding, seen = {record.name for record in self.records.deciding}, dict[str, list[float]]()
-        for (block, record), floor in self.floors.items():
-            if record in deciding:
-                seen.setdefault(block, []).append(floor.covered)
-        return {block: float(np.mean(shares)) for block, shares in seen.items()}
+        deciding = {record.name for record in self.records.deciding}
+        shares = {
+            block: [floor.covered for record, floor in read.floors.items() if record in deciding]
+            for block, read in self.block_noise.items()
+        }
+        return {block: float(np.mean(each)) for block, each in shares.items() if each}
 
     def slowest(self) -> dict[str, float]:
         """Return the least speed that some record resolves, by the measured signal that it is the rate of."""
         speeds: dict[str, float] = {}
         for block, record in itertools.product(self._blocks, self.records.deciding):
-            span = self.filters[block.name].span
+            span = self.block_noise[block.name].filters.span
             for name, drive in block.drives.items():
                 if drive.order == 1 or name == block.moving:
                     rate = derivative(record.trace[drive.signal], record.step, order=drive.order, span=span)
@@ -238,7 +214,7 @@ class Bench:
                     speeds[drive.signal] = min(least, speeds.get(drive.signal, math.inf))
         return speeds
 
-    def _thinned(self, block: str, record: Record, *, whole: bool) -> tuple[Record, BlockNoise]:
+    def _thinned(self, block: str, record: Record, *, whole: bool) -> tuple[Record, NoiseFloor]:
         """Return every k-th sample unfiltered; with ``whole`` all are simulated and the same are compared."""
         key = block, record.name, whole
         if key not in self._thin:
@@ -246,12 +222,13 @@ class Bench:
             allowed = _COARSEST
             for signal in moving:
                 span = max(float(np.ptp(r.trace[signal])) for r in self.records.records)
-                fastest = float(np.max(np.abs(np.gradient(gaussian_filter1d(record.trace[signal], 2.0)))))
+                smooth = scipy.ndimage.gaussian_filter1d(record.trace[signal], 2.0)
+                fastest = float(np.max(np.abs(np.gradient(smooth))))
                 allowed = min(allowed, int(_COARSE_SHARE * span / max(fastest, 1e-300)))
             k = max(1, allowed)
             trace = record.trace
             counted = np.flatnonzero(~record.masked_in(trace.signals)[::k])
-            raw = self.floors[block, record.name].raw_sigma[::k][counted]
+            raw = self.block_noise[block].floors[record.name].raw_sigma[::k][counted]
             one = every(len(trace), k)
             masked = record.masked
             if not whole:
@@ -260,18 +237,5 @@ class Bench:
                 )
                 one = every(len(trace), 1)
                 masked = {n: m[::k] for n, m in masked.items()}
-            self._thin[key] = replace(record, trace=trace, masked=masked), BlockNoise(one[counted], raw, raw)
+            self._thin[key] = replace(record, trace=trace, masked=masked), NoiseFloor(one[counted], raw, raw)
         return self._thin[key]
-
-
-def _block_records(bench: Bench, blocks: Sequence[Block]) -> list[BlockRecord]:
-    """Return how blocks read the records that may decide on filters."""
-    result = []
-    for block in blocks:
-        driven = bench.driven(block, [])
-        for record in bench.records.deciding:
-            floor = bench.floors.get((block.name, record.name))
-            if floor is not None:
-                width = bench.filters[block.name].width
-                result.append(BlockRecord(driven, record, width, floor.filter, floor.sigma))
-    return result

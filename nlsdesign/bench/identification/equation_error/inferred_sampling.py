@@ -32,8 +32,7 @@ from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..records.sampling import AVERAGED, HELD, SAMPLED, Sampling, shifted
 from ..residuals import effective_size
-from .block import Block
-from .block_noise import BlockNoise, Filters
+from .block import Block, BlockNoise
 from .block_response import DrivenBlock, free_in
 
 _FORMS = (SAMPLED, HELD, AVERAGED)
@@ -52,45 +51,25 @@ Missing: TypeAlias = Callable[[Block, Record, float], Iterator[Array]]
 """What a block may lack on a record, whose rates are taken over a span in s: terms of shape (n,) each."""
 
 
-class SeenBlock(NamedTuple):
-    """A block with the filters and the noise floors with which it reads the records, by record."""
-
-    block: Block
-    filters: Filters
-    floors: Mapping[str, BlockNoise]
-
-
-def with_inferred_sampling(records: RecordSet, seen: Sequence[SeenBlock], missing: Missing) -> RecordSet:
+def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missing: Missing) -> RecordSet:
     """Return the records in which every input runs between its samples as they tell best, with remarks.
 
     ``records``: inputs of which nothing is said have columns without a sampling. ``missing``: what the blocks
     may lack.
     """
     for column in records.columns:
-        if column.sampling is None:
-            likelihood = _asked(records, seen, column.signal, missing)
-            inferred, remark = likelihood.taken() if likelihood else (SAMPLED, "")
-            records = with_sampling(records, {column.signal: inferred})
-        elif column.declared and column.sampling is not SAMPLED:
-            likelihood = _asked(records, seen, column.signal, missing)
+        if column.sampling is SAMPLED or (column.sampling and not column.declared):
+            continue
+        likelihood = _asked(records, seen, column.signal, missing)
+        if column.sampling:
             remark = likelihood.against(column.sampling) if likelihood else ""
         else:
-            continue
+            inferred, remark = likelihood.taken() if likelihood else (SAMPLED, "")
+            records = records.read_as({column.signal: inferred})
         if remark:
             finding = Finding(f"column '{column.name}'", remark)
             records = replace(records, remarks=(*records.remarks, finding))
     return records
-
-
-def with_sampling(records: RecordSet, sampling: Mapping[str, Sampling]) -> RecordSet:
-    """Return the records in which some inputs run between their samples as they are told to."""
-    columns = tuple(replace(c, sampling=sampling.get(c.signal, c.sampling)) for c in records.columns)
-    return replace(records, records=tuple(_as(r, sampling) for r in records.records), columns=columns)
-
-
-def _as(record: Record, sampling: Mapping[str, Sampling]) -> Record:
-    known = {**record.sampling, **sampling}
-    return replace(record, sampling={s: form for s, form in known.items() if form is not SAMPLED})
 
 
 class BlockRows(NamedTuple):
@@ -170,7 +149,7 @@ class _Likelihood(NamedTuple):
 
 
 def _asked(
-    records: RecordSet, seen: Sequence[SeenBlock], signal: str, missing: Missing
+    records: RecordSet, seen: Sequence[BlockNoise], signal: str, missing: Missing
 ) -> _Likelihood | None:
     """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells.
 
@@ -196,7 +175,7 @@ def _asked(
     return sharper if sharper and plain.allows(sharper.shift) else plain
 
 
-def _free(seen: SeenBlock) -> tuple[str, ...]:
+def _free(seen: BlockNoise) -> tuple[str, ...]:
     return free_in(seen.block, [v.name for v in seen.block.model.parameters if v.spread])
 
 
@@ -279,7 +258,7 @@ def freed(residuals: Array, terms: Array) -> tuple[Array, int]:
 
 
 def rows_of(
-    seen: SeenBlock, records: Sequence[Record], forms: Sequence[Mapping[str, Sampling]], missing: Missing
+    seen: BlockNoise, records: Sequence[Record], forms: Sequence[Mapping[str, Sampling]], missing: Missing
 ) -> BlockRows:
     """Return the residuals of a block on the records that it sees, for each way to read it."""
     block, filters, free = seen.block, seen.filters, _free(seen)
@@ -290,7 +269,7 @@ def rows_of(
         floor = seen.floors[record.name]
         values, rows = block.model.values, []
         for form in forms:
-            read = _as(record, form)
+            read = record.read_as(form)
             response = driven.respond(driven.samples(read, values), values)
             error = (read.as_computed(block.target) if block.target else 0.0) - response.output
             rows.append((floor.filter @ error) / floor.sigma)
@@ -302,7 +281,7 @@ def rows_of(
     return BlockRows(np.hstack(residuals), numbers, terms_of(seen, records, missing))
 
 
-def terms_of(seen: SeenBlock, records: Sequence[Record], missing: Missing) -> Array:
+def terms_of(seen: BlockNoise, records: Sequence[Record], missing: Missing) -> Array:
     """Return what a block may lack on the records that it sees, shape (rows, terms)."""
     terms = []
     for record in (r for r in records if r.name in seen.floors):

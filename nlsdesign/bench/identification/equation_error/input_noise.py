@@ -22,7 +22,7 @@ Source: Söderström and Stoica 1989, chapter 11 (tests of whiteness and of inde
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +32,9 @@ from scipy.linalg import solve_triangular
 from ....foundation.arrays import Array
 from ..filters import derivative
 from ..records.measurement import Record, RecordSet
-from .inferred_sampling import SeenBlock, freed, functions_of_motion, rows_of
-from .noise import Band, Colour, Noise, NoisePart, Stretch, bands_of, fitted_at, scatter
+from .block import BlockNoise
+from .inferred_sampling import freed, functions_of_motion, rows_of
+from .noise import Band, Colour, Noise, NoisePart, Stretch, bands_of, fitted_at, is_white, scatter
 
 _SURELY = 3.0
 """Standard errors of a band by which a motion stands out of its counts to be seen: by chance, one band in a
@@ -45,17 +46,15 @@ _OPEN = 1.2
 """Mean square of what is left of a block, in that of white noise, up to which there is nothing to explain."""
 _OWN = 0.5
 """Share of the floor of a block that comes from the noise of a signal, at least, for the block to show it."""
-_CONTRADICTED = 4.0
-"""Standard errors by which a test may be missed: some forty are made, and the model is not exact."""
 _BESIDE = (0.003, 0.03, 0.1)
 """Noise in the rows of a block beside that of the signal, in the variance of its white one: what is taken of
 counts, and what a filter passes where it passes next to nothing. The likeliest is taken."""
-_MOST_ROWS, _LEAST_ROWS, _TIMES, _LAGS, _CLASSES = 400, 40, 12, 3, 3
+_MOST_ROWS, _LEAST_ROWS, _TIMES = 400, 40, 12
 _LONGEST = 0.1
 """Share of a record after which a process has forgotten all but 37 %, at most: what is slower is not seen."""
 
 
-def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[SeenBlock]) -> Noise:
+def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[BlockNoise]) -> Noise:
     """Return the noise with the colour of inputs of blocks that are no motions, where the records show it."""
     drives = [drive for each in seen for drive in each.block.drives.values()]
     moving = dict.fromkeys(d.signal for d in drives if d.order > 0)
@@ -71,7 +70,8 @@ def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[SeenB
         for each in seen if shown else ():
             colours = read.colours(each, shown)
             if colours:
-                noise = noise.with_colours(signal, colours, read.lengths(colours))
+                lengths = [r.step * len(r.trace) for r in read.records if r.name in colours]
+                noise = noise.with_colours(signal, colours, lengths)
                 break
     return noise
 
@@ -91,10 +91,6 @@ class _Signal(NamedTuple):
     name: str
     noise: Noise
     records: tuple[Record, ...]
-
-    def lengths(self, names: Collection[str]) -> list[float]:
-        """Return how long these records are, in s."""
-        return [record.step * len(record.trace) for record in self.records if record.name in names]
 
     def above_motion(self, record: Record, counts: Mapping[str, float]) -> list[Band]:
         """Return the bands of the signal above all motion; none where they look white, or may be real."""
@@ -119,9 +115,9 @@ class _Signal(NamedTuple):
         plain, *others = (fitted_at(time, above, record.step).deviance for time in (0.0, *_times(record)))
         return above if min(others) < plain - _SEEN else []
 
-    def colours(self, seen: SeenBlock, shown: Mapping[str, list[Band]]) -> dict[str, Colour]:
+    def colours(self, seen: BlockNoise, shown: Mapping[str, list[Band]]) -> dict[str, Colour]:
         """Return the colour of the signal in each record that shows it; none where one contradicts."""
-        block, filters, floors = seen
+        block, filters, floors = seen.block, seen.filters, seen.floors
         chosen = [record for record in self.records if record.name in floors]
         shares = {record.name: floors[record.name].shares.get(self.name, 0.0) for record in chosen}
         if not shares or float(np.mean(list(shares.values()))) < _OWN:
@@ -141,7 +137,7 @@ class _Signal(NamedTuple):
                 rates = (
                     derivative(record.trace[m], record.step, order=1, span=filters.span) for m in motions
                 )
-                if any(_goes_with(white, np.abs(rate[first.places])) for rate in rates):
+                if not all(is_white(white, np.abs(rate[first.places])) for rate in rates):
                     return {}
                 colours[record.name] = colour
         return colours
@@ -171,15 +167,3 @@ class _Signal(NamedTuple):
 
 def _times(record: Record) -> list[float]:
     return [float(t) for t in np.geomspace(record.step, _LONGEST * record.step * len(record.trace), _TIMES)]
-
-
-def _goes_with(white: Array, speed: Array) -> bool:
-    """Tell whether rows are no white noise of variance 1, early and late, in slow and in fast motion."""
-    count = len(white)
-    by_speed = np.array_split(white[np.argsort(speed, kind="stable")], _CLASSES)
-    misses = [
-        (float(np.mean(part**2)) - 1.0) * math.sqrt(len(part) / 2.0)
-        for part in (*by_speed, *np.array_split(white, _CLASSES))
-    ]
-    misses += [float(white[k:] @ white[:-k]) / math.sqrt(count) for k in range(1, _LAGS + 1)]
-    return bool(np.max(np.abs(misses)) > _CONTRADICTED)

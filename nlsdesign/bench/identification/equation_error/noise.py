@@ -51,6 +51,9 @@ _PLAINLY_ONE = 4.0
 its corner to count as seen: it is then seven times as probable."""
 _PLAIN = 1.5
 """Density at the lowest frequency over that of the white part, up to which noise counts as white."""
+_CONTRADICTED = 4.0
+"""Standard errors by which a test may be missed: some forty are made, and the model is not exact."""
+_LAGS, _CLASSES = 3, 3
 _STILL = 1.5
 """Counts within which a motion is at rest, or comes again."""
 _ELSEWHERE = 10.0
@@ -195,6 +198,18 @@ def fitted_at(time: float, bands: Sequence[Band], step: float) -> OneProcess:
     """
     frequency, density, count = (np.array(column) for column in zip(*bands, strict=True))
     return _one_process(_density(time, frequency, step) if time else np.zeros_like(density), density, count)
+
+
+def is_white(rows: Array, speed: Array) -> bool:
+    """Tell whether rows are white noise of variance 1, early and late, in slow and in fast motion."""
+    count = len(rows)
+    by_speed = np.array_split(rows[np.argsort(speed, kind="stable")], _CLASSES)
+    misses = [
+        (float(np.mean(part**2)) - 1.0) * math.sqrt(len(part) / 2.0)
+        for part in (*by_speed, *np.array_split(rows, _CLASSES))
+    ]
+    misses += [float(rows[k:] @ rows[:-k]) / math.sqrt(count) for k in range(1, _LAGS + 1)]
+    return not np.max(np.abs(misses)) > _CONTRADICTED
 
 
 def _one_process(coloured: Array, density: Array, count: Array) -> OneProcess:

@@ -33,6 +33,17 @@ STIFF = 2.0
 """A stage is stiff if the norm of its derivative times the step is above this."""
 
 
+class BlockEquations(NamedTuple):
+    """A block's expressions: f(x, v, p) and y(x, v, p), with v for all that neither state nor p enters."""
+
+    state: Expression
+    digested: Expression  # v, worked out once per record
+    parameter: Expression  # p: those that are free
+    now: Expression  # the delays at which v was read
+    derivative: Expression
+    output: Expression
+
+
 class Stage(NamedTuple):
     """States that act on each other, and whether they do so linearly with constant coefficients."""
 
@@ -173,14 +184,14 @@ def _stages(
     return x + h * (1.5 * first + 0.5 * second)
 
 
-def is_short(expression: Expression) -> bool:
+def _is_short(expression: Expression) -> bool:
     """Tell whether an expression is cheap enough to be differentiated twice in every step."""
     return bool(
         ca.Function("f", [ca.vertcat(*ca.symvar(expression))], [expression]).n_instructions() < _SHORT
     )
 
 
-def placed(
+def _placed(
     value: Expression, symbols: tuple[Expression, Expression], states: Sequence[int]
 ) -> Callable[[Expression, Expression], Expression]:
     """Return an expression as a function of some states and of everything else, all states and samples."""
@@ -193,3 +204,102 @@ def placed(
         return ca.SX(ca.substitute(value, ca.vertcat(state, digested), place))
 
     return at
+
+
+class _Step(NamedTuple):
+    """One step of the states: what they are later, and the mean output over it where that is asked for.
+
+    ``tables`` are those of the exact steps, ``symbols`` stand for them; ``matrices`` are the derivatives of
+    the stages that take theirs from the start of the record. ``guesses`` are symbols of iterates and what
+    they stand for, earlier ones first.
+    """
+
+    later: Expression
+    tables: Expression
+    symbols: Expression
+    matrices: Expression
+    guesses: list[tuple[Expression, Expression]]
+    near: list[list[int]]  # the states of these stages
+
+
+def _step(
+    e: BlockEquations,
+    stages: Sequence[Stage],
+    stiff: Sequence[bool],
+    *,
+    right: Expression,
+    h: Expression,
+    mean: bool,
+) -> _Step:
+    """Return a step of length ``h`` to the samples ``right``, stage after stage.
+
+    With ``mean`` it gives out the mean of the output over a stiff stage's short steps as well.
+    """
+    tables, symbols, matrices, outputs, near = [], [], [], [], []
+    guesses: list[tuple[Expression, Expression]] = []
+    new = ca.SX(e.state)
+    for stage, fast in zip(stages, stiff, strict=True):
+        inner = ca.SX(ca.vertcat(*[e.state[i] for i in stage.states]))
+        rate = ca.SX(ca.vertcat(*[e.derivative[i] for i in stage.states]))
+        n, ends = inner.numel(), (ca.vertcat(e.state, e.digested), ca.vertcat(new, right))
+        at = _placed(rate, (e.state, e.digested), stage.states)
+        if stage.linear:
+            table = ca.SX.sym("table", n, 3 * n)
+            tables.append(ca.vec(ca.densify(exact_step(ca.jacobian(rate, inner), h))))
+            symbols.append(ca.vec(table))
+            zero = ca.SX.zeros(n)
+            later = table @ ca.vertcat(inner, at(zero, ends[0]), at(zero, ends[1]))
+        elif fast:
+            short_steps = implicit_steps(at, inner, ends, h)
+            later = short_steps.states[-1]
+            guesses += zip(short_steps.guess, short_steps.guessed, strict=True)
+            seen, count = _placed(e.output, (e.state, e.digested), stage.states), len(short_steps.states)
+            corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
+            outputs += [seen(x, v) / count for x, v in zip(short_steps.states, corners, strict=True)]
+        else:
+            w = None if _is_short(rate) else ca.SX.sym("w", n, n)
+            matrices += [] if w is None else [ca.vec(w)]
+            near += [] if w is None else [stage.states]
+            later = rosenbrock_step(at, inner, ends, w, h)
+        for k, i in enumerate(stage.states):
+            new[i] = later[k]
+    later = ca.vertcat(new, sum(outputs, start=ca.SX(0))) if mean else new
+    return _Step(later, _column(tables), _column(symbols), _column(matrices), guesses, near)
+
+
+def step_functions(
+    e: BlockEquations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
+) -> tuple[list[ca.Function], list[list[int]]]:
+    """Return the functions of a step, and the states of the stages that take their derivative at its start.
+
+    These are the tables of the exact steps over the parameters, the step, its slopes by the states at its
+    beginning and by the free parameters, column after column, and what carries the derivatives of the states
+    on. With ``mean`` the mean output over a stiff step goes with the states.
+    """
+    h, free, right = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now), ca.SX.sym("right", e.digested.shape)
+    step = _step(e, stages, stiff, right=right, h=h, mean=mean)
+    dependence = ca.jacobian(step.tables, e.parameter)
+    prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(step.tables, dependence))])
+    along = ca.SX.sym("along", *dependence.shape)
+    by_table = ca.jacobian(step.later, step.symbols) @ ca.project(along, dependence.sparsity())
+    by = ca.horzcat(ca.jacobian(step.later, e.state), ca.jacobian(step.later, e.parameter) + by_table)
+    columns = [step.later, ca.vec(ca.densify(by))]
+    # Backwards: each symbol stands for an expression of those before it.
+    for symbol, value in reversed(step.guesses):
+        columns = ca.substitute(columns, [symbol], [value])
+    before = ca.vertcat(e.state, ca.SX.sym("before")) if mean else e.state
+    constant = ca.vertcat(free, step.symbols, ca.vec(along), step.matrices, h)
+    given = [before, e.digested, right, constant]
+    named = zip(("step", "slopes"), columns, strict=True)
+    one, slopes = (ca.Function(name, given, [ca.cse(ca.densify(column))]) for name, column in named)
+    # The derivatives of the states one step later.
+    size = e.state.numel()
+    before, by = (ca.SX.sym(name, size, e.parameter.numel()) for name in ("before", "by_parameter"))
+    by_state = ca.SX.sym("by_state", size, size)
+    both = ca.vertcat(ca.vec(by_state), ca.vec(by))
+    carried = ca.Function("carried", [ca.vec(before), both], [ca.vec(by_state @ before + by)])
+    return [prepare, one, slopes, carried], step.near
+
+
+def _column(items: Sequence[Expression]) -> Expression:
+    return ca.SX(ca.vertcat(*items)) if items else ca.SX(0, 1)

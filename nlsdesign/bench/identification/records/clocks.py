@@ -19,7 +19,6 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 from scipy.interpolate import make_interp_spline
-from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize_scalar
 
 from ....foundation.arrays import Array, Indices
@@ -268,7 +267,7 @@ def _smooth(channel: Channel, step: float) -> Channel:
     if np.ptp(channel.values) == 0.0:
         raise MeasurementError(f"'{channel.name}'", "is constant, so it shows no motion to be aligned by")
     even = on_one_clock([channel], 1.0 / step)
-    smooth = gaussian_filter1d(even.values[channel.name], _WIDTH, mode="nearest")
+    smooth = scipy.ndimage.gaussian_filter1d(even.values[channel.name], _WIDTH, mode="nearest")
     return Channel(channel.name, even.time, smooth)
 
 

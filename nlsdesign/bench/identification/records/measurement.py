@@ -16,6 +16,7 @@ from typing import Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.csv_tables import heads_with_units
@@ -23,7 +24,7 @@ from ....foundation.errors import MeasurementError, nearest, unknown_name, visib
 from ....foundation.quantity import parse_unit
 from ....model import FlatModel
 from ....simulation import Trace
-from ..filters import derivative
+from ..filters import blurred, derivative
 from ..residuals import noise_beside, noise_of, quantum_of
 from .clocks import Resolution
 from .column_heads import default_mapping, times_among, times_without_unit
@@ -217,6 +218,29 @@ class Record:
             known[key].flags.writeable = False
         return known[key]
 
+    def read_as(self, sampling: Mapping[str, Sampling]) -> Record:
+        """Return the record with some signals running between their samples as they are told to.
+
+        Parameters
+        ----------
+        sampling
+            By full name of the signal; others stay as they are.
+        """
+        known = {**self.sampling, **sampling}
+        return replace(self, sampling={s: form for s, form in known.items() if form is not SAMPLED})
+
+    def blur(self, signal: str, span: float) -> Array:
+        """Return what a span takes from the rate of a signal at the samples, shape (n,).
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        span
+            Time in s over which the rate is taken.
+        """
+        return blurred(self.at_samples(signal), self.step, span=span)
+
     def as_computed(self, signal: str) -> Array:
         """Return what a prediction of a measured signal must equal at the samples, shape (n,).
 
@@ -226,6 +250,37 @@ class Record:
             Full name.
         """
         return self.sampling_of(signal).as_computed(self.trace[signal])
+
+    def refined(self, times: int) -> Record:
+        """Return the record with several samples in the place of one, between those that were measured.
+
+        What was held or averaged becomes the smooth signal with the same effect; samples that are masked have
+        no part in those beside them.
+
+        Parameters
+        ----------
+        times
+            How many; 1 leaves it as it is.
+        """
+        if times == 1:
+            return self
+        trace, share = self.trace, math.sqrt(times)
+        clock = np.arange(len(trace), dtype=np.float64)
+        finer = np.arange((len(trace) - 1) * times + 1) / times
+        signals, resolution = {}, {}
+        for name in trace.signals:
+            noise, quantum = self.resolution_of(name)
+            resolution[name] = Resolution(share * noise, share * quantum)
+            sound = ~self.masked_in([name])
+            signals[name] = make_interp_spline(clock[sound], self.at_samples(name)[sound], k=5)(finer)
+        below, above = np.floor(finer).astype(int), np.ceil(finer).astype(int)
+        return replace(
+            self,
+            trace=Trace(trace.time[0] + finer * self.step, signals, trace.units, trace.name),
+            resolution=resolution,
+            masked={name: mask[below] | mask[above] for name, mask in self.masked.items()},
+            sampling={},
+        )
 
     def resolution_of(self, signal: str) -> Resolution:
         """Return noise and size of a count of a signal, in SI.
@@ -371,6 +426,30 @@ class RecordSet:
             if each.signal == signal:
                 return each
         raise unknown_name("measured signal", signal, self.signals)
+
+    def read_as(self, sampling: Mapping[str, Sampling]) -> RecordSet:
+        """Return the records in which some inputs run between their samples as they are told to.
+
+        Parameters
+        ----------
+        sampling
+            By full name of the signal; others stay as they are.
+        """
+        columns = tuple(replace(c, sampling=sampling.get(c.signal, c.sampling)) for c in self.columns)
+        return replace(self, records=tuple(r.read_as(sampling) for r in self.records), columns=columns)
+
+    def in_canonical_order(self) -> RecordSet:
+        """Return the same records and findings, ordered by the content of the records.
+
+        Rounding of sums and choices among equals depend on the order of records. In canonical order results
+        do not depend on the names of files.
+        """
+        ordered = tuple(sorted(self.records, key=_content))
+        findings, remarks = (
+            tuple(sorted(group, key=lambda finding: (_index_of_record(finding, ordered), finding.text)))
+            for group in (self.findings, self.remarks)
+        )
+        return replace(self, records=ordered, findings=findings, remarks=remarks)
 
 
 def load_records(
@@ -640,26 +719,12 @@ def _record(file: Path, table: RecordTable, mapping: ColumnMap, part: int = 0) -
     return RecordSet((record,), mapping.columns, run.findings, (*assumed, *run.remarks))
 
 
-def in_canonical_order(records: RecordSet) -> RecordSet:
-    """Return the same records and findings, ordered by the content of the records.
-
-    Rounding of sums and choices among equals depend on the order of records. In canonical order results do
-    not depend on the names of files.
-    """
-    ordered = tuple(sorted(records.records, key=_content))
-    findings, remarks = (
-        tuple(sorted(group, key=lambda finding: (_place(finding, ordered), finding.text)))
-        for group in (records.findings, records.remarks)
-    )
-    return replace(records, records=ordered, findings=findings, remarks=remarks)
-
-
 def _content(record: Record) -> tuple[int, str, str]:
     """Return number of samples, a digest of time and signals, and the role."""
     return len(record.trace), content_digest(record.trace), record.role
 
 
-def _place(finding: Finding, ordered: tuple[Record, ...]) -> int:
+def _index_of_record(finding: Finding, ordered: tuple[Record, ...]) -> int:
     """Return the index of the record of a finding; the number of records if it belongs to none."""
     file = finding.place.partition(":")[0]
     known = [k for k, record in enumerate(ordered) if (record.source or record.name).startswith(file)]

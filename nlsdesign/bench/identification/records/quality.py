@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import median_filter
+import scipy
 
 from ....foundation.arrays import Array, Indices, Mask
 from ....foundation.errors import MeasurementError
@@ -320,11 +320,11 @@ class _Scatter:
     def __init__(self, values: Array) -> None:
         self.values = values
         self.changes = np.diff(values)
-        self.jumps = self.changes - median_filter(self.changes, _SLOPE_SPAN, mode="nearest")
+        self.jumps = self.changes - scipy.ndimage.median_filter(self.changes, _SLOPE_SPAN, mode="nearest")
         low, high = np.percentile(values, (5.0, 95.0))
         self.least = max(noise_of(values), quantum_of(values), _SHARE_OF_RANGE * float(high - low))
         size = np.abs(self.jumps)
-        local = _TO_DEVIATION * median_filter(size, _SCATTER_SPAN, mode="nearest")
+        local = _TO_DEVIATION * scipy.ndimage.median_filter(size, _SCATTER_SPAN, mode="nearest")
         scale = np.maximum(local, self.least)
         # A channel whose changes have heavy tails by nature is judged by these.
         usual, rare = np.percentile(size, (50.0, 95.0))
@@ -361,7 +361,7 @@ def _standing_clear(scatter: _Scatter, groups: list[Group]) -> list[Group]:
     """
     if not groups:
         return groups
-    off = np.abs(scatter.values - median_filter(scatter.values, _MEDIAN_SPAN, mode="nearest"))
+    off = np.abs(scatter.values - scipy.ndimage.median_filter(scatter.values, _MEDIAN_SPAN, mode="nearest"))
     expected = _HALF_WAY * len(off)
     for place, group in enumerate(sorted(groups, key=lambda g: g.size)):
         below = int(np.sum((off > 0.5 * group.size) & (off < group.size)))

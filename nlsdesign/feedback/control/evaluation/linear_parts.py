@@ -222,7 +222,7 @@ def linear_plant(
             ca.jacobian(shown, s.state), _by(shown, s.input, places), shown, s.derivative[rate], u[0],
         )],
     )  # fmt: skip
-    rest = rest_states(plant, angles)
+    rest = rest_states(plant, angles, unmoved=True)
     p, start = plant.start(plant.parameters), plant.start(plant.inputs)
     drive = _holding(function, rest, (start, p), places[0])
     inputs = np.tile(start, (len(angles), 1))

@@ -406,5 +406,5 @@ def tangent_stiffness(plant: FlatModel, angles: Array) -> Array:
     jump = row[at]
     for i in inner:
         jump += row[i] * ca.jacobian(s.derivative[i], s.state[of])
-    (slopes,) = evaluate_at(plant, s, [jump], rest_states(plant, angles))
+    (slopes,) = evaluate_at(plant, s, [jump], rest_states(plant, angles, unmoved=True))
     return slopes.ravel()

@@ -125,7 +125,7 @@ def _inverse(loop: ClosedLoop, frequency: Array, size: Array) -> tuple[Array, Ar
     names = [v.name for v in plant.states]
     inner = [i for i, name in enumerate(names) if name not in (motion, rate)]
     follow, balance = _functions(loop, (motion, rate), inner)
-    state = np.tile(rest_states(plant, np.zeros(1)), (len(size), 1))
+    state = np.tile(rest_states(plant, np.zeros(1), unmoved=True), (len(size), 1))
     u, p = plant.start(plant.inputs), plant.start(plant.parameters)
     omega = 2.0 * math.pi * frequency
     fixed = [np.tile(column[:, None], (1, len(size))) for column in (u, p)]

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression, depends
@@ -18,6 +19,7 @@ from ....model.linear import rest_state
 from ....model.roles import contour_ends, motor_of, series_spring
 from ....model.structure import MotorNames, MovingBody
 from ....model.transform import cut, named
+from ...analysis.rest import unmoved_states
 from .law_writer import LawWriter, LoopNames, loop_names
 
 
@@ -129,7 +131,10 @@ class KnownDrive:
         ]
         if not used:
             return expression
-        new = ca.vertcat(*(writer.number(v) for v, _ in used))
+        limit = self.motor.current_limit
+        new = ca.vertcat(
+            *(self.current_limit(writer) if v.name == limit else writer.number(v) for v, _ in used)
+        )
         return ca.SX(ca.substitute(expression, ca.vertcat(*(symbol for _, symbol in used)), new))
 
 
@@ -163,52 +168,127 @@ def currents_of_supply(
     return (-supply - induced) / resistance, (supply - induced) / resistance
 
 
-def declared_friction(
-    drive: KnownDrive, writer: LawWriter, width: Expression
-) -> Callable[[Expression], Expression]:
-    """Return what the plant declares to resist its motor as a function of the speed alone, in N·m.
+STEEPEST = 0.1
+"""Steepest change of sign of a friction that grows with the load, over the gain of the velocity loop.
 
-    It is read off the equations: all torques that depend on nothing but the speed of the motor, such as
-    those of bearings and of dry friction in its smooth form. Losses that grow with the load are not in
-    it. Its change of sign is spread over ±width: f(s)·(1 + ω/s)/2 + f(−s)·(1 − ω/s)/2 with
-    s = √(ω² + width²), because a command that passes zero would otherwise make the current jump.
+More of it would close a loop of its own through the estimated torque, and hunt.
+"""
 
-    ``writer``: of the controller; it is given the parameters of the plant that enter.
+
+def known_load(
+    drive: KnownDrive, writer: LawWriter, width: Expression, gain: Expression
+) -> Callable[[Expression, Expression, Expression], Expression]:
+    """Return what the plant declares to resist its motor beside its spring, R(θ, ω, T), in N·m.
+
+    It is read off the equations, R = −J·ω̇ − r·T without a drive: friction, also that of a place or of a
+    load, ripple, weights and constant loads. What else it depends on is taken as it starts. Its change of
+    sign is spread over ±w: R(s)·(1 + ω/s)/2 + R(−s)·(1 − ω/s)/2 with s = √(ω² + w²), because a command that
+    passes zero would otherwise make the current jump. w is the width, or more where friction grows with the
+    load, see :data:`STEEPEST`.
+
+    ``writer``: of the controller; it is given the parameters of the plant that enter. ``gain``: of the
+    velocity loop, in N·m·s/rad. The function takes the angle of the motor, its speed and the torque of the
+    spring.
     """
-    torque = _speed_torques(drive, writer)
+    plant, spring, body = drive.plant, series_spring(drive.plant), drive.body
+    opened = cut(plant, [spring.effort, f"{body.name}.drive_torque", *end_stops(drive)])
+    s, (before, declared) = opened.symbols(), drive.named
+    known = named(opened, s)
+    given = ca.vertcat(
+        known[body.motion], known[body.rate], s.input[[v.name for v in opened.inputs].index(spring.effort)]
+    )
+    acceleration = s.derivative[[v.name for v in opened.states].index(body.rate)]
+    resisting = -_at_start(opened, s, known[body.inertia or ""] * acceleration, given)
+    turns = ca.jacobian(before[spring.motion], before[body.motion])
+    resisting = drive.written(
+        writer, ca.substitute(resisting, s.parameter, declared.parameter) - turns * given[2]
+    )
 
-    def smooth(speed: Expression) -> Expression:
-        size = ca.sqrt(speed * speed + width * width)
+    def smooth(angle: Expression, speed: Expression, torque: Expression) -> Expression:
+        def at(speed: Expression, load: Expression = torque) -> Expression:
+            return ca.SX(ca.substitute(resisting, given, ca.vertcat(angle, speed, load)))
+
+        widest = width
+        if depends(resisting, given[2]):
+            grown = at(width) - at(-width) - at(width, ca.SX(0)) + at(-width, ca.SX(0))
+            widest = ca.fmax(width, grown / (2 * STEEPEST * gain))
+        size = ca.sqrt(speed * speed + widest * widest)
         share = speed / size
-        return (torque(size) * (1 + share) + torque(-size) * (1 - share)) / 2
+        return (at(size) * (1 + share) + at(-size) * (1 - share)) / 2
 
     return smooth
 
 
-def _speed_torques(drive: KnownDrive, writer: LawWriter) -> Callable[[Expression], Expression]:
-    """Return the sum of the torques on the motor that depend on nothing but its speed."""
+def _at_start(model: FlatModel, s: Symbols, expression: Expression, free: Expression) -> Expression:
+    """Return an expression with the states and inputs of a model as they start, but for the free ones."""
+    states, inputs = model.start(model.states), model.start(model.inputs)
+    fresh = ca.SX.sym("free", free.numel())
+    expression = ca.substitute(expression, free, fresh)
+    others = ca.vertcat(s.time, s.state, s.input, s.table)
+    starts = ca.DM([0.0, *states, *inputs, *model.look_up(list(states), list(inputs))])
+    return ca.SX(ca.substitute(ca.substitute(expression, others, starts), fresh, free))
+
+
+def end_stops(drive: KnownDrive) -> list[str]:
+    """Return the torques of places that the drive could not hold, as those of end stops."""
+    plant, spring = drive.plant, series_spring(drive.plant)
+    opened = cut(plant, [spring.effort])
+    s = opened.symbols()
+    known = named(opened, s)
+    end = min(contour_ends(plant, spring).values(), default=math.pi / 2.0) / abs(drive.spring_turns_value)
+    states, inputs = opened.start(opened.states), opened.start(opened.inputs)
+    names = [v.name for v in opened.inputs]
+    inputs[names.index(drive.names.current)] = plant.values[drive.motor.current_limit]
+    most = abs(opened.evaluate(list(states), list(inputs))[f"{drive.body.name}.drive_torque"])
+    place = [v.name for v in opened.states].index(drive.body.motion)
+    largest: dict[str, float] = {}
+    for angle in np.linspace(-1.5 * end, 1.5 * end, 61):
+        states[place] = angle
+        for name, value in opened.evaluate(list(states), list(inputs)).items():
+            largest[name] = max(largest.get(name, 0.0), abs(value))
+    return [
+        v.name for v in opened.signals
+        if v.unit == "N*m" and largest[v.name] > most and not known[v.name].is_leaf()
+        and depends(known[v.name], known[drive.body.motion])
+    ]  # fmt: skip
+
+
+STEPS = 3
+"""Steps of Newton's method to the current for a torque; from below they do not pass it where a gain falls."""
+
+LEAST_GAIN = 0.05
+"""Least gain of the drive that such a step reckons with, over that of small currents."""
+
+_LINEAR = 1e-9
+"""Share of its torque by which a drive may depart from a constant gain and count as linear."""
+
+
+def current_for(drive: KnownDrive, writer: LawWriter, torque: Expression) -> Expression:
+    """Return the current in A with which the drive makes a torque in N·m, also where its gain falls with it.
+
+    What the torque of the drive depends on beside the current is taken as it starts; one that follows the
+    current late counts as linear.
+
+    ``writer``: of the controller; it is given the parameters of the plant that enter.
+    """
+    plant, constant = drive.plant, drive.torque_per_current(writer)
     known, s = drive.named
-    rate = known[drive.body.rate]
-    others = ca.vertcat(s.time, all_but(s.state, rate), s.input)
-    by_speed = [
-        v.name
-        for v in drive.plant.signals
-        if v.unit == "N*m" and depends(known[v.name], rate) and not depends(known[v.name], others)
-    ]
-    if not by_speed:
-        return lambda speed: ca.SX(0)
-    # Cut at all of them at once, a torque inside another one of them has no effect of its own.
-    opened = cut(drive.plant, by_speed)
-    after = opened.symbols()
-    within = named(opened, after)
-    acceleration = after.derivative[[v.name for v in opened.states].index(drive.body.rate)]
-    total = ca.SX(0)
-    for name in by_speed:
-        share = -within[drive.body.inertia or ""] * ca.jacobian(acceleration, within[name])
-        if not depends(share, ca.vertcat(after.state, after.input)):
-            total += ca.substitute(share, after.parameter, s.parameter) * known[name]
-    placed = drive.written(writer, total)
-    return lambda speed: ca.SX(ca.substitute(placed, rate, speed))
+    asked = known[drive.names.current]
+    made = _at_start(plant, s, known[f"{drive.body.name}.drive_torque"], asked)
+    currents = np.linspace(0.1, 1.0, 10) * plant.values[drive.motor.current_limit]
+    torques = ca.Function("made", [asked, s.parameter], [made])(
+        ca.DM(currents).T, plant.start(plant.parameters)
+    )
+    gains = torques.full().ravel() / currents
+    current = torque / constant
+    if np.ptp(gains) <= _LINEAR * np.max(np.abs(gains)):
+        return current
+    driving = drive.written(writer, made)
+    gain = ca.jacobian(driving, asked)
+    for _ in range(STEPS):
+        reached, slope = (ca.substitute(e, asked, current) for e in (driving, gain))
+        current += (torque - reached) / ca.fmax(slope, LEAST_GAIN * constant)
+    return current
 
 
 SLOW = 1.0
@@ -281,7 +361,7 @@ def only_side(plant: FlatModel) -> float:
     """
     drive = KnownDrive(plant)
     end = min(contour_ends(plant, series_spring(plant)).values(), default=_SMALL_TURN)
-    torques = [_torque_at_rest(drive, way * end) for way in (1.0, -1.0)]
+    torques = [torque_at_rest(drive, way * end) for way in (1.0, -1.0)]
     strongest = max(torques, key=abs)
     if min(map(abs, torques)) > _NOTHING * abs(strongest) or strongest == 0.0:
         return 0.0
@@ -366,10 +446,12 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
 def _by_contour(drive: KnownDrive, way: float) -> float:
     """Return the size of the torque at rest at the end of the contour; infinite without a cam."""
     ends = contour_ends(drive.plant, series_spring(drive.plant)).values()
-    return abs(_torque_at_rest(drive, way * min(ends))) if ends else math.inf
+    return abs(torque_at_rest(drive, way * min(ends))) if ends else math.inf
 
 
-def _torque_at_rest(drive: KnownDrive, angle: float) -> float:
+def torque_at_rest(drive: KnownDrive, angle: float) -> float:
     """Return the torque of the spring at rest at an angle of the spring in rad."""
-    turned = {drive.body.motion: angle / abs(drive.spring_turns_value), drive.body.rate: 0.0}
+    body, starts = drive.body, {v.name: v.start for v in drive.plant.states}
+    turned = {name: starts[name] for name in unmoved_states(drive.plant, body.rate)}
+    turned |= {body.motion: angle / abs(drive.spring_turns_value), body.rate: 0.0}
     return drive.plant.evaluate(list(rest_state(drive.plant, turned)))[series_spring(drive.plant).effort]

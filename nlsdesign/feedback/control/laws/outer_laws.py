@@ -414,8 +414,9 @@ def stiffness_table(drive: KnownDrive) -> Table:
     """Return the slope of the spring's torque at rest over its measured angle, zero where the torque falls.
 
     Over the contour of the cam, or ±90° where there is none; held at the ends, as the lever arm is. All inner
-    states of the spring are relaxed. The argument is the angle of the motor where that alone tells the angle
-    of the spring, else the angle of the spring, which is then an input of its own.
+    states of the spring are relaxed, or as they start where only motion moves them, as in hysteresis. The
+    argument is the angle of the motor where that alone tells the angle of the spring, else the angle of the
+    spring, which is then an input of its own.
     """
     plant, body = drive.plant, drive.body
     _check_held(plant, body.name)
@@ -428,7 +429,10 @@ def stiffness_table(drive: KnownDrive) -> Table:
     edges = np.concatenate([angles[:1], (angles[1:] + angles[:-1]) / 2.0, angles[-1:]])
     symbols = plant.symbols()
     (at_rest,) = evaluate_at(
-        plant, symbols, [named(plant, symbols)[spring.effort]], rest_states(plant, (edges - offset) / turns)
+        plant,
+        symbols,
+        [named(plant, symbols)[spring.effort]],
+        rest_states(plant, (edges - offset) / turns, unmoved=True),
     )
     torques = at_rest.ravel()
     slopes = np.maximum(np.diff(torques) / np.diff(edges), 0.0)

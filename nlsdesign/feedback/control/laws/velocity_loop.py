@@ -11,7 +11,7 @@ import casadi as ca
 from ....foundation.errors import ValueRangeError
 from ....foundation.symbolic import Expression
 from ....model import Variable
-from .known_drive import KnownDrive, currents_of_supply, declared_friction
+from .known_drive import KnownDrive, current_for, currents_of_supply, known_load
 from .law_writer import GAIN, AntiWindup, ConditionalIntegration, Integration, LawWriter, limited
 from .outer_laws import Heard, HeldBack, SpeedCommand, check_settings
 
@@ -122,17 +122,18 @@ LEAST_WIDTH = 1e-6
 
 @dataclass(frozen=True)
 class FrictionCompensation:
-    """Adds the friction that the plant declares at the commanded speed.
+    """Adds what the plant declares to resist its motor beside the spring, at the commanded speed.
 
-    Only what depends on the speed of the motor alone: bearings and dry friction, no losses that grow with the
-    load. The plant's own numbers are parameters of the controller.
+    Friction, also where it depends on the place or grows with the load, and what else acts on the motor as a
+    function of angle and speed: ripple, weights, constant loads; no end stop. At the measured angle and the
+    estimated torque of the spring. The plant's own numbers are parameters of the controller.
 
     Parameters
     ----------
     share
-        Of the declared friction that is added, 1.
+        Of that torque that is added, 1.
     width
-        Speed in rad/s over which it changes sign: the larger, the less a command near zero chatters.
+        Speed in rad/s over which friction changes sign: the larger, the less a command near zero chatters.
 
     Raises
     ------
@@ -151,8 +152,10 @@ class FrictionCompensation:
                 next_step="take about the speed that one count of the encoder per sample is",
             )  # fmt: skip
 
-    def torque(self, writer: LawWriter, drive: KnownDrive, speed: Expression) -> Expression:
-        """Return the torque in N·m that the declared friction takes at a speed.
+    def torque(
+        self, writer: LawWriter, drive: KnownDrive, heard: Heard, speed: Expression, *, gain: Expression
+    ) -> Expression:
+        """Return the torque in N·m that resists the motor at a speed.
 
         Parameters
         ----------
@@ -160,11 +163,15 @@ class FrictionCompensation:
             Of the controller.
         drive
             What is known of the plant.
+        heard
+            Inputs of the controller.
         speed
             Of the motor in rad/s.
+        gain
+            Of the velocity loop in N·m·s/rad.
         """
         share = writer.setting(
-            "friction_share", "1", "velocity loop: share of the declared friction added", self.share
+            "friction_share", "1", "velocity loop: share of the declared friction and loads added", self.share
         )
         width = writer.number(
             Variable(
@@ -172,7 +179,7 @@ class FrictionCompensation:
                 self.width, self.width, LEAST_WIDTH,
             )
         )  # fmt: skip
-        return share * declared_friction(drive, writer, width)(speed)
+        return share * known_load(drive, writer, width, gain)(heard.angle, speed, heard.torque)
 
 
 class MotorCurrent(NamedTuple):
@@ -185,11 +192,13 @@ class MotorCurrent(NamedTuple):
 
 @dataclass(frozen=True)
 class VelocityLoop:
-    """PI on the filtered speed: k·I = J·ω_b·(ω_d − ω̂)·(1 + ω_i∫dt) + J·ω̇_d + c·r·T̂ + friction(ω_d) − d̂.
+    """PI on the filtered speed: D(I) = J·ω_b·(ω_d − ω̂)·(1 + ω_i∫dt) + J·ω̇_d + c·r·T̂ + R(θ, ω_d, T̂) − d̂.
 
-    ω_d is the commanded speed of the motor, ω̇_d its rate as far as the outer law knows it, ω̂ the filtered
-    difference of the measured angle. The current is held within ±I_max, and within what the supply can push
-    through the winding, (±U_max − k·ω̂)/R, where the motor declares a resistance. Source: Vallery et al. 2008.
+    D is k·I, or what the plant declares of a drive whose gain falls with the current; R is what resists the
+    motor, see :class:`FrictionCompensation`. ω_d is the commanded speed of the motor, ω̇_d its rate as far as
+    the outer law knows it, ω̂ the filtered difference of the measured angle. The current is held within
+    ±I_max, and within what the supply can push through the winding, (±U_max − k·ω̂)/R, where the motor
+    declares a resistance. Source: Vallery et al. 2008.
 
     Parameters
     ----------
@@ -203,7 +212,7 @@ class VelocityLoop:
     compensation
         Share c of the estimated spring torque that is added, so that the loop does not have to carry it.
     friction
-        Compensation of the declared friction; ``None`` for none.
+        Compensation of what resists the motor; ``None`` for none.
     disturbance
         Disturbance observer; ``None`` for none.
     windup
@@ -242,19 +251,12 @@ class VelocityLoop:
         """Write the loop into a controller and return the current, for the command of its outer law."""
         raw, speed = self.measured_speed(writer, drive, heard)
         slow = writer.state("velocity_loop.integral", "N*m", "integral part of the motor torque")
-        turns, inertia, constant = (
-            drive.spring_turns(writer),
-            drive.inertia(writer),
-            drive.torque_per_current(writer),
+        turns, inertia = drive.spring_turns(writer), drive.inertia(writer)
+        constant = drive.torque_per_current(writer)
+        closes_at = writer.setting(
+            "velocity_bandwidth", "Hz", "velocity loop: bandwidth", self.closes_at(writer.sample_time)
         )
-        stiffness = (
-            inertia
-            * 2.0
-            * math.pi
-            * writer.setting(
-                "velocity_bandwidth", "Hz", "velocity loop: bandwidth", self.closes_at(writer.sample_time)
-            )
-        )
+        stiffness = inertia * 2.0 * math.pi * closes_at
         share = writer.setting(
             "compensation", "1", "velocity loop: share of the estimated spring torque added to the current",
             self.compensation,
@@ -264,22 +266,22 @@ class VelocityLoop:
         load = turns * heard.torque
         torque = stiffness * lacking + slow + share * load + inertia * command.acceleration / turns
         if self.friction is not None:
-            torque += self.friction.torque(writer, drive, wanted_speed)
+            torque += self.friction.torque(writer, drive, heard, wanted_speed, gain=stiffness)
         if self.disturbance is not None:
-            resisting = load if self.friction is None else load + self.friction.torque(writer, drive, speed)
+            resisting = (
+                load
+                if self.friction is None
+                else load + self.friction.torque(writer, drive, heard, speed, gain=stiffness)
+            )
             torque -= self.disturbance.torque(writer, MotorBalance(inertia, constant, raw, resisting))
-        wanted = torque / constant
+        wanted = current_for(drive, writer, torque)
         current = self._limited(writer, drive, wanted, speed)
         if self.disturbance is not None:
             self.disturbance.remember(writer, current)
         beyond = wanted - current
-        rate = (
-            2.0
-            * math.pi
-            * writer.setting(
-                "velocity_integral", "Hz", "velocity loop: corner below which it integrates", self.integral
-            )
-        )
+        rate = 2.0 * math.pi * writer.setting(
+            "velocity_integral", "Hz", "velocity loop: corner below which it integrates", self.integral
+        )  # fmt: skip
         one = Integration("velocity", slow, lacking, rate * stiffness * lacking, (beyond,), beyond * constant)
         writer.follow("velocity_loop.integral", self.windup.following(writer, one))
         return MotorCurrent(

@@ -295,8 +295,9 @@ class _Bounding:
         largest = 0.0
         for _ in range(REFINEMENTS):
             middle = (cells[0] + cells[1]) / 2.0
-            slope = self._steepness(cells)
-            largest = max(largest, float(np.max(self._steepness((middle, middle)), initial=0.0)))
+            ends = [np.concatenate([end, middle]) for end in cells]
+            slope, steep = np.split(self._steepness((ends[0], ends[1])), 2)
+            largest = max(largest, float(np.max(steep, initial=0.0)))
             wide = (slope > 1.3 * largest) & (cells[1] - cells[0] > 1e-6)
             done.append((cells[0][~wide], cells[1][~wide]))
             cells = (
@@ -422,21 +423,19 @@ class _Bounding:
 
     def _output_error(self, z: Array) -> float:
         """Return how far t(θ)·z + t₀(θ), as read from the table, is from the torque."""
-        middle = (self.cells[0] + self.cells[1]) / 2.0
-        half = (self.cells[1] - self.cells[0]) / 2.0
+        boxes = _divided(z, 1 if self.view.affine else 6, ends=self.view.affine)
+        box = np.concatenate(boxes)
+        low, high = (np.tile(end, len(boxes)) for end in self.cells)
+        middle, half = (low + high) / 2.0, (high - low) / 2.0
         n, names = len(self.design.step.plant.names), self.design.step.plant.names
         keys = [f"estimate[0][{names.index(name)}]" for name in self.inner] + [f"estimate[0][{n}]"]
         read = [_read(self.design, key, middle) for key in keys]
-        parts = 1 if self.view.affine else 6
-        worst = 0.0
-        for box in _divided(z, parts, ends=self.view.affine):
-            at = self.view.ranges(self.view.torque, (middle, middle), box)[0]
-            slopes = self.view.ranges(self.view.torque, self.cells, box)[1]
-            value, slope = _affine([r[0] for r in read], box), _affine([r[1] for r in read], box)
-            off = _apart(value, (at.lower[:, 0], at.upper[:, 0]))
-            steep = _apart(slope, (slopes.lower[:, 0], slopes.upper[:, 0]))
-            worst = max(worst, float(np.max(off + steep * half)))
-        return worst
+        at = self.view.ranges(self.view.torque, (middle, middle), box)[0]
+        slopes = self.view.ranges(self.view.torque, (low, high), box)[1]
+        value, slope = _affine([r[0] for r in read], box), _affine([r[1] for r in read], box)
+        off = _apart(value, (at.lower[:, 0], at.upper[:, 0]))
+        steep = _apart(slope, (slopes.lower[:, 0], slopes.upper[:, 0]))
+        return float(np.max(off + steep * half))
 
 
 def _affine(read: list[Array], box: Array) -> Bounds:

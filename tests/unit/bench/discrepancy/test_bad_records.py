@@ -22,6 +22,10 @@ from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, write_declaration, write_records
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 HEADS = "t_s,theta_rad,current_A,force_N"
 TIME, ANGLE, CURRENT, FORCE = range(4)

@@ -15,9 +15,8 @@ from nlsdesign.bench.identification.records.quality import Finding
 from nlsdesign.components import Assembly
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.simulation import Trace
-from tests.diagnosed import rig_set
+from tests.hand_machines import Level, Machine, made
 
-ONLY = ("hold", "multisine", "sine_15deg_5.0Hz", "sine_25deg_2.0Hz", "sine_45deg_0.5Hz")
 FEW = (quadratic_drag, coulomb_friction)
 ALLOWED = {"error", "where", "records"}
 """Of ``verdict.json`` that may depend on records that are held out."""
@@ -25,8 +24,9 @@ ALLOWED = {"error", "where", "records"}
 
 @pytest.fixture(scope="module")
 def rubbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Assembly, RecordSet]:
-    """Five records, some of which are held out by default."""
-    return rig_set(tmp_path_factory.mktemp("rubbed"), "arm", {"coulomb_friction": 1.0}, 12, only=ONLY)
+    """Three records of a motor with dry friction, some of which are held out by default."""
+    level: Level = lambda rate, angle, load: 0.12  # noqa: E731
+    return made(Machine(friction=level), tmp_path_factory.mktemp("rubbed"), records=3)
 
 
 def changed(record: Record) -> Record:
@@ -35,7 +35,7 @@ def changed(record: Record) -> Record:
         return record
     draw = np.random.default_rng(8)
     signals = {
-        name: np.roll(3.0 * rows, 40) + 5.0 * float(np.std(rows)) * draw.standard_normal(len(rows))
+        name: np.roll(3.0 * rows, 40) + 0.05 * float(np.std(rows)) * draw.standard_normal(len(rows))
         for name, rows in record.trace.signals.items()
     }
     return replace(record, trace=Trace(record.trace.time, signals, record.trace.units, record.trace.name))

@@ -63,7 +63,11 @@ class BenchByHand:
     """Two fitted records, one for selection, one held out."""
 
     def __init__(self) -> None:
-        self.units = {"spring": "N*m", "wheel": "N*m"}
+        block = SimpleNamespace(unit="N*m")
+        self.block_noise = {
+            name: SimpleNamespace(typical=floor, known=math.inf, block=block)
+            for name, floor in (("spring", 0.1), ("wheel", 0.5))
+        }
         self.roles = {"a": "fit", "b": "fit", "c": "selection", "d": "held_out"}
 
     @property
@@ -72,12 +76,6 @@ class BenchByHand:
 
     def of(self, *roles: str) -> list[SimpleNamespace]:
         return [SimpleNamespace(name=n) for n, role in self.roles.items() if role in roles]
-
-    def typical_floor(self, block: str) -> float:
-        return {"spring": 0.1, "wheel": 0.5}[block]
-
-    def known_from(self, block: str) -> float:
-        return math.inf
 
 
 BENCH = cast(Bench, BenchByHand())
@@ -90,6 +88,23 @@ def with_mean_squares(**records: float) -> Hypothesis:
 
 
 # --- hypothesis -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mean_square", [1.0, 4.0])
+def test_numbers_beside_an_open_block_are_as_known_as_its_records_agree(mean_square: float) -> None:
+    fit = replace(fitted(0.1, spring_stiffness=1.0), by_records=np.array([[0.04]]))
+    hypothesis = replace(with_mean_squares(a=mean_square), fits={("spring",): fit})
+    left = excesses(hypothesis, BENCH, RULE)
+    (known,) = hypothesis.as_known_beside(left).fits.values()
+    assert known.covariance[0, 0] == pytest.approx(0.04 if left["spring"].open else 0.01)
+    assert left["spring"].open == (mean_square > 1.0)
+
+
+def test_a_standard_error_holds_what_no_record_tells_from_the_number() -> None:
+    fit = fitted(0.1, spring_stiffness=1.0)
+    known = fit.standard_error("spring.stiffness")
+    late = replace(fit, parameters=tuple(replace(p, confounded=2.0 * known) for p in fit.parameters))
+    assert late.standard_error("spring.stiffness") == pytest.approx(math.sqrt(5.0) * known)
 
 
 def test_a_hypothesis_lists_its_effects_and_their_numbers_in_the_order_of_adding() -> None:

@@ -17,7 +17,7 @@ from nlsdesign.bench.discrepancy.selection.comparison import Comparison, Judged
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
-from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
+from nlsdesign.bench.identification.equation_error.evidence import Bench, NoiseFloor
 from nlsdesign.bench.identification.filters import smoothing
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.measurement import Role
@@ -38,6 +38,10 @@ from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 TIME = np.arange(6000) * 0.002
 SIGMA = 0.1
@@ -60,7 +64,7 @@ RECORDS = RecordSet(tuple(motion(seed) for seed in range(5)), COLUMNS)
 def judged(record: Record, error: Array, *, name: str = "motor", target: str | None = None) -> Judged:
     """One block on one record, its filtered error as given at every sample."""
     matrix = smoothing(len(TIME), 2.0, 5)
-    floor = BlockNoise(matrix, np.full(matrix.shape[0], SIGMA), np.full(len(TIME), SIGMA))
+    floor = NoiseFloor(matrix, np.full(matrix.shape[0], SIGMA), np.full(len(TIME), SIGMA))
     output = SimpleNamespace(unit="N*m", description="torque")
     block = SimpleNamespace(
         name=name,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -48,14 +49,12 @@ def effect(
 SEGMENTS = 5
 
 
+def noise_by_hand(unit: str) -> SimpleNamespace:
+    return SimpleNamespace(typical=1.0, known=math.inf, block=SimpleNamespace(unit=unit))
+
+
 class Bench:
-    units: ClassVar = {"motor": "N*m", "spring": "N"}
-
-    def typical_floor(self, block: str) -> float:
-        return 1.0
-
-    def known_from(self, block: str) -> float:
-        return math.inf
+    block_noise: ClassVar = {name: noise_by_hand(unit) for name, unit in (("motor", "N*m"), ("spring", "N"))}
 
 
 class Table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
@@ -407,6 +408,16 @@ def test_every_combination_of_starts_is_tried_in_the_size_of_what_was_measured(n
     assert (size.lower, size.upper, size.scale, size.size) == (-5.0, 5.0, "linear", 1.0)
     assert bench.values == [{"spring.stiffness": 2.2, "part.gap": 0.2, "part.size": 0.0}]
     assert task.new == ("part.gap", "part.size")
+
+
+def test_a_delay_is_known_but_for_a_shift_that_the_records_may_have() -> None:
+    """Held currents act half a sample late: a delay was half a sample wrong, with an error of a hundredth."""
+    fits = HypothesisFit(cast(Bench, BenchOfOne()), {"q": 2.0, "shift": 0.06})
+    late = replace(GAP, beyond="shift")
+    task = fits._problem(Hypothesis(BLANK, (candidate(late, SIZE),)), group(), (late, SIZE))
+    _, gap, size = task.starts[0]
+    assert gap.confounded == pytest.approx(0.06 / math.sqrt(3.0))
+    assert size.confounded == 0.0
 
 
 def test_a_group_comes_back_with_what_it_leaves_over(notebook: Notebook) -> None:

@@ -23,7 +23,7 @@ _FRICTIONS = [
 
 
 def named(machine: Machine, folder: Path) -> Verdict:
-    return diagnose(*made(machine, folder), catalogue=_FRICTIONS)
+    return diagnose(*made(machine, folder, records=2), catalogue=_FRICTIONS)
 
 
 def falling(rate: float, angle: float, load: float) -> float:

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import ALL, Verdict
-from nlsdesign.bench.discrepancy.diagnose import _strained
+from nlsdesign.bench.discrepancy.diagnose import _runners_up, _strained
+from nlsdesign.bench.discrepancy.effects.effect import Candidate
 from nlsdesign.bench.discrepancy.effects.plain_names import (
     effect_in_words,
     kind_in_words,
@@ -26,7 +27,8 @@ from nlsdesign.bench.discrepancy.reporting.verdict import Course, RecordGap, in_
 from nlsdesign.bench.discrepancy.screening.scale_and_sign import _hint
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.discrepancy.selection.measures import DECLARED, Excess
-from nlsdesign.bench.discrepancy.selection.trials import Skipped
+from nlsdesign.bench.discrepancy.selection.search import Outcome
+from nlsdesign.bench.discrepancy.selection.trials import Skipped, Tried
 from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.bench.identification.parameters import declared_parameter
 from nlsdesign.components import (
@@ -44,6 +46,10 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import Variable
 from nlsdesign.presentation import report
 from nlsdesign.presentation.figures.style import alternative_text
+from tests.undrawn import undrawn
+
+__all__ = ["undrawn"]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 def piece() -> Any:
@@ -330,6 +336,17 @@ def test_what_helped_is_said_even_if_nothing_is_named() -> None:
     because = verdict("unknown", runners_up=(("backlash", 0.4, "its gap is zero within its error"),))
     assert "explains 40.0 % of the excess over the noise: its gap is zero within its error." in str(because)
     assert because.to_dict()["runners_up"][0]["reason"] == "its gap is zero within its error"
+
+
+def test_what_explains_nothing_is_no_runner_up() -> None:
+    blank = assembly("blank", load=Inertia(inertia=1.0))
+    tried = tuple(
+        Tried(Hypothesis(blank, (Candidate(name, "load", blank, (), "", ""),)), share, ("too late",))
+        for name, share in (("backlash", 0.0), ("self_heating", -0.2), ("drive_delay", 0.01))
+    )
+    assert _runners_up(Outcome(Hypothesis(blank), tried=tried), ()) == (
+        ("drive_delay", 0.01, "too late", {}),
+    )
 
 
 def test_what_is_not_all_is_said() -> None:

@@ -13,7 +13,7 @@ from nlsdesign.bench.discrepancy.block_prediction import band_errors, predict
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import block_noise, evidence, inferred_sampling
-from nlsdesign.bench.identification.equation_error.between_samples import on_clock, refined
+from nlsdesign.bench.identification.equation_error.between_samples import on_clock
 from nlsdesign.bench.identification.equation_error.block import Block
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.mapping import Column
@@ -59,7 +59,7 @@ def test_a_corner_that_is_passed_between_samples_is_no_error(monkeypatch: pytest
     assert squares(bench) < 1.4
     (remark,) = bench.records.remarks
     assert "sampled so slowly" in str(remark)
-    monkeypatch.setattr(evidence, "resolving_step", lambda readings: math.inf)
+    monkeypatch.setattr(evidence, "resolving_step", lambda *_: math.inf)
     assert squares(Bench(RECORDS, bench_blocks())) > 1.4, "or the test would show nothing"
 
 
@@ -71,7 +71,7 @@ def test_what_is_predicted_stays_on_the_samples_as_measured() -> None:
 
 def test_samples_stay_between_which_others_are_put() -> None:
     whole = RECORDS.records[0]
-    finer = refined(whole, 4)
+    finer = whole.refined(4)
     assert finer.step == pytest.approx(0.25 * STEP)
     for name in MEASURED:
         np.testing.assert_allclose(finer.trace[name][::4], whole.trace[name], atol=1e-12)
@@ -87,7 +87,7 @@ def test_a_masked_sample_has_no_part_in_what_is_put_beside_it() -> None:
     spoilt[200] += 1e3
     signals = {**whole.trace.signals, "motor.current": spoilt}
     one, other = (
-        refined(replace(whole, masked={"motor.current": mask}, trace=trace), 2)
+        replace(whole, masked={"motor.current": mask}, trace=trace).refined(2)
         for trace in (whole.trace, replace(whole.trace, signals=signals))
     )
     np.testing.assert_array_equal(one.trace["motor.current"], other.trace["motor.current"])
@@ -111,7 +111,7 @@ def test_a_quick_swing_is_read_across_its_reversals(monkeypatch: pytest.MonkeyPa
     columns = tuple(Column(name, name, unit) for name, unit in units.items())
     monkeypatch.setattr(block_noise, "LEAST_COVERED", least)
     bench = Bench(RecordSet((Record("swing", trace),), columns), blocks_of(flatten(swing), tuple(units)))
-    (floor,) = bench.floors.values()
+    (floor,) = bench.block_noise["ball"].floors.values()
     if least:
         assert len(floor.sigma) > 3000
         assert bench.covered()["ball"] > 0.9

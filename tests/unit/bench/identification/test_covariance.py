@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from nlsdesign.bench.identification.covariance import Piece, robust_covariance
+from nlsdesign.bench.identification.covariance import Piece, covariance_by_records, robust_covariance
 from nlsdesign.foundation.arrays import Array
 
 COUNT, STEP = 600, 0.01
@@ -55,6 +55,34 @@ def test_residuals_that_follow_the_slopes_count_beyond_what_their_size_says() ->
     found = robust_covariance(pieces, np.zeros((0, 1)))[0, 0]
     assert found > 3.0 * as_if_independent
     assert found > 0.4 * scatter
+
+
+def wanting(records: int, seed: int) -> tuple[float, list[Piece]]:
+    """One number fitted to records each of which wants another one throughout: a model lacks something."""
+    draw, x = np.random.default_rng(seed), slopes()[:, 1:]
+    runs = [(x * draw.standard_normal()).ravel() + 0.1 * draw.standard_normal(COUNT) for _ in range(records)]
+    value = np.linalg.lstsq(np.vstack([x] * records), np.concatenate(runs), rcond=None)[0]
+    time = STEP * np.arange(COUNT)
+    return float(value[0]), [Piece("motor", f"r{k}", time, run - x @ value, x) for k, run in enumerate(runs)]
+
+
+def test_what_a_model_lacks_throughout_a_record_scatters_from_record_to_record() -> None:
+    none, fits = np.zeros((0, 1)), [wanting(6, seed) for seed in range(100)]
+    true = float(np.std([value for value, _ in fits]))
+    by_segments = [robust_covariance(pieces, none) for _, pieces in fits]
+    by_records = [
+        covariance_by_records(pieces, none, known)
+        for (_, pieces), known in zip(fits, by_segments, strict=True)
+    ]
+    stated = [float(np.sqrt(np.mean(each))) for each in (by_segments, by_records)]
+    assert stated[0] < 0.6 * true, "or the test would show nothing"
+    assert stated[1] == pytest.approx(true, rel=0.25)
+
+
+def test_two_records_tell_nothing_of_a_scatter() -> None:
+    pieces = wanting(2, 0)[1]
+    known = robust_covariance(pieces, np.zeros((0, 1)))
+    assert covariance_by_records(pieces, np.zeros((0, 1)), known) is known
 
 
 def test_a_number_of_which_one_segment_alone_tells_is_not_known_exactly() -> None:

@@ -13,10 +13,11 @@ from scipy.linalg import expm
 from scipy.optimize import lsq_linear
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
-from nlsdesign.bench.identification.equation_error.block import Block
+from nlsdesign.bench.identification.equation_error.block import Block, NoiseFloor
 from nlsdesign.bench.identification.equation_error.block_response import DrivenBlock
-from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.equation_error.evidence import Bench, Evidence
 from nlsdesign.bench.identification.equation_error.stepping import exact_step, rosenbrock_step, stages_of
+from nlsdesign.bench.identification.filters import every
 from nlsdesign.bench.identification.least_squares import (
     Fit,
     Parameter,
@@ -137,6 +138,38 @@ def test_derivatives_are_those_of_finite_differences(inside: dict[str, object]) 
         up, down = (driven.respond(samples, values | {name: values[name] + s * h}).output for s in (1, -1))
         difference = (up - down) / (2.0 * h)
         assert np.max(np.abs(slope[:, j] - difference)) < 2e-5 * np.max(np.abs(difference)), name
+
+
+def test_slopes_that_the_output_contradicts_are_refused() -> None:
+    """Fillers that slide within a sample: the force is bounded, and its slopes had fifty digits."""
+    block = block_of(puller(fillers=SlidingFillers(modulus=4e5, yield_stress=2e4)))
+    number = "spring.piece.fillers.yield_stress"
+    driven = DrivenBlock(block, [number], records=[record_of(np.zeros_like(TIME))])
+    samples = driven.samples(record_of(np.zeros_like(TIME)), block.model.values)
+    for sound in (2e4, 200.0):
+        driven.respond(samples, {number: sound})
+    assert np.all(np.isfinite(driven.output(samples, {number: 100.0})))
+    with pytest.raises(ConvergenceError, match="no derivative"):
+        driven.respond(samples, {number: 100.0})
+
+
+def test_the_last_four_answers_of_a_record_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
+    block, record, asked = block_of(puller()), record_of(force_by_hand()), list[float]()
+    driven = DrivenBlock(block, FREE, records=[record])
+    samples = driven.samples(record, block.model.values)
+    floor = NoiseFloor(every(len(TIME), 1), np.ones_like(TIME), np.ones_like(TIME))
+    evidence, respond = Evidence(driven, record, floor, samples), driven.respond
+    monkeypatch.setattr(driven, "respond", lambda given, p: (asked.append(p[FREE[0]]), respond(given, p))[1])
+    answers = [
+        evidence.residual({**block.model.values, FREE[0]: modulus}) for modulus in (1e5, 2e5, 3e5, 4e5, 1e5)
+    ]
+    assert asked == [1e5, 2e5, 3e5, 4e5]
+    assert answers[-1] is answers[0]
+    for modulus in (5e5, 1e5):
+        again = evidence.residual({**block.model.values, FREE[0]: modulus})
+    assert asked[4:] == [5e5, 1e5], "the oldest answer has made room"
+    for now, then in zip(again, answers[0], strict=True):
+        np.testing.assert_array_equal(now, then)
 
 
 def test_a_stretchy_cable_answers_like_the_implicit_equation_solved_by_bisection() -> None:

@@ -12,6 +12,7 @@ from nlsdesign.bench.discrepancy import diagnose
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import input_noise
+from nlsdesign.bench.identification.equation_error import noise as channel_noise
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import ROTATION, Assembly, Dashpot, Encoder, Inertia, tie
@@ -71,7 +72,7 @@ def test_noise_that_remembers_is_in_the_floor_of_the_block_that_it_drives(
     (colour,) = bench.noise.colours["ball.torque"]["slow"].parts
     assert 0.5 * TIME < colour.time < 2.0 * TIME
     monkeypatch.setattr(input_noise, "_OPEN", np.inf)
-    floors = [each.floors["ball", "slow"] for each in (bench, turned(SLOW)[0])]
+    floors = [each.block_noise["ball"].floors["slow"] for each in (bench, turned(SLOW)[0])]
     true = float(np.std(floors[0].filter @ noise))
     assert float(np.median(floors[0].sigma)) == pytest.approx(true, rel=0.2)
     assert float(np.median(floors[1].sigma)) < 0.6 * true, "or the test would show nothing"
@@ -100,7 +101,7 @@ def test_what_is_no_noise_is_not_taken_for_it(
     clause: str, no_clause: float, what: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert turned(**what)[0].noise.evidence["ball.torque"] == "white only"
-    monkeypatch.setattr(input_noise, clause, no_clause)
+    monkeypatch.setattr(channel_noise if clause == "_CONTRADICTED" else input_noise, clause, no_clause)
     assert turned(**what)[0].noise.evidence["ball.torque"] == "above motion", "this clause decides"
 
 

@@ -51,7 +51,9 @@ def test_rows_far_from_a_masked_sample_still_count() -> None:
         Bench(RecordSet((each,), COLUMNS), blocks) for each in (record("a", 0.2, 1e-3), masked(PLACE))
     )
     assert whole.clock == part.clock
-    lost = set(whole.floors["spring", "a"].places) - set(part.floors["spring", "a"].places)
+    lost = set(whole.block_noise["spring"].floors["a"].places) - set(
+        part.block_noise["spring"].floors["a"].places
+    )
     assert lost
     step = part.records.records[0].step
     assert all(abs(place * step - PLACE * 1e-3) < 0.06 for place in lost)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from scipy.signal import lfilter
 
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
-from nlsdesign.bench.identification.equation_error.evidence import Bench, BlockNoise
+from nlsdesign.bench.identification.equation_error.block_noise import noise_floor
+from nlsdesign.bench.identification.equation_error.evidence import Bench, NoiseFloor
 from nlsdesign.bench.identification.equation_error.noise import (
     Noise,
     NoisePart,
@@ -74,7 +76,7 @@ def test_a_current_that_jumps_with_the_counts_of_an_encoder_is_not_the_noise_of_
     assert estimate_noise(quiet).level["current"] == pytest.approx(0.02, rel=0.05)
 
 
-def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, BlockNoise]:
+def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, NoiseFloor]:
     """Floors of a bench whose force has noise that remembers, seen in ten rests of 0.1 s."""
     records = RecordSet((record("a", 0.2, 1e-3),), COLUMNS)
     noise = estimate_noise(records)
@@ -84,8 +86,23 @@ def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, BlockNoise]:
     bench = Bench(records, list(BLOCKS.values()),
                   noise=Noise(noise.level, noise.rounded, {name: slow}, {}, seen))  # fmt: skip
     for block in BLOCKS:
-        assert bench.known_from(block) == pytest.approx(bench.floors[block, "a"].known)
-    return {block: bench.floors[block, "a"] for block in BLOCKS}
+        assert bench.block_noise[block].known == pytest.approx(bench.block_noise[block].floors["a"].known)
+    return {block: bench.block_noise[block].floors["a"] for block in BLOCKS}
+
+
+def test_the_share_of_a_signal_in_a_floor_is_what_the_floor_lacks_without_its_noise() -> None:
+    run = record("a", 0.2, 1e-3)
+    bench = Bench(RecordSet((run,), COLUMNS), list(BLOCKS.values()))
+    read = bench.block_noise["motor"]
+    shares = read.floors["a"].shares
+    for name in ("current_sensor.reading", "force_sensor.reading"):
+        without = replace(bench.noise, level={**bench.noise.level, name: 0.0})
+        whole, rest = (
+            float(np.mean(noise_floor(read.block, run, noise, read.filters).sigma ** 2))
+            for noise in (bench.noise, without)
+        )
+        # Of all samples, where the floor is that of the rows.
+        assert 0.01 < shares[name] == pytest.approx(1.0 - rest / whole, rel=0.1)
 
 
 def test_slow_noise_leaves_fewer_independent_rows_and_a_floor_that_is_less_known() -> None:

@@ -17,7 +17,6 @@ from nlsdesign.bench.identification.equation_error.block_response import DrivenB
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.least_squares import declared_parameter, fit
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.bench.identification.records.measurement import in_canonical_order
 from nlsdesign.bench.identification.records.quality import Finding
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
@@ -85,8 +84,8 @@ def test_the_canonical_order_is_that_of_content() -> None:
     original = [replace(r, source=f"{r.name}.csv") for r in (LARGE, SMALL)]
     findings = (Finding("large.csv: column 'x'", "is odd"), Finding("small.csv: column 'x'", "is odd"))
     other = (Finding("a.csv: column 'x'", "is odd"), Finding("z.csv: column 'x'", "is odd"))
-    one = in_canonical_order(RecordSet(tuple(original), COLUMNS, findings))
-    two = in_canonical_order(RecordSet(tuple(renamed), COLUMNS, other))
+    one = RecordSet(tuple(original), COLUMNS, findings).in_canonical_order()
+    two = RecordSet(tuple(renamed), COLUMNS, other).in_canonical_order()
     called = {"small": "z", "large": "a"}
     assert [called[r.name] for r in one.records] == [r.name for r in two.records]
     places = [f.place.partition(".")[0] for f in one.findings]
