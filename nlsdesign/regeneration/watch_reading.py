@@ -144,35 +144,29 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
     WatchVerdict
         Names with probabilities, or an abstention.
     """
-    seen = [_estimated(record["bins"][i], block, plan.most) for i, block in enumerate(plan.blocks)]
-    means = min(count for count, _, _ in seen)
+    means, change, base = _estimated(record["bins"], plan)
     if means < plan.least:
         return WatchVerdict("too_little", (), math.nan, means)
-    change = np.concatenate([d for _, d, _ in seen])
-    covariance = np.zeros((len(change), len(change)))
-    at = 0
-    for _, d, c in seen:
-        covariance[at : at + len(d), at : at + len(d)] = c
-        at += len(d)
     directions = _directions(plan.blocks)
-    base = covariance + TOLERANCE**2 * np.eye(len(change))
-    causes = {names: math.log(chance) + _density(change, base, rows)
-              for names, chance, rows in _causes(directions, len(change))}  # fmt: skip
+    noticed = {TORQUE_CONSTANT: (0.05, "")}
+    for block in plan.blocks[::-1]:
+        noticed |= dict(zip(block.changes, zip(block.noticed, block.units, strict=True), strict=True))
+    causes = dict(_causes(directions, change, base))
     total = np.logaddexp.reduce(list(causes.values()))
     chances = {names: math.exp(value - total) for names, value in causes.items()}
     best = max(chances, key=lambda names: chances[names])
     changes = []
     for name, direction in directions.items():
         chance = sum(p for names, p in chances.items() if name in names)
+        # How far the change goes along this direction, beside those of the likeliest cause.
         others = [directions[n] for n in best if n != name and n in directions]
-        size, error = _size(change, base, [direction, *others])
-        noticed, unit = _noticed(plan.blocks, name)
-        kind = name.rpartition(".")[2]
-        changes.append(
-            WatchedChange(
-                name, EFFECTS.get(kind, ""), size * noticed, error * noticed, unit, min(chance, MOST)
-            )
-        )
+        matrix = np.column_stack([direction, *others])
+        weighted = np.linalg.solve(base, matrix)
+        inverse = np.linalg.pinv(matrix.T @ weighted)
+        size, error = float((inverse @ (weighted.T @ change))[0]), math.sqrt(max(inverse[0, 0], 0.0))
+        share, unit = noticed[name]
+        effect = EFFECTS.get(name.rpartition(".")[2], "")
+        changes.append(WatchedChange(name, effect, size * share, error * share, unit, min(chance, MOST)))
     changes.sort(key=lambda c: -c.probability)
     likely = list(itertools.takewhile(lambda c: c.probability > 1.0 - SURE, changes))
     sure = [c for c in likely if c.probability >= SURE]
@@ -193,19 +187,26 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
     return WatchVerdict(verdict, tuple(changes), min(chance, MOST), means)
 
 
-def _estimated(bins: Any, block: WatchedBlock, most: int) -> tuple[float, Array, Array]:
+def _estimated(bins: Any, plan: WatchPlan) -> tuple[float, Array, Array]:
     """Return how many means there are, the change that each number seems to have, and the covariance."""
-    k, count = len(block.changes), float(bins["count"].sum())
-    products = bins["products"].astype(float).sum(axis=0)
-    i, j = np.tril_indices(most + 1)
-    full = np.zeros((most + 1, most + 1))
-    full[i, j] = full[j, i] = products
-    matrix, vector, square = full[:k, :k], full[:k, most], full[most, most]
-    # What single precision has lost is not to be seen as known.
-    normal = matrix + np.diag(LOST * np.diag(matrix) + square / (count + 1.0) / WIDE**2 + 1e-30)
-    change = np.linalg.solve(normal, vector)
-    variance = max(square - change @ vector, 0.0) / max(count - k, 1.0)
-    return count, np.asarray(change), np.asarray(variance * np.linalg.inv(normal))
+    counts, changes = [], []
+    size = sum(len(block.changes) for block in plan.blocks)
+    covariance, first = np.zeros((size, size)), 0
+    i, j = np.tril_indices(plan.most + 1)
+    for block, sums in zip(plan.blocks, bins, strict=True):
+        k, count = len(block.changes), float(sums["count"].sum())
+        full = np.zeros((plan.most + 1, plan.most + 1))
+        full[i, j] = full[j, i] = sums["products"].astype(float).sum(axis=0)
+        matrix, vector, square = full[:k, :k], full[:k, -1], full[-1, -1]
+        # What single precision has lost is not to be seen as known.
+        normal = matrix + np.diag(LOST * np.diag(matrix) + square / (count + 1.0) / WIDE**2 + 1e-30)
+        change = np.linalg.solve(normal, vector)
+        variance = max(square - change @ vector, 0.0) / max(count - k, 1.0)
+        covariance[first : first + k, first : first + k] = variance * np.linalg.inv(normal)
+        first += k
+        counts.append(count)
+        changes.append(change)
+    return min(counts), np.concatenate(changes), covariance + TOLERANCE**2 * np.eye(size)
 
 
 def _directions(blocks: Sequence[WatchedBlock]) -> dict[str, Array]:
@@ -231,40 +232,19 @@ def _directions(blocks: Sequence[WatchedBlock]) -> dict[str, Array]:
     return directions
 
 
-def _noticed(blocks: Sequence[WatchedBlock], name: str) -> tuple[float, str]:
-    if name == TORQUE_CONSTANT:
-        return 0.05, ""
-    return next(
-        (n, u)
-        for b in blocks
-        for each, n, u in zip(b.changes, b.noticed, b.units, strict=True)
-        if each == name
-    )
-
-
 def _causes(
-    directions: Mapping[str, Array], size: int
-) -> Iterator[tuple[tuple[str, ...], float, list[Array]]]:
-    """Yield what may have happened: names, probability before anything was seen, directions."""
-    yield (), NOTHING, []
-    for name, direction in directions.items():
-        yield (name,), ONE / len(directions), [direction]
+    directions: Mapping[str, Array], change: Array, base: Array
+) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Yield what may have happened: names, and the logarithm of how probable it is with what was seen."""
     pairs = list(itertools.combinations(directions, 2))
-    for pair in pairs:
-        yield pair, TWO / len(pairs), [directions[name] for name in pair]
-    yield OTHERS, OTHER, list(np.eye(size))
-
-
-def _density(change: Array, base: Array, rows: Sequence[Array]) -> float:
-    """Return the logarithm of the density of what was seen, where the change lies along some directions."""
-    covariance = base + USUAL**2 * sum((np.outer(row, row) for row in rows), start=np.zeros_like(base))
-    _, size = np.linalg.slogdet(covariance)
-    return -0.5 * float(size + change @ np.linalg.solve(covariance, change))
-
-
-def _size(change: Array, base: Array, rows: Sequence[Array]) -> tuple[float, float]:
-    """Return how far the change goes along the first direction, beside the others, and its standard error."""
-    matrix = np.column_stack(rows)
-    weighted = np.linalg.solve(base, matrix)
-    inverse = np.linalg.pinv(matrix.T @ weighted)
-    return float((inverse @ (weighted.T @ change))[0]), float(math.sqrt(max(inverse[0, 0], 0.0)))
+    causes: list[tuple[tuple[str, ...], float, list[Array]]] = [
+        ((), NOTHING, []),
+        *[((name,), ONE / len(directions), [direction]) for name, direction in directions.items()],
+        *[(pair, TWO / len(pairs), [directions[name] for name in pair]) for pair in pairs],
+        (OTHERS, OTHER, list(np.eye(len(change)))),
+    ]
+    for names, chance, rows in causes:
+        # The normal density of what was seen, where the change lies along these directions.
+        covariance = base + USUAL**2 * sum((np.outer(row, row) for row in rows), start=np.zeros_like(base))
+        size = float(np.linalg.slogdet(covariance)[1] + change @ np.linalg.solve(covariance, change))
+        yield names, math.log(chance) - 0.5 * size
