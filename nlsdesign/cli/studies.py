@@ -170,18 +170,15 @@ def study() -> None:
 @json_option
 def list_studies(as_json: bool) -> None:
     """List the studies that come with the project."""
-    rows = [(name, _first_line(name)) for name in study_names()]
+    rows, place = [], folder("studies")
+    for name in study_names():
+        # The first line of its docstring: a study is read and not loaded.
+        file = next(path for path in (place / f"{name}.py", place / name / "__init__.py") if path.exists())
+        rows.append((name, (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]))
     if as_json:
         show_json(dict(rows))
         return
     show_table("Studies", ("name", "what it shows"), rows)
-
-
-def _first_line(name: str) -> str:
-    """Return the first line of the docstring of a study, which is read and not loaded."""
-    place = folder("studies")
-    file = next(path for path in (place / f"{name}.py", place / name / "__init__.py") if path.exists())
-    return (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]
 
 
 @study.command(

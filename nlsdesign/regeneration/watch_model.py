@@ -57,8 +57,9 @@ TABLE_ERROR = 2e-4
 
 
 class Filtered(NamedTuple):
-    """The states of the filter of one reading, their next values, and what it shows."""
+    """A reading as an input, the states of its filter, their next values, and what it shows."""
 
+    variable: Variable
     stages: Expression  # (3,)
     previous: Expression
     following: Expression  # the stages one sample later
@@ -67,8 +68,21 @@ class Filtered(NamedTuple):
     held: bool
 
 
-def _filtered(reading: str, sample_time: float, held: bool) -> Filtered:
-    """Return three low-pass stages in a row, exact for a signal that is held or straight between samples."""
+def _filtered(model: FlatModel, reading: str, sample_time: float) -> Filtered:
+    """Return three low-pass stages in a row, exact for a signal that is held or straight between samples.
+
+    A reading is refused where the deck says that it cannot be.
+    """
+    measured = reading_of(model.readings, reading).measured
+    held = measured in {v.name for v in model.inputs}
+    text = f"{measured} that acts from this reading to the next" if held else f"{reading}, {measured}"
+    variable = replace(model.variable(measured), name=reading, description=text, start=0.0)
+    limit = _largest_drive(model, of_effort=False)
+    variable = (
+        replace(variable, minimum=-limit, maximum=limit)
+        if held
+        else with_declared_reading(variable, model, measured)
+    )
     lag = LAGS * sample_time
     stages, previous, seen = ca.SX.sym(f"{reading}.stage", 3), ca.SX.sym("previous"), ca.SX.sym(reading)
     chain = np.diag([-1.0 / lag] * 3) + np.diag([1.0 / lag] * 2, -1)
@@ -81,21 +95,7 @@ def _filtered(reading: str, sample_time: float, held: bool) -> Filtered:
     following = ca.mtimes(over, ca.vertcat(stages, previous, slope))
     first, second, third = ca.vertsplit(stages)
     values = (third, (second - third) / lag, (first - 2 * second + third) / lag**2)
-    return Filtered(stages, previous, following, values, seen, held)
-
-
-def _changes(block: Block) -> Mapping[str, tuple[float, list[int]]]:
-    """Return what a block can tell: share to be noticed, and numbers that change together, by name."""
-    s, model = block.model.symbols(), block.model
-    everything = ca.densify(ca.jacobian(ca.vertcat(s.derivative, s.output), s.parameter))
-    changes: dict[str, tuple[float, list[int]]] = {}
-    for i, v in enumerate(model.parameters):
-        last = v.name.partition("[")[0].rpartition(".")[2]
-        if last in NOTICED and not everything[:, i].is_zero():
-            kind, share = NOTICED[last]
-            part = v.name.partition(".")[0]
-            changes.setdefault(f"{part}.{kind}", (share, []))[1].append(i)
-    return changes
+    return Filtered(variable, stages, previous, following, values, seen, held)
 
 
 class Told(NamedTuple):
@@ -139,7 +139,7 @@ def _told(block: Block, filters: Mapping[str, Filtered], plant: FlatModel, sampl
     speed = s.input[[v.name for v in model.inputs].index(str(block.moving))]
     results = ca.substitute([ca.vertcat(*rows, speed, load), following], [s.parameter], [ca.SX(numbers)])
     told = ca.Function("told", [state, s.input, moving], results)
-    (shown, following), tables, columns = _tabulated(told, block, filters, plant, state)
+    (shown, following), tables, columns = _Tabulation(told, state, block, filters, plant).results()
     return Told(tuple(names), ca.vertsplit(shown), state, following, slowest, tables, columns)
 
 
@@ -149,49 +149,29 @@ def _sensitivities(
     """Return the states with what each change does to them, their slopes, and what it does to all rows."""
     count = len(block.model.states)
     whole = ca.vertcat(*ca.vertsplit(ca.densify(s.derivative))[:count], s.output)
+    everything = ca.densify(ca.jacobian(ca.vertcat(s.derivative, s.output), s.parameter))
+    steps: dict[str, ca.SX] = {}
+    for i, v in enumerate(block.model.parameters):
+        last = v.name.partition("[")[0].rpartition(".")[2]
+        if last in NOTICED and not everything[:, i].is_zero():
+            kind, share = NOTICED[last]
+            name = f"{v.name.partition('.')[0]}.{kind}"
+            steps.setdefault(name, ca.SX.zeros(numbers.numel()))[i] = share * numbers[i]
     states, slopes, added = [s.state], [whole[:count]], {}
-    for name, (share, members) in _changes(block).items():
-        step = ca.SX.zeros(numbers.numel())
-        step[members] = share * numbers[members]
+    for name, step in steps.items():
         added[name] = ca.densify(ca.jtimes(whole, s.parameter, step))
-        if count and not _vanishes(added[name][:count], s, numbers):
+        # A slope is looked at where it is evaluated: what cancels is not zero as an expression.
+        slope = ca.substitute(added[name][:count], s.parameter, ca.SX(numbers))
+        at, draw = ca.Function("at", [s.state, s.input], [slope]), np.random.default_rng(1)
+        sizes = [
+            np.abs(at(*(draw.normal(size=a.numel()) for a in (s.state, s.input))).full()).max(initial=0.0)
+            for _ in range(8)
+        ]
+        if count and not max(sizes) < 1e-9:
             states.append(ca.SX.sym(f"{name}.inner", count))
             added[name] += ca.jtimes(whole, s.state, states[-1])
             slopes.append(added[name][:count])
     return ca.vertcat(*states), ca.vertcat(*slopes), added
-
-
-def _tabulated(
-    told: ca.Function, block: Block, filters: Mapping[str, Filtered], plant: FlatModel, state: Expression
-) -> tuple[list[Expression], tuple[Table, ...], list[Expression]]:
-    """Return what a block tells of filtered readings, with tables and the symbols of their columns."""
-    value, rate, places, held = [], [], {}, set()
-    for i, v in enumerate(block.model.inputs):
-        drive = block.drives.get(v.name)
-        seen = filters[drive.signal].values if drive else (ca.SX(v.start), ca.SX(0), ca.SX(0))
-        order = drive.order if drive else 0
-        value.append(seen[order])
-        rate.append(seen[order + 1] if order < 2 else ca.SX(0))
-        if drive is None or filters[drive.signal].held:
-            held.add(i)
-        elif order == 0:
-            places[i] = drive.signal
-    reading = _Tabulation(told, [state, ca.vertcat(*value), ca.vertcat(*rate)], places, held, plant)
-    results = reading.results()
-    tables, columns, every, combined = reading.tables()
-    if every:
-        results = ca.substitute(results, [ca.vertcat(*every)], [ca.vertcat(*combined)])
-    return results, tables, columns
-
-
-def _vanishes(column: Expression, s: Symbols, numbers: ca.DM) -> bool:
-    """Say whether an expression of a block is zero wherever it is evaluated."""
-    at = ca.Function("at", [s.state, s.input], [ca.substitute(column, s.parameter, ca.SX(numbers))])
-    draw = np.random.default_rng(1)
-    sizes = [
-        np.abs(at(*(draw.normal(size=a.numel()) for a in (s.state, s.input))).full()).max() for _ in range(8)
-    ]
-    return bool(max(sizes) < 1e-9)
 
 
 class _Node(NamedTuple):
@@ -214,18 +194,29 @@ class _Tabulation:
     def __init__(
         self,
         function: ca.Function,
-        given: Sequence[Expression],
-        places: Mapping[int, str],
-        held: set[int],
+        state: Expression,
+        block: Block,
+        filters: Mapping[str, Filtered],
         plant: FlatModel,
     ) -> None:
-        self.function, self.given, self.places, self.held, self.plant = function, given, places, held, plant
-        self.columns: dict[int, dict[int, tuple[Expression, Expression]]] = {i: {} for i in places}
-        self.symbols = {i: ca.SX.sym(f"place_{i}") for i in places}
-        work = dict.fromkeys(places, 0)
-        fold(
-            read_graph(function), self._input, self._constant, combined=lambda o, a: self._counted(o, a, work)
-        )
+        self.function, self.plant = function, plant
+        value, rate, self.places, self.held = [], [], dict[int, str](), set[int]()
+        for i, v in enumerate(block.model.inputs):
+            drive = block.drives.get(v.name)
+            seen = filters[drive.signal].values if drive else (ca.SX(v.start), ca.SX(0), ca.SX(0))
+            order = drive.order if drive else 0
+            value.append(seen[order])
+            rate.append(seen[order + 1] if order < 2 else ca.SX(0))
+            if drive is None or filters[drive.signal].held:
+                self.held.add(i)
+            elif order == 0:
+                self.places[i] = drive.signal
+        self.given = [state, ca.vertcat(*value), ca.vertcat(*rate)]
+        self.columns: dict[int, dict[int, tuple[Expression, Expression]]] = {i: {} for i in self.places}
+        self.symbols = {i: ca.SX.sym(f"place_{i}") for i in self.places}
+        work = dict.fromkeys(self.places, 0)
+        fold(read_graph(function), self._input, self._constant,
+             combined=lambda operation, operands: self._combined(operation, operands, work))  # fmt: skip
         self.tabulated = {i for i, operations in work.items() if operations >= LEAST_WORK}
         for column in self.columns.values():
             column.clear()
@@ -240,27 +231,26 @@ class _Tabulation:
     def _constant(value: float) -> _Node:
         return _Node(ca.SX(value), frozenset(), value)
 
-    def _counted(self, operation: int, operands: Sequence[_Node], work: dict[int, int]) -> _Node:
-        node = self._combined(operation, operands, work)
-        if len(node.inputs) == 1 and (place := min(node.inputs)) in work:
-            work[place] += 1
-        return node
-
     def _combined(
-        self, operation: int, operands: Sequence[_Node], wanted: Collection[int] | None = None
+        self, operation: int, operands: Sequence[_Node], work: dict[int, int] | None = None
     ) -> _Node:
-        wanted = self.tabulated if wanted is None else wanted
+        """Return an operation on values; ``work`` counts operations by motion, all of them looked up."""
         inputs = frozenset().union(*[each.inputs for each in operands])
-        middle = None
+        middle, node = None, None
         if all(each.middle is not None for each in operands):
             middle = float(applied(operation, [ca.SX(each.middle or 0.0) for each in operands]))
             if inputs and operation in _LOGICAL and operation != ca.OP_IF_ELSE_ZERO:
-                return _Node(ca.SX(middle), frozenset(), middle)
-            if inputs and operation in (ca.OP_FMIN, ca.OP_FMAX):
-                return next(each for each in operands if each.middle == middle)
-        if len(inputs) > 1:
-            operands = [self._looked_up(each, wanted) for each in operands]
-        return _Node(applied(operation, [each.expression for each in operands]), inputs, middle)
+                node = _Node(ca.SX(middle), frozenset(), middle)
+            elif inputs and operation in (ca.OP_FMIN, ca.OP_FMAX):
+                node = next(each for each in operands if each.middle == middle)
+        if node is None:
+            if len(inputs) > 1:
+                wanted = self.tabulated if work is None else work
+                operands = [self._looked_up(each, wanted) for each in operands]
+            node = _Node(applied(operation, [each.expression for each in operands]), inputs, middle)
+        if work and len(node.inputs) == 1 and (place := min(node.inputs)) in work:
+            work[place] += 1
+        return node
 
     def _looked_up(self, node: _Node, wanted: Collection[int]) -> _Node:
         """Return a column in place of what follows from one motion alone."""
@@ -276,21 +266,28 @@ class _Tabulation:
             rows[key] = ca.SX.sym(f"w_{place}_{len(rows)}"), node.expression
         return node._replace(expression=rows[key][0])
 
-    def results(self) -> list[Expression]:
-        """Return the results, with symbols for what is looked up."""
+    def results(self) -> tuple[list[Expression], tuple[Table, ...], list[Expression]]:
+        """Return the results, with tables over motions and the symbols of their columns."""
         nodes = fold(read_graph(self.function), self._input, self._constant, combined=self._combined)
         read = {at: self._looked_up(node, self.tabulated).expression for at, node in nodes.items()}
-        return as_results(self.function, read)
-
-    def tables(self) -> tuple[tuple[Table, ...], list[Expression], list[Expression], list[Expression]]:
-        """Return tables over motions, the symbols of their columns, and all symbols with what they are."""
+        results = as_results(self.function, read)
         tables, symbols, every, combined = [], [], [], []
         for place, rows in self.columns.items():
             if not rows:
                 continue
             signal = self.places[place]
             at = ca.Function("at", [self.symbols[place]], [ca.vertcat(*[e for _, e in rows.values()])])
-            fine = np.linspace(*_ends(self.plant, signal), FINE)
+            # As far as the contour of the cams, or the range of the sensor.
+            limits = declared_reading(self.plant, reading_of(self.plant.readings, signal).measured).limits
+            ends = [*contour_ends(self.plant).values()]
+            reach = (-max(ends), max(ends)) if ends else limits[:2] if limits else None
+            if reach is None:
+                raise ExportError(
+                    f"'{signal}'",
+                    "has no declared range, over which the laws of the machine could be tabulated",
+                    next_step="declare lowest_reading and highest_reading with the sensor",
+                )
+            fine = np.linspace(*reach, FINE)
             values = at.map(len(fine))(fine[None, :]).full().T
             basis, shares = _independent(values)
             columns = [ca.SX.sym(f"column_{place}_{i}") for i in basis]
@@ -308,7 +305,9 @@ class _Tabulation:
                 sum((float(s) * term for s, term in zip(row, terms, strict=True) if s), start=ca.SX(0))
                 for row in shares
             ]
-        return tuple(tables), symbols, every, combined
+        if every:
+            results = ca.substitute(results, [ca.vertcat(*every)], [ca.vertcat(*combined)])
+        return results, tuple(tables), symbols
 
 
 def _independent(values: Array) -> tuple[list[int], Array]:
@@ -332,20 +331,6 @@ def _independent(values: Array) -> tuple[list[int], Array]:
     for row, (members, shares) in zip(table, known, strict=True):
         row[[*(basis.index(m) for m in members), -1]] = shares
     return basis, table
-
-
-def _ends(plant: FlatModel, signal: str) -> tuple[float, float]:
-    """Return between which readings a table reaches: the contour of the cams, or the range of the sensor."""
-    ends = contour_ends(plant)
-    limits = declared_reading(plant, reading_of(plant.readings, signal).measured).limits
-    if ends:
-        return -max(ends.values()), max(ends.values())
-    if limits is None:
-        raise ExportError(
-            f"'{signal}'", "has no declared range, over which the laws of the machine could be tabulated",
-            next_step="declare lowest_reading and highest_reading with the sensor",
-        )  # fmt: skip
-    return limits[0], limits[1]
 
 
 def _breakpoints(values: Array) -> list[int]:
@@ -391,20 +376,31 @@ def watch_plan(model: FlatModel, sample_time: float = 1e-3) -> WatchPlan:
     ExportError
         If a law must be tabulated over a motion without a range.
     """
-    from ..export import WatchPlan  # here, as its libraries take time to load
+    from ..export import WatchedBlock, WatchPlan  # here, as its libraries take time to load
+    from ..export.c.watch_code import LOAD
 
     signals = [v.name for v in model.outputs]
     seen = {reading_of(model.readings, name).measured for name in signals}
     signals += [name for body in model.bodies for name in body.commands if name not in seen]
     blocks = [block for block in blocks_of(model, signals) if block.moving]
-    held = {v.name for v in model.inputs}
     names = dict.fromkeys(d.signal for block in blocks for d in block.drives.values())
-    filters = {n: _filtered(n, sample_time, reading_of(model.readings, n).measured in held) for n in names}
+    filters = {name: _filtered(model, name, sample_time) for name in names}
     told = [_told(block, filters, model, sample_time) for block in blocks]
-    largest = _largest_drive(model)
-    watched = tuple(_watched(b, t, model, largest, sample_time) for b, t in zip(blocks, told, strict=True))
-    settling = max(4.0 * LAGS * sample_time, *[5.0 * each.slowest for each in told])
-    return WatchPlan(_residual_model(model, watched, told, filters, sample_time), watched, settling)
+    settling, watched = 4.0 * LAGS * sample_time, []
+    for block, rows in zip(blocks, told, strict=True):
+        settling = max(settling, 5.0 * rows.slowest)
+        kinds = [name.rpartition(".")[2] for name in rows.names]
+        noticed = tuple(DELAY if kind == "delay" else NOTICED_SHARES[kind] for kind in kinds)
+        units = tuple("s" if kind == "delay" else "" for kind in kinds)
+        creep = [v.start for v in block.model.parameters if v.name.endswith(".creep_speed")]
+        moving = reading_of(model.readings, block.drives[str(block.moving)].signal).measured
+        quantum = declared_reading(model, moving).quantum
+        rubs = creep and "friction" in kinds
+        least = max(LEAST_SPEED * max(creep), quantum / (LAGS * sample_time)) if rubs else 0.0
+        share = 1.0 if "delay" in kinds else NOTICED_SHARES["stiffness"]
+        load = LOAD * share * _largest_drive(model)
+        watched.append(WatchedBlock(block.name, rows.names, noticed, units, least, load))
+    return WatchPlan(_residual_model(model, watched, told, filters, sample_time), tuple(watched), settling)
 
 
 def _residual_model(
@@ -446,7 +442,7 @@ def _residual_model(
         name=f"{model.name}_residuals",
         description=f"Efforts that readings of {model.name} leave, and what changes add",
         states=tuple(states),
-        inputs=tuple(_reading(model, n, sample_time) for n in filters),
+        inputs=tuple(f.variable for f in filters.values()),
         parameters=(),
         outputs=tuple(outputs),
         signals=(),
@@ -460,41 +456,9 @@ def _residual_model(
     )
 
 
-def _reading(model: FlatModel, signal: str, sample_time: float) -> Variable:
-    """Return a reading as an input: refused where the deck says that it cannot be."""
-    shown = reading_of(model.readings, signal).measured
-    variable = replace(model.variable(shown), name=signal, description=f"{signal}, {shown}", start=0.0)
-    if shown in {v.name for v in model.inputs}:
-        limit = _largest_drive(model, of_effort=False)
-        return replace(
-            variable,
-            description=f"{shown} that acts from this reading to the next",
-            minimum=-limit,
-            maximum=limit,
-        )
-    return with_declared_reading(variable, model, shown)
-
-
 def _largest_drive(model: FlatModel, *, of_effort: bool = True) -> float:
     """Return the largest effort of the motor, or its largest command."""
     _, motor = motor_of(model)
     numbers = model.values
     gear = numbers[motor.gear_ratio] if motor.gear_ratio else 1.0
     return numbers[motor.current_limit] * (gear * numbers[motor.torque_constant] if of_effort else 1.0)
-
-
-def _watched(block: Block, told: Told, model: FlatModel, largest: float, sample_time: float) -> WatchedBlock:
-    from ..export.c.watch_code import LOAD, WatchedBlock
-
-    noticed = [
-        DELAY if name.endswith(".delay") else NOTICED_SHARES[name.rpartition(".")[2]] for name in told.names
-    ]
-    units = tuple("s" if name.endswith(".delay") else "" for name in told.names)
-    creep = [v.start for v in block.model.parameters if v.name.endswith(".creep_speed")]
-    rubs = any(name.endswith(".friction") for name in told.names)
-    drive = block.drives[str(block.moving)]
-    quantum = declared_reading(model, reading_of(model.readings, drive.signal).measured).quantum
-    least = max([LEAST_SPEED * max(creep), quantum / (LAGS * sample_time)]) if creep and rubs else 0.0
-    driven = any(name.endswith(".delay") for name in told.names)
-    share = 1.0 if driven else NOTICED_SHARES["stiffness"]
-    return WatchedBlock(block.name, told.names, tuple(noticed), units, least, LOAD * share * largest)

@@ -384,42 +384,35 @@ class WatchTwin:
             products[at] += mean[i] * mean[j]
 
     def _go_on(self) -> None:
-        each = BINS + 2 * self.plan.most + 2
+        """Do one piece of the judgement: forget, fill a matrix, sweep it over a change, or judge."""
+        each, r, work, most = BINS + 2 * self.plan.most + 2, self._r, self.work, self.plan.most
         number, piece = divmod(self._task - 1, each)
-        changes, recent = len(self.plan.blocks[number].changes), self.record["recent"][number]
+        k, recent = len(self.plan.blocks[number].changes), self.record["recent"][number]
         if piece < BINS:
-            _forget(self.record["bins"][number][piece], self._r(_kept(self.plan)))
+            _forget(self.record["bins"][number][piece], r(_kept(self.plan)))
         elif piece == BINS:
-            self._fill(recent)
-        elif piece <= BINS + 2 * changes:
-            if piece % 2 == BINS % 2:
-                self._sweep((piece - BINS) // 2 - 1)
+            for value, (i, j) in zip(recent["products"], self._pairs, strict=True):
+                work[i, j] = work[j, i] = value
+            prior = (work[most, most] / (recent["count"] + r(1))) * r(PRIOR**-2) + r(1e-30)
+            for i in range(most):
+                work[i, i] += (work[i, i] * r(RIDGE)) + prior
+        elif piece <= BINS + 2 * k and piece % 2 == BINS % 2:
+            pivot = (piece - BINS) // 2 - 1
+            inverse = r(1) / work[pivot, pivot]
+            work[pivot] *= inverse
+            work[pivot, pivot] = inverse
+            for i in range(len(work)):
+                if i != pivot:
+                    factor = work[i, pivot]
+                    work[i, pivot] = 0
+                    work[i] -= factor * work[pivot]
         elif piece == each - 1:
             self._found |= self._judged(recent, number)
-            _forget(recent, self._r(RECENTLY))
+            _forget(recent, r(RECENTLY))
             if number == len(self.plan.blocks) - 1:
                 self.record["word"], self._task = self._found, -1
                 self.record["judged"] += 1
         self._task += 1
-
-    def _fill(self, moments: Any) -> None:
-        work, r, most = self.work, self._r, self.plan.most
-        for value, (i, j) in zip(moments["products"], self._pairs, strict=True):
-            work[i, j] = work[j, i] = value
-        prior = (work[most, most] / (moments["count"] + r(1))) * r(PRIOR**-2) + r(1e-30)
-        for i in range(most):
-            work[i, i] += (work[i, i] * r(RIDGE)) + prior
-
-    def _sweep(self, pivot: int) -> None:
-        work = self.work
-        inverse = self._r(1) / work[pivot, pivot]
-        work[pivot] *= inverse
-        work[pivot, pivot] = inverse
-        for i in range(len(work)):
-            if i != pivot:
-                factor = work[i, pivot]
-                work[i, pivot] = 0
-                work[i] -= factor * work[pivot]
 
     def _judged(self, moments: Any, number: int) -> int:
         k, r, work = len(self.plan.blocks[number].changes), self._r, self.work

@@ -112,7 +112,13 @@ class _Reader:
                 kind = element.tag.rpartition("}")[2]
                 raise self._refused(f"{kind} '{fit_to_show(element.get('name'))}'", "only FMUs are read")
             self._components[self._needed(element, "name")] = element
-        fmus = {name: self._fmu(name, element) for name, element in self._components.items()}
+        fmus = {}
+        for name, element in self._components.items():
+            thing = f"component '{fit_to_show(name)}'"
+            if element.get("type", _FMU) != _FMU:
+                kind = fit_to_show(element.get("type"))
+                raise self._refused(thing, f"is of type {kind}; only FMUs are read")
+            fmus[name] = self._file(thing, self._needed(element, "source"))
         if not fmus:
             raise ExportError(self._what, "holds no FMU")
         wires = dict(self._wires())
@@ -139,12 +145,6 @@ class _Reader:
         if not file.is_relative_to(self._folder.resolve()) or not file.is_file():
             raise self._refused(thing, f"'{fit_to_show(source)}' is no file of the archive")
         return file
-
-    def _fmu(self, name: str, element: ElementTree.Element) -> Path:
-        thing = f"component '{fit_to_show(name)}'"
-        if element.get("type", _FMU) != _FMU:
-            raise self._refused(thing, f"is of type {fit_to_show(element.get('type'))}; only FMUs are read")
-        return self._file(thing, self._needed(element, "source"))
 
     def _connector(self, element: str, name: str) -> ElementTree.Element:
         if element not in self._components:
@@ -223,14 +223,12 @@ class _Reader:
                 inline = _parsed(self._what, self._file("a ParameterBinding", source))
             prefix = owner + binding.get("prefix", "")
             for row in inline.findall("ssv:Parameters/ssv:Parameter", NAMESPACES):
-                values[prefix + self._needed(row, "name")] = self._value(row)
+                name = self._needed(row, "name")
+                number = next((kind for kind in row if kind.tag.rpartition("}")[2] in _NUMBERS), None)
+                if number is None:
+                    raise self._refused(f"parameter '{fit_to_show(name)}'", "has no number as its value")
+                values[prefix + name] = self._number(number, "value")
         return values
-
-    def _value(self, row: ElementTree.Element) -> float:
-        for kind in row:
-            if kind.tag.rpartition("}")[2] in _NUMBERS:
-                return self._number(kind, "value")
-        raise self._refused(f"parameter '{fit_to_show(row.get('name'))}'", "has no number as its value")
 
 
 def _unit(connector: ElementTree.Element) -> Unit | None:

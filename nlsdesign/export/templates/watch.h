@@ -6,10 +6,6 @@
 
 #include "@name@_residuals.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define @NAME@_BLOCKS @blocks@u
 #define @NAME@_MOST @most@u /* changes of the block that has most */
 #define @NAME@_PAIRS @pairs@u /* products of the residual and the changes, each pair once */
@@ -73,6 +69,10 @@ typedef struct {
     uint32_t settling; /* samples until the filters have settled */
     uint32_t started;
 } @name@_state;
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 void @name@_init(@name@_state *state);
 
