@@ -223,11 +223,12 @@ class _Reader:
                 inline = _parsed(self._what, self._file("a ParameterBinding", source))
             prefix = owner + binding.get("prefix", "")
             for row in inline.findall("ssv:Parameters/ssv:Parameter", NAMESPACES):
-                name = self._needed(row, "name")
                 number = next((kind for kind in row if kind.tag.rpartition("}")[2] in _NUMBERS), None)
                 if number is None:
-                    raise self._refused(f"parameter '{fit_to_show(name)}'", "has no number as its value")
-                values[prefix + name] = self._number(number, "value")
+                    thing = f"parameter '{fit_to_show(row.get('name'))}'"
+                    raise self._refused(thing, "has no number as its value")
+                value = self._number(number, "value")
+                values[prefix + self._needed(row, "name")] = value
         return values
 
 
@@ -306,7 +307,10 @@ def write_ssp(
         entries: dict[str, bytes] = {STRUCTURE_FILE: writer.structure(Path(path).stem)}
         entries |= writer.values()
         for name, file in fmus.items():
-            entries[f"{RESOURCES}/{name}.fmu"] = _content(Path(file))
+            try:
+                entries[f"{RESOURCES}/{name}.fmu"] = Path(file).read_bytes()
+            except OSError as error:
+                raise ExportError(str(file), f"cannot be read ({error.strerror or error})") from error
     with draft(Path(path)) as file_name, zipfile.ZipFile(file_name, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in entries.items():
             entry = zipfile.ZipInfo(name, _EPOCH)
@@ -315,13 +319,6 @@ def write_ssp(
             entry.compress_type = zipfile.ZIP_STORED if name.endswith(".fmu") else zipfile.ZIP_DEFLATED
             archive.writestr(entry, content)
     return WrittenSystem(Path(path), tuple(writer.notes))
-
-
-def _content(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise ExportError(str(file), f"cannot be read ({error.strerror or error})") from error
 
 
 class _Structure:
