@@ -246,13 +246,10 @@ def regenerated_observer(
     draws = [*_draws(declared, ()), *_draws(better, fits)]
     models = [*[declared] * DRAWS, *[better] * DRAWS]
     spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
-    if failures := sum(not math.isfinite(error) for error in spread):
-        words = f"for {failures} of {len(spread)} draws of the numbers no observer can be designed"
-        lacking = (*lacking, words)
     return Regeneration(
         better,
         generated.model,
-        tuple(lacking),
+        (*lacking, *_failures(spread)),
         errors=errors,
         corrected=corrected,
         chosen=chosen,
@@ -339,6 +336,12 @@ def _generated(
     if len(named) == 1:
         return design, name
     return design, f"{name}: it errs less on the records that decide ({roles}) than the other"
+
+
+def _failures(spread: Sequence[float]) -> tuple[str, ...]:
+    count = sum(not math.isfinite(error) for error in spread)
+    words = f"for {count} of {len(spread)} draws of the numbers no observer can be designed"
+    return (words,) if count else ()
 
 
 def _draws(model: FlatModel, fits: Sequence[Fit]) -> list[dict[str, float]]:
