@@ -26,6 +26,7 @@ from .options import (
 from .output import examples, show_json, show_lines, show_table, show_written, warn
 from .overwriting import c_names, out_file_option, out_option
 from .typed_values import NamedPath
+from .watch import WATCH, export_monitor
 
 if TYPE_CHECKING:
     from ..components import Assembly
@@ -45,6 +46,8 @@ def export() -> None:
 def _writes(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for."""
     name = "torque_loop" if given["what"] == BOTH else given["what"]
+    if name == WATCH:
+        return [*c_names(name), *c_names(f"{name}_residuals")]
     further = (
         (".hpp", "_supervisor.h", "_example_posix.c", "_example_cortex_m.c", ".mk")
         if given["examples"]
@@ -63,15 +66,17 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
         "nlsdesign export c --deck austin2015_figure_consistent --what both --real float --flash 64kB "
         "--examples",
         "nlsdesign export c --deck my.toml --what controller --law pid --dry-run",
+        "nlsdesign export c --deck austin2015_figure_consistent --what watch --real float",
     ),
 )
 @deck_option
 @click.option(
     "--what",
-    type=click.Choice([OBSERVER, CONTROLLER, BOTH]),
+    type=click.Choice([OBSERVER, CONTROLLER, BOTH, WATCH]),
     default=OBSERVER,
     show_default=True,
-    help="both: observer and torque controller as one step, which keeps the current itself.",
+    help="both: observer and torque controller as one step, which keeps the current itself. "
+    "watch: a monitor that says in use when the deck no longer holds.",
 )
 @kind_option
 @law_options
@@ -98,6 +103,9 @@ def export_code(
 
     The observer is by default the one that is best over the spread of the deck.
     """
+    if what == WATCH:
+        export_monitor(deck_name, sample_time, out, real, as_json, chosen)
+        return
     from ..export import export_c, prove_step, write_examples, write_package
     from ..foundation.progress import Steps
     from ..model import flatten

@@ -34,6 +34,7 @@ from .serve import serve
 from .simulate import simulate
 from .studies import study
 from .sweep import report, sweep
+from .watch import watch
 
 
 @click.group(
@@ -65,7 +66,21 @@ def program(context: click.Context, packages: tuple[str, ...]) -> None:
 observer.add_command(calibrate)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(sweep, report, cosimulation, simulate, records, fit, diagnose, compare, study, serve, completion, docs),
+    *(
+        sweep,
+        report,
+        cosimulation,
+        simulate,
+        records,
+        fit,
+        diagnose,
+        watch,
+        compare,
+        study,
+        serve,
+        completion,
+        docs,
+    ),
 ):
     program.add_command(command)
 complete_names(program)

@@ -43,16 +43,9 @@ def line_width() -> int:
 
 def show_json(content: Mapping[str, Any]) -> None:
     """Print a mapping as JSON, which has no number that is not finite: null stands there."""
-    valid = json.loads(json.dumps(content, default=_plain), parse_constant=lambda constant: None)
+    text = json.dumps(content, default=lambda v: v.tolist() if hasattr(v, "tolist") else str(v))
+    valid = json.loads(text, parse_constant=lambda constant: None)
     click.echo(json.dumps(valid, indent=2, ensure_ascii=False))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    return str(value)
 
 
 def show_lines(lines: Iterable[object]) -> None:

@@ -170,18 +170,15 @@ def study() -> None:
 @json_option
 def list_studies(as_json: bool) -> None:
     """List the studies that come with the project."""
-    rows = [(name, _first_line(name)) for name in study_names()]
+    rows, place = [], folder("studies")
+    for name in study_names():
+        # The first line of its docstring: a study is read and not loaded.
+        file = next(path for path in (place / f"{name}.py", place / name / "__init__.py") if path.exists())
+        rows.append((name, (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]))
     if as_json:
         show_json(dict(rows))
         return
     show_table("Studies", ("name", "what it shows"), rows)
-
-
-def _first_line(name: str) -> str:
-    """Return the first line of the docstring of a study, which is read and not loaded."""
-    place = folder("studies")
-    file = next(path for path in (place / f"{name}.py", place / name / "__init__.py") if path.exists())
-    return (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]
 
 
 @study.command(
@@ -220,11 +217,13 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool, force: bool, dry
     if as_json:
         show_json({"results": results, "not_as_claimed": list(wrong), "out": target})
     else:
-        show_table(
-            f"Study {name}",
-            ("result", "value", "claimed"),
-            [_row(k, v, expected.get(k)) for k, v in results.items()],
-        )
+        rows = []
+        for key, value in results.items():
+            claim = expected.get(key)
+            unit = claim.unit if claim else "1"
+            claimed = with_unit(f"{claim.value:.4g} ± {claim.tolerance:.2g}", unit) if claim else ""
+            rows.append((key, with_unit(f"{value:.4g}", unit), claimed))
+        show_table(f"Study {name}", ("result", "value", "claimed"), rows)
         if not results:
             click.echo("no numbers: the study was skipped, or its main returns None")
         if _time_of(report) != before:
@@ -250,9 +249,3 @@ def _no_empty_folder(target: Path) -> Iterator[None]:
 def _time_of(file: Path) -> int | None:
     """Return when a file was written, in ns; none where there is no such file."""
     return file.stat().st_mtime_ns if file.is_file() else None
-
-
-def _row(key: str, value: float, claim: Claim | None) -> tuple[str, str, str]:
-    unit = claim.unit if claim else "1"
-    claimed = with_unit(f"{claim.value:.4g} ± {claim.tolerance:.2g}", unit) if claim else ""
-    return key, with_unit(f"{value:.4g}", unit), claimed

@@ -59,7 +59,8 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     stopped, in whatever way, is not computed again.
     """
     executor = _executor(given)
-    from ..sweeps import libraries, read_sweep_file
+    from ..foundation.progress import Steps
+    from ..sweeps import SweepSettings, libraries, read_sweep_file, run_task
 
     libraries()
     task = read_sweep_file(file)
@@ -79,7 +80,11 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
                     next_step="nothing was computed; name another folder for --report, "
                     "or move that file away",
                 )  # fmt: skip
-    table = _run(task, out, executor, given)
+    settings = SweepSettings(again=given["again"], retry_failed=given["retry_failed"])
+    steps = Steps()
+    progress: Progress = steps if sys.stderr.isatty() else _Lines()
+    with steps.step("sweep"):
+        table = run_task(task, out, executor=executor, settings=settings, progress=progress)
     page = None
     if pages is not None:
         from ..presentation.sweep_report import write_sweep_report
@@ -135,17 +140,6 @@ def _executor(given: dict[str, Any]) -> Executor:
         address = str(given["scheduler"])
         return DaskScheduler(address) if "://" in address else DaskScheduler(file=Path(address))
     return Processes(given["workers"])
-
-
-def _run(task: SweepTask, out: Path, executor: Executor, given: dict[str, Any]) -> SweepTable:
-    from ..foundation.progress import Steps
-    from ..sweeps import SweepSettings, run_task
-
-    settings = SweepSettings(again=given["again"], retry_failed=given["retry_failed"])
-    steps = Steps()
-    progress: Progress = steps if sys.stderr.isatty() else _Lines()
-    with steps.step("sweep"):
-        return run_task(task, out, executor=executor, settings=settings, progress=progress)
 
 
 class _Lines:

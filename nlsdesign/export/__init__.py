@@ -11,6 +11,7 @@ from .c.coefficients import LoadableModel, loadable_model
 from .c.controller_code import export_c
 from .c.packages import write_package
 from .c.programs import write_examples
+from .c.watch_code import WatchedBlock, WatchPlan, WatchSource, export_watch, read_watch_record
 from .c.writer import CSource
 from .compilation.compiled_step import natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS
@@ -53,6 +54,9 @@ __all__ = [
     "Processor",
     "SamplesOf",
     "Stepping",
+    "WatchPlan",
+    "WatchSource",
+    "WatchedBlock",
     "Wire",
     "convergence",
     "cosimulate",
@@ -61,6 +65,7 @@ __all__ = [
     "export_fmu",
     "export_modelica",
     "export_mujoco",
+    "export_watch",
     "loadable_model",
     "measure_on_target",
     "natively",
@@ -69,6 +74,7 @@ __all__ = [
     "read_exports",
     "read_parameter_block",
     "read_ssp",
+    "read_watch_record",
     "write_a2l",
     "write_examples",
     "write_package",

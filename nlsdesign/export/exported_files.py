@@ -228,9 +228,11 @@ def _fmu(path: Path, size: int) -> ExportedFile | None:
                 own = b"nlsdesign" in archive.read("modelDescription.xml")[:4096]
                 return ExportedFile(path, "FMU", edited=f"it has no {ORIGIN_FILE}") if own else None
             record = _record(path, archive.read(ORIGIN_FILE))
-            digests = {
-                name: _digest(archive, entry) for name, entry in entries.items() if name != ORIGIN_FILE
-            }
+            digests = {}
+            for name, entry in entries.items():
+                if name != ORIGIN_FILE:
+                    with archive.open(entry) as stream:
+                        digests[name] = hashlib.file_digest(stream, "sha256").hexdigest()  # type: ignore[arg-type]
             deck = record["deck"] or {"name": "", "sha256": "", "parent": None}
             parent = deck["parent"]["sha256"] if deck["parent"] else ""
             stated = record["files"]
@@ -244,11 +246,6 @@ def _fmu(path: Path, size: int) -> ExportedFile | None:
         raise ExportError(str(path), f"cannot be unpacked: {error}") from None
     except BROKEN_ARCHIVE as error:
         raise ExportError(str(path), f"is a damaged archive: {error}") from None
-
-
-def _digest(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> str:
-    with archive.open(entry) as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()  # type: ignore[arg-type]
 
 
 def _too_large(path: Path) -> ExportError:

@@ -1,8 +1,9 @@
 """What takes several rooms: from one declared machine to everything that runs it.
 
 Which commands a deck is ready for, observers that keep a size of flash, the observer designed again from the
-better model of a diagnosis, the published observer with poles from records, and all files of a machine.
-Presentation and commands may import it; it decides nothing that a room below can decide alone.
+better model of a diagnosis, the published observer with poles from records, what a monitor computes and what
+its evidence says, and all files of a machine. Presentation and commands may import it; it decides nothing
+that a room below can decide alone.
 """
 
 from .exported_machine import MACHINE as MACHINE
@@ -21,6 +22,8 @@ from .readiness import errors_while_running as errors_while_running
 from .readiness import readiness
 from .regenerated_controller import RegeneratedController as RegeneratedController
 from .regenerated_observer import Regeneration, regenerate, write_regeneration
+from .watch_model import watch_plan
+from .watch_reading import WatchedChange, WatchVerdict, read_watch
 from .watched_records import ObserverChoice
 
 __all__ = [
@@ -28,12 +31,16 @@ __all__ = [
     "ObserverChoice",
     "Regeneration",
     "SameTable",
+    "WatchVerdict",
+    "WatchedChange",
     "block_for",
     "export_machine",
     "fit_poles",
     "range_remarks",
+    "read_watch",
     "readiness",
     "regenerate",
     "sized_observer",
+    "watch_plan",
     "write_regeneration",
 ]

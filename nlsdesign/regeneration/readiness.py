@@ -107,8 +107,13 @@ def readiness(declared: Assembly) -> list[Readiness]:
         "fit": records,
         "diagnose": records,
     }
-    reasons = {check: _refusal(check) for check in dict.fromkeys(asked.values())}
-    return [Readiness(name, reasons[check]) for name, check in asked.items()]
+    reasons: dict[Callable[[], None], NlsError] = {}
+    for check in dict.fromkeys(asked.values()):
+        try:
+            check()
+        except NlsError as error:
+            reasons[check] = error
+    return [Readiness(name, reasons.get(check)) for name, check in asked.items()]
 
 
 def errors_while_running(actuator: Assembly) -> dict[str, Callable[[Prior], float]]:
@@ -121,12 +126,3 @@ def errors_while_running(actuator: Assembly) -> dict[str, Callable[[Prior], floa
     except (ArrangementError, ValueRangeError):
         return {}
     return {"torque while running, best estimate": least}
-
-
-def _refusal(check: Callable[[], None]) -> NlsError | None:
-    """Return why a check fails, ``None`` where it does not."""
-    try:
-        check()
-    except NlsError as error:
-        return error
-    return None

@@ -74,13 +74,18 @@ def block_declarations(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
     }
 
 
-def block_functions(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
-    """Return what the source has for blocks."""
+def half_byte_sums() -> list[str]:
+    """Return the CRC-32 of each half byte as rows of C."""
     crc = list(range(16))
     for _ in range(4):
         crc = [(k >> 1) ^ (0xEDB88320 if k & 1 else 0) for k in crc]
+    return _lines([f"0x{k:08x}u" for k in crc])
+
+
+def block_functions(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
+    """Return what the source has for blocks."""
     values: dict[str, str | list[str]] = {
-        "half_bytes": _lines([f"0x{k:08x}u" for k in crc]),
+        "half_bytes": half_byte_sums(),
         "bytes": str(layout.offset("checksum")),
         "ranges": range_checks(layout),
         "taken": taken_numbers(layout),

@@ -392,11 +392,8 @@ def _sampled_signal(signal: Signal, points: Array) -> Given:
     left = points - np.concatenate([lengths[:1], lengths]) * _JUST_BEFORE
     left[0] = points[0]
     middle = np.append(points[:-1] + 0.5 * lengths, points[-1])
-    return Given(*(_values(signal, times) for times in (points, left, middle)))
-
-
-def _values(signal: Signal, times: Array) -> Array:
+    courses = (points, left, middle)
     if callable(signal):
-        return np.array([float(signal(time)) for time in times.tolist()])
+        return Given(*(np.array([float(signal(time)) for time in times.tolist()]) for times in courses))
     given, values = (np.asarray(each, dtype=float) for each in signal)
-    return np.asarray(np.interp(times, given, values), dtype=float)
+    return Given(*(np.asarray(np.interp(times, given, values), dtype=float) for times in courses))

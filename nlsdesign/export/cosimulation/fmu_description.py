@@ -173,7 +173,13 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
     description = FmuDescription(
         instance, folder, version, offered.modelIdentifier, read.guid, rolls_back, variables
     )
-    _check_sample_time(what, description)
+    period = description.variables.get("sample.time")
+    if (
+        period is not None
+        and period.variability == "constant"
+        and (period.start is None or not 0.0 < period.start < math.inf)
+    ):
+        raise ExportError(what, f"states a sample time of {period.start} s, which is not possible")
     return description
 
 
@@ -186,14 +192,6 @@ def check_library(description: FmuDescription) -> None:
             f"the FMU has no binary for this machine ({place})",
             next_step="export it with platforms=None on this machine, or name the platform",
         )
-
-
-def _check_sample_time(what: str, description: FmuDescription) -> None:
-    stated = description.variables.get("sample.time")
-    if stated is None or stated.variability != "constant":
-        return
-    if stated.start is None or not (math.isfinite(stated.start) and stated.start > 0.0):
-        raise ExportError(what, f"states a sample time of {stated.start} s, which is not possible")
 
 
 def _variable(read: Any) -> FmuScalar:

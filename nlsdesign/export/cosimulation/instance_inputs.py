@@ -110,7 +110,10 @@ class ConnectedInputs:
         if self._plan.curved(link):
             if not link.delay and self._plan.sampled(name):
                 return held
-            return CurveFeed(self._now, self._curve(link.source), link.gain, link.delay, first)
+            source, output = split_name(link.source)
+            smooth = self._plan.descriptions[source].variables[output].variability == "continuous"
+            curve = self.curves.setdefault(link.source, Curve(self._columns[link.source], smooth))
+            return CurveFeed(self._now, curve, link.gain, link.delay, first)
         samples = self.samples.setdefault(link.source, [])
         period = self._plan.descriptions[split_name(link.source)[0]].sample_time or 0.0
         if link.delay:
@@ -121,11 +124,6 @@ class ConnectedInputs:
             # Without an order as with every master that passes initial values on.
             return LateFeed(held, samples, period, period, first if self._plan.order else None)
         return replace(held, samples=samples, first=first) if self._plan.order else held
-
-    def _curve(self, source: str) -> Curve:
-        instance, variable = split_name(source)
-        smooth = self._plan.descriptions[instance].variables[variable].variability == "continuous"
-        return self.curves.setdefault(source, Curve(self._columns[source], smooth))
 
 
 def due_by_row(plan: Plan) -> dict[int, list[str]]:

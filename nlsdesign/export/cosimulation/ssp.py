@@ -112,7 +112,13 @@ class _Reader:
                 kind = element.tag.rpartition("}")[2]
                 raise self._refused(f"{kind} '{fit_to_show(element.get('name'))}'", "only FMUs are read")
             self._components[self._needed(element, "name")] = element
-        fmus = {name: self._fmu(name, element) for name, element in self._components.items()}
+        fmus = {}
+        for name, element in self._components.items():
+            thing = f"component '{fit_to_show(name)}'"
+            if element.get("type", _FMU) != _FMU:
+                kind = fit_to_show(element.get("type"))
+                raise self._refused(thing, f"is of type {kind}; only FMUs are read")
+            fmus[name] = self._file(thing, self._needed(element, "source"))
         if not fmus:
             raise ExportError(self._what, "holds no FMU")
         wires = dict(self._wires())
@@ -139,12 +145,6 @@ class _Reader:
         if not file.is_relative_to(self._folder.resolve()) or not file.is_file():
             raise self._refused(thing, f"'{fit_to_show(source)}' is no file of the archive")
         return file
-
-    def _fmu(self, name: str, element: ElementTree.Element) -> Path:
-        thing = f"component '{fit_to_show(name)}'"
-        if element.get("type", _FMU) != _FMU:
-            raise self._refused(thing, f"is of type {fit_to_show(element.get('type'))}; only FMUs are read")
-        return self._file(thing, self._needed(element, "source"))
 
     def _connector(self, element: str, name: str) -> ElementTree.Element:
         if element not in self._components:
@@ -223,14 +223,13 @@ class _Reader:
                 inline = _parsed(self._what, self._file("a ParameterBinding", source))
             prefix = owner + binding.get("prefix", "")
             for row in inline.findall("ssv:Parameters/ssv:Parameter", NAMESPACES):
-                values[prefix + self._needed(row, "name")] = self._value(row)
+                number = next((kind for kind in row if kind.tag.rpartition("}")[2] in _NUMBERS), None)
+                if number is None:
+                    thing = f"parameter '{fit_to_show(row.get('name'))}'"
+                    raise self._refused(thing, "has no number as its value")
+                value = self._number(number, "value")
+                values[prefix + self._needed(row, "name")] = value
         return values
-
-    def _value(self, row: ElementTree.Element) -> float:
-        for kind in row:
-            if kind.tag.rpartition("}")[2] in _NUMBERS:
-                return self._number(kind, "value")
-        raise self._refused(f"parameter '{fit_to_show(row.get('name'))}'", "has no number as its value")
 
 
 def _unit(connector: ElementTree.Element) -> Unit | None:
@@ -308,7 +307,10 @@ def write_ssp(
         entries: dict[str, bytes] = {STRUCTURE_FILE: writer.structure(Path(path).stem)}
         entries |= writer.values()
         for name, file in fmus.items():
-            entries[f"{RESOURCES}/{name}.fmu"] = _content(Path(file))
+            try:
+                entries[f"{RESOURCES}/{name}.fmu"] = Path(file).read_bytes()
+            except OSError as error:
+                raise ExportError(str(file), f"cannot be read ({error.strerror or error})") from error
     with draft(Path(path)) as file_name, zipfile.ZipFile(file_name, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in entries.items():
             entry = zipfile.ZipInfo(name, _EPOCH)
@@ -317,13 +319,6 @@ def write_ssp(
             entry.compress_type = zipfile.ZIP_STORED if name.endswith(".fmu") else zipfile.ZIP_DEFLATED
             archive.writestr(entry, content)
     return WrittenSystem(Path(path), tuple(writer.notes))
-
-
-def _content(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise ExportError(str(file), f"cannot be read ({error.strerror or error})") from error
 
 
 class _Structure:

@@ -117,18 +117,13 @@ def _size(a: Interval) -> Interval:
     return least, max(abs(a[0]), abs(a[1]))
 
 
-def _square(a: Interval) -> Interval:
-    low, high = _size(a)
-    return low * low, high * high
-
-
 _RANGES: Mapping[int, Callable[..., Interval]] = {
     ca.OP_ADD: _sum,
     ca.OP_SUB: lambda a, b: _sum(a, _negative(b)),
     ca.OP_NEG: _negative,
     ca.OP_TWICE: lambda a: _sum(a, a),
     ca.OP_MUL: _product,
-    ca.OP_SQ: _square,
+    ca.OP_SQ: lambda a: _product(_size(a), _size(a)),
     ca.OP_FABS: _size,
     ca.OP_FMIN: lambda a, b: (min(a[0], b[0]), min(a[1], b[1])),
     ca.OP_FMAX: lambda a, b: (max(a[0], b[0]), max(a[1], b[1])),

@@ -77,7 +77,14 @@ def reference_results(model: FlatModel, *, step: float | None = None) -> Referen
         important += [v.name for v in shown.states]
         important += [name for spring in shown.springs for name in (spring.effort, spring.motion)]
     names = tuple(dict.fromkeys(important))[:MOST_VARIABLES]
-    results = _sampled(shown, inputs, names) if model.sample_time else _continuous(shown, time, inputs, names)
+    if model.sample_time:
+        # What is shown at communication points is the sample of the point before, at first the first.
+        running, outputs = GuardedModel(shown), [v.name for v in shown.outputs]
+        samples = [running.step(row)[0] for row in inputs[:-1].tolist()]
+        places = [outputs.index(name) for name in names]
+        results = np.array([samples[0], *samples], dtype=np.float64)[:, places]
+    else:
+        results = _continuous(shown, time, inputs, names)
     return ReferenceResults(time, tuple(v.name for v in model.inputs), inputs, names, results)
 
 
@@ -148,14 +155,6 @@ def _continuous(model: FlatModel, time: Array, inputs: Array, names: Sequence[st
         _, y, s, _ = model.equations(t, x, u, parameters, [])
         rows.append(np.concatenate([x, np.array(y).ravel(), np.array(s).ravel()])[places])
     return np.array(rows)
-
-
-def _sampled(model: FlatModel, inputs: Array, names: Sequence[str]) -> Array:
-    """Return what is shown at communication points: the sample of the point before, at first the first."""
-    running = GuardedModel(model)
-    places = [[v.name for v in model.outputs].index(name) for name in names]
-    samples = [running.step(row)[0] for row in inputs[:-1].tolist()]
-    return np.array([samples[0], *samples], dtype=np.float64)[:, places]
 
 
 def _csv(time: Array, names: Sequence[str], values: Array) -> str:

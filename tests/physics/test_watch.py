@@ -1,0 +1,60 @@
+"""Monitors in use on machines that share no model code with the package: quiet, awake, and right about
+what changed."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import nlsdesign as nls
+from nlsdesign.components import smoothed
+from nlsdesign.export import export_watch, read_watch_record
+from nlsdesign.regeneration import read_watch, watch_plan
+from tests.rig.watched import build_watched, joint_deck, use
+
+CHANGE, MINUTE = 300.0, 61.0
+AT_ONCE = {"friction": "dry_friction.friction", "stiffness": "spring.stiffness", "delay": "motor.delay"}
+SIZES = {"friction": 1.1, "stiffness": 0.95, "delay": 2e-3}
+
+
+@pytest.fixture(scope="module", params=["published", "joint"])
+def watched(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    deck, sample_time = "austin2015_figure_consistent", 1e-3
+    if request.param == "joint":
+        deck, sample_time = folder / "joint.toml", 2e-3
+        deck.write_text(joint_deck(), encoding="utf-8")
+    plan = watch_plan(nls.flatten(smoothed(nls.declare(nls.load_deck(deck)))), sample_time)
+    return plan, build_watched(request.param, export_watch(plan, folder / "c", real="float")), folder
+
+
+def test_half_an_hour_without_a_change_is_quiet_and_reads_as_none(watched):
+    plan, program, folder = watched
+    seen = use(program, 31, 1800.0, record=folder / "kept.bin")
+    assert math.isinf(seen.first)
+    assert seen.judged == 179
+    assert seen.usable > 0.99
+    assert read_watch(read_watch_record(folder / "kept.bin", plan), plan).verdict == "none"
+
+
+@pytest.mark.parametrize("what", list(SIZES))
+def test_a_change_is_noticed_within_a_minute_and_named_after_five(watched, what):
+    plan, program, folder = watched
+    seen = use(
+        program, 33, CHANGE + 300.0, change_at=CHANGE, after={what: SIZES[what]}, record=folder / "kept.bin"
+    )
+    assert CHANGE < seen.first <= CHANGE + MINUTE
+    (named,) = read_watch(read_watch_record(folder / "kept.bin", plan), plan).named
+    assert AT_ONCE[what] in (named.name, *named.aliases)
+
+
+def test_a_machine_that_is_not_quite_its_deck_is_held_against_itself(watched):
+    _, program, _ = watched
+    built = {"friction": 1.25, "stiffness": 1.03, "inertia": 0.97}
+    assert use(program, 35, 600.0, built=built).first < 200.0
+    assert math.isinf(use(program, 35, 1200.0, built=built, commission_at=300.0).first)
+    seen = use(
+        program, 35, 1200.0, built=built, commission_at=300.0, change_at=900.0, after={"friction": 1.4}
+    )
+    assert 900.0 < seen.first <= 900.0 + MINUTE
