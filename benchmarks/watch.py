@@ -1,6 +1,6 @@
 """The monitor in use: false alarms, time to notice, names; ``python -m benchmarks.watch HOURS``.
 
-Machines are those of `tests.rig.watched`, which share no model code with the package. Each of two machines is
+Machines are those of `tests.watched`, which share no model code with the package. Each of two machines is
 used HOURS hours without a change; every other figure is quick. Writes the tables of
 ``docs/how_to/watch_in_use.md``.
 """
@@ -19,7 +19,7 @@ import nlsdesign as nls
 from nlsdesign.components import smoothed
 from nlsdesign.export import WatchPlan, export_c, export_watch, read_watch_record
 from nlsdesign.regeneration import read_watch, watch_plan
-from tests.rig.watched import Use, build, build_watched, joint_deck, use
+from tests.watched import Use, build, build_watched, joint_deck, use
 
 PAGE = Path(__file__).parents[1] / "docs" / "how_to" / "watch_in_use.md"
 DECKS = {"published": ("austin2015_figure_consistent", 1e-3), "joint": ("", 2e-3)}
@@ -143,7 +143,7 @@ def innovation_alone(each: Watched, folder: Path, hours: float) -> tuple[Path, f
     import subprocess
 
     from nlsdesign.feedback.observer import CascadeGain
-    from tests.rig.watched import values
+    from tests.watched import values
 
     plant = nls.flatten(nls.declare(nls.load_deck(DECKS[each.name][0])))
     source = export_c(nls.design_observer(plant, gain=CascadeGain()), folder / "simple", name="simple")

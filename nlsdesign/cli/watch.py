@@ -63,7 +63,7 @@ def watch() -> None:
 @sample_time_option
 @json_option
 def read_evidence(file: Path, deck_name: str, sample_time: float, as_json: bool) -> int:
-    """Say which number of the deck has changed, with probabilities; or that the evidence does not say.
+    """Name the number of the deck that has changed, or say why not.
 
     FILE holds the record of the monitor that `export c --what watch` wrote. Exit status 0 if nothing changed,
     1 if something did or too little was seen, 2 if the file cannot be read.

@@ -11,7 +11,7 @@ import nlsdesign as nls
 from nlsdesign.components import smoothed
 from nlsdesign.export import export_watch, read_watch_record
 from nlsdesign.regeneration import read_watch, watch_plan
-from tests.rig.watched import build_watched, joint_deck, use
+from tests.watched import build_watched, joint_deck, use
 
 CHANGE, MINUTE = 300.0, 61.0
 AT_ONCE = {"friction": "dry_friction.friction", "stiffness": "spring.stiffness", "delay": "motor.delay"}

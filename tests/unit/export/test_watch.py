@@ -19,7 +19,7 @@ from nlsdesign.export.compilation.target_run import missing_emulator
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.regeneration import read_watch, watch_plan
 from tests.compiling import compile_program
-from tests.rig.watched import joint_deck
+from tests.watched import joint_deck
 from tests.watching import as_step
 
 DECK = "austin2015_figure_consistent"

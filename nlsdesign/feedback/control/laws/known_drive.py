@@ -200,16 +200,19 @@ def known_load(
     acceleration = s.derivative[[v.name for v in opened.states].index(body.rate)]
     resisting = -_at_start(opened, s, known[body.inertia or ""] * acceleration, given)
     turns = ca.jacobian(before[spring.motion], before[body.motion])
-    resisting = drive.written(
-        writer, ca.substitute(resisting, s.parameter, declared.parameter) - turns * given[2]
-    )
+    resisting = ca.substitute(resisting, s.parameter, declared.parameter) - turns * given[2]
+    # −J·ω̇ holds r·T, which the difference takes out by its value, not from the expression.
+    slope = ca.Function("slope", [given, declared.parameter], [ca.jacobian(resisting, given[2])])
+    points = [ca.DM([0.1, speed, load]) for speed in (-1.0, 1.0) for load in (-0.5, 0.5)]
+    grows = any(abs(float(slope(at, plant.start(plant.parameters)))) > _NOTHING for at in points)
+    resisting = drive.written(writer, resisting if grows else ca.substitute(resisting, given[2], 0))
 
     def smooth(angle: Expression, speed: Expression, torque: Expression) -> Expression:
         def at(speed: Expression, load: Expression = torque) -> Expression:
             return ca.SX(ca.substitute(resisting, given, ca.vertcat(angle, speed, load)))
 
         widest = width
-        if depends(resisting, given[2]):
+        if grows:
             grown = at(width) - at(-width) - at(width, ca.SX(0)) + at(-width, ca.SX(0))
             widest = ca.fmax(width, grown / (2 * STEEPEST * gain))
         size = ca.sqrt(speed * speed + widest * widest)

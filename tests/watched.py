@@ -15,13 +15,12 @@ import numpy as np
 
 from nlsdesign.export import WatchSource
 from tests.compiling import compile_program
+from tests.rig.bench import CAM_GRID, SERVO_BANDWIDTH, SERVO_DAMPING, _cam_tables
+from tests.rig.kind_decks import NAMES, deck_of
+from tests.rig.kinds import ELASTIC_JOINT
+from tests.rig.published import PUBLISHED
 
-from .bench import CAM_GRID, SERVO_BANDWIDTH, SERVO_DAMPING, _cam_tables
-from .kind_decks import NAMES, deck_of
-from .kinds import ELASTIC_JOINT
-from .published import PUBLISHED
-
-HERE = Path(__file__).parent
+HERE = Path(__file__).parent / "rig"
 NUMBERS = (
     "friction",
     "stiffness",
