@@ -113,10 +113,9 @@ def regenerated_controller(
     old = design_observer(declared, gain=CascadeGain(), sample_time=sample_time)
     try:
         new = design_observer(better, gain=CascadeGain(), sample_time=sample_time)
-    except (
-        NlsError
-    ):  # a law that no observer holds, as of hysteresis: its controller may still be worth having
-        new = old
+    except NlsError:
+        # A law that no observer holds, as of hysteresis; its controller may still follow better.
+        new, margins = old, f"{margins}; the observer in the loop is that of the declared model for both"
     loops = [
         encoder_loop(plant, observer=old, controller=before),
         encoder_loop(plant, observer=new, controller=after),

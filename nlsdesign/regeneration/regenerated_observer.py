@@ -405,7 +405,8 @@ def write_regeneration(result: Regeneration, folder: Path) -> tuple[Regeneration
             if name != "plant":
                 source = export_c(model, folder / "c", name=name)
                 written |= {source.source: f"{name} in C99", source.header: "its interface"}
-            written[export_fmu(model, folder / f"{name}.fmu")] = f"{name} of the better model as FMU"
+            whose = " of the better model" if name == "plant" else ""  # the others may be the declared one's
+            written[export_fmu(model, folder / f"{name}.fmu")] = f"{name}{whose} as FMU"
         except NlsError as error:
             reasons.append(f"the {name} is not exported: {error}")
     result = replace(result, reasons=tuple(reasons))

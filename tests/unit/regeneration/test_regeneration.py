@@ -17,6 +17,7 @@ from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.components import ROTATION, Assembly, Encoder, Fixed, GearedMotor, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.feedback.control import ClosedLoop, torque_controller
+from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import FlatModel, flatten
@@ -212,6 +213,26 @@ def test_a_controller_that_follows_worse_or_hunts_replaces_nothing(
     assert bool(chosen.kept) == stays
     assert chosen.controller.origin == (declared if stays else better).origin
     assert chosen.words()[1].startswith("The controller stays" if stays else "The controller is that of the")
+
+
+def test_a_controller_without_an_observer_of_its_model_says_whose_is_in_the_loop(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
+
+    def observer(model: FlatModel, **_: object) -> FlatModel:
+        if model.origin == better.origin:
+            raise ArrangementError("this law", "has no observer")
+        return design_observer(model, gain=CascadeGain(), sample_time=2e-3)
+
+    def usual(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
+        return torque_controller(model, sample_time=sample_time), "margins"
+
+    monkeypatch.setattr(regenerated_controller, "design_observer", observer)
+    monkeypatch.setattr(regenerated_controller, "usual_controller", usual)
+    monkeypatch.setattr(regenerated_controller, "sine_error", lambda *_: 1.0)
+    chosen = regenerated_controller.regenerated_controller(declared, better, 2e-3)
+    assert chosen.words()[1].endswith("the observer in the loop is that of the declared model for both.")
 
 
 def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:
