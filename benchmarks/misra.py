@@ -1,8 +1,7 @@
 """Deviations of generated C from MISRA C:2012, as cppcheck finds them: ``python -m benchmarks.misra``.
 
 Writes the table of ``docs/misra.md`` anew. The exit status is 1 if a rule is broken that has no argument
-there, so a new deviation is argued or mended. The adaptive observer is left out: cppcheck does not end within
-minutes on it.
+there, so a new deviation is argued or mended.
 """
 
 from __future__ import annotations

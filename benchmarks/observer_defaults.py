@@ -4,10 +4,12 @@
 actuator and the one that the study designs. A servo leads each along sines of 2.8 N·m at 2 and 5 Hz, 1.5 s
 of motion before 1 s that counts, and all observers get the same counted angles and currents. The machines
 are integrated by ``default_machine.c``, which shares nothing with the package. Beside the observers of the
-package, as generated C in double precision, stand yardsticks that share nothing with them but the cascade:
+package, as generated C in double precision, stand yardsticks:
 
 - *ratio*: the torque of the cascade times one slow number, what the drive gives over what the cascade
   expects, to the power w, the share of the spring in the variance of both,
+- *adaptive*: a joint Kalman filter of the states and of the few directions of the uncertain numbers that move
+  the torque, on the matrices of the package (``_adaptive_filter.py``); the default of former versions,
 - *joint EKF*: one extended Kalman filter of the states and of the numbers of the machine, in that C file,
 - *bound*: the Cramér–Rao bound over the spread, slopes by differences of the machine in C.
 
@@ -29,6 +31,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 import nlsdesign as nls
+from benchmarks._adaptive_filter import AdaptiveFilter
 from benchmarks._default_machines import (
     RUBBER,
     SINGLE,
@@ -86,6 +89,17 @@ def ratio(course: Course, cascade: Observer, prior: Prior) -> Observer:
         both, own = (lfilter([1.0], [1.0, -forget], x) for x in (seen * expected, expected**2))
         found = (both + 1.0) / (own + 1.0)
         return torque * np.concatenate([np.ones(2), np.clip(found, 0.5, 2.0)]) ** weight, None
+
+    return observed
+
+
+def adaptive(model: nls.FlatModel) -> Observer:
+    """The joint Kalman filter of `_adaptive_filter`, in double precision."""
+    filter_ = AdaptiveFilter(model)
+
+    def observed(run: Run) -> tuple[Array, Array]:
+        found = filter_.run(run.angle, run.current[None, :])
+        return found.torque, found.deviation
 
     return observed
 
@@ -219,7 +233,7 @@ def kinds(
     made: dict[str, Callable[[], Observer]] = {
         "cascade": lambda: cascade, "ratio": lambda: ratio(course, cascade, prior),
         "joint EKF": lambda: lambda run: course.joint(prior, run, 1.0),
-        "adaptive": lambda: compiled("adaptive"), "default": lambda: compiled(None),
+        "adaptive": lambda: adaptive(model), "default": lambda: compiled(None),
     }  # fmt: skip
     return {name: made[name]() for name in names}
 

@@ -41,9 +41,6 @@ def main() -> int:
     """Prove, and write or check."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing")
-    parser.add_argument(
-        "--adaptive", action="store_true", help="the adaptive observer too: half an hour more"
-    )
     given = parser.parse_args()
     lines = [
         "| | number type | may be undefined | not proved finite | beyond limits | statements reached |",
@@ -51,8 +48,7 @@ def main() -> int:
     ]
     holds = True
     for real in ("float", "double"):
-        chosen = {name: m for name, m in models().items() if given.adaptive or "adaptive" not in name}
-        results = proved(chosen, real)  # type: ignore[arg-type]
+        results = proved(models(), real)  # type: ignore[arg-type]
         lines += rows(results, real)
         holds &= all(each.holds for each in results.values())
     if not given.check:

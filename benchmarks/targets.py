@@ -21,7 +21,6 @@ from nlsdesign.export import CORTEX_M4F, PROCESSORS, Processor, export_c, measur
 from nlsdesign.export.compilation.target_run import TargetMeasurement
 from nlsdesign.feedback.control import joined
 from nlsdesign.feedback.observer import (
-    design_adaptive_observer,
     design_corrected_observer,
     design_observer_with_details,
 )
@@ -52,7 +51,7 @@ def models() -> dict[str, FlatModel]:
     """What runs on the controller, from the bundled deck."""
     plant = nls.flatten(nls.declare(nls.load_deck(DECK)))
     cascade = design_observer_with_details(plant).model
-    corrected, adaptive = design_corrected_observer(plant).model, design_adaptive_observer(plant).model
+    corrected = design_corrected_observer(plant).model
     controller = nls.torque_controller(plant, law=nls.control.PidTorque())
     scheduled = nls.torque_controller(plant, law=nls.control.ScheduledTorque())
     return {
@@ -64,8 +63,6 @@ def models() -> dict[str, FlatModel]:
         "corrected observer": corrected,
         "corrected observer and controller": joined(corrected, controller),
         "corrected observer and scheduled controller": joined(corrected, scheduled),
-        "adaptive observer": adaptive,
-        "adaptive observer and controller": joined(adaptive, controller),
     }
 
 

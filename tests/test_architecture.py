@@ -84,7 +84,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"reporting"}, {"diagnose"},
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"parametric"}, {"jobs"}),
-    "feedback.observer": ({"scheduling"}, {"adaptive"}, {"certificates"}, {"spread"}),
+    "feedback.observer": ({"scheduling"}, {"corrected", "certificates"}, {"spread"}),
     "feedback.control": ({"laws"}, {"closed_loop"}, {"evaluation"}, {"tuning"}),
     "export": (
         {"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "modelica", "mujoco"}, {"exported_files"},

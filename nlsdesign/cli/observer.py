@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,28 +39,6 @@ CERTIFICATE = "certificate.json"
 """File that is announced; the library is not loaded for it."""
 SEARCHES = ("gradient", "cma")
 """As :data:`nlsdesign.regeneration.fitted_poles.SEARCHES`, which is not loaded for an option."""
-
-
-def range_options(command: Any) -> Any:
-    """Add the options for the ranges over which a bound on the torque is to hold.
-
-    ``command``: gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
-    """
-    for option in (
-        click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
-                     "count of the deck's encoder by default."),
-        click.option("--speed", type=Number("rad/s"), help="Largest speed; 20 rad/s by default."),
-        click.option("--angles", type=Number("rad"), nargs=2, metavar="LOW HIGH", help="Range of the angle, "
-                     "such as --angles '-46 deg' '46 deg'; the whole table by default."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
-
-
-def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ranges that were given."""
-    named = {name: options[name] for name in ("angles", "speed", "angle_error")}
-    return {name: value for name, value in named.items() if value is not None}
 
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
@@ -101,7 +79,18 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @click.option("--certificate", "certified", is_flag=True, help="Also write what is proved of it.")
 @click.option("--decay", type=float, metavar="PER_SECOND", help="Design one certified gain with this decay.")
 @click.option("--with-spread", is_flag=True, help="Certify for all parameters within their spread.")
-@range_options
+@click.option(
+    "--angles",
+    type=Number("rad"),
+    nargs=2,
+    metavar="LOW HIGH",
+    help="Range of the angle over "
+    "which a bound on the torque is to hold, such as --angles '-46 deg' '46 deg'; the whole table "
+    "by default.",
+)
+@click.option("--speed", type=Number("rad/s"), help="Largest speed; 20 rad/s by default.")
+@click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a count of "
+              "the deck's encoder by default.")  # fmt: skip
 def observer(
     context: click.Context, /, deck_name: str | None, out: Path, as_json: bool, **options: Any
 ) -> None:
@@ -182,7 +171,7 @@ def _what_is_asked(
     context: click.Context, options: dict[str, Any]
 ) -> tuple[str | None, dict[str, Any] | None]:
     """Return the kind of observer, and what is to be proved of it; nothing by default."""
-    ranges = given_ranges(options)
+    ranges = {n: options[n] for n in ("angles", "speed", "angle_error") if options[n] is not None}
     kind, decay, with_spread = options["kind"], options["decay"], options["with_spread"]
     if options["records"] is not None and kind != "published":
         raise click.UsageError("--fit-poles belongs to --kind published", ctx=context)
@@ -379,52 +368,3 @@ def certify_continuous_gain(
     gains = dict(zip(proved.proof.system.states, proved.proof.gain, strict=True))
     rows = [f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}" for name, row in gains.items()]
     show_written(as_json, (*proved.statement, *rows), [path], gains=gains)
-
-
-@observer.command(
-    "certify-adaptive",
-    epilog=examples(
-        "nlsdesign observer certify-adaptive --deck austin2015_figure_consistent --out out/certified"
-    ),
-)
-@deck_option
-@sample_time_option
-@spring_option
-@measured_option
-@out_option("out/observer", writes=(CERTIFICATE, *c_names("observer")))
-@real_option
-@click.option("--limit", type=float, metavar="DEVIATIONS", help="Of the slow states; that of the adaptive "
-              "observer by default.")  # fmt: skip
-@range_options
-@json_option
-def certify_adaptive_estimate(
-    deck_name: str,
-    sample_time: float,
-    out: Path,
-    real: str,
-    limit: float | None,
-    as_json: bool,
-    **options: Any,
-) -> None:
-    """Write the adaptive observer as C with a bound. It says how far its torque can leave the deck's."""
-    from ..export import export_c
-    from ..feedback.observer import (
-        AdaptiveSettings,
-        Trust,
-        certify_held_estimate,
-        design_adaptive_observer,
-        held_assumptions,
-    )
-
-    text, plant = _plant(deck_name)
-    trust = Trust() if limit is None else Trust(limit=limit)
-    roles = _roles(plant, options)
-    design = design_adaptive_observer(
-        plant, estimate=roles["estimate"], measured=roles["measured"], sample_time=sample_time,
-        settings=AdaptiveSettings(trust=trust),
-    )  # fmt: skip
-    assumed = replace(held_assumptions(plant, design), real=real, **given_ranges(options))
-    proved = certify_held_estimate(plant, design, assumptions=assumed, settings=asdict(trust), deck=text)
-    source = export_c(proved.stated(design.model), out, real=real, name="observer")
-    path = proved.write_beside(source.header, source.source)
-    show_written(as_json, proved.statement, [path, source.header, source.source, source.selftest])

@@ -110,8 +110,8 @@ class SpreadQuestion(SweepQuestion):
         Of the draws.
     sample_time
         In s.
-    adaptive
-        Whether the observer may learn, where that helps; otherwise it is the cascade.
+    corrected
+        Whether the torque of the cascade may be corrected by what the drive shows, where that helps.
 
     Raises
     ------
@@ -122,7 +122,7 @@ class SpreadQuestion(SweepQuestion):
     draws: int = 32
     seed: int = 0
     sample_time: float = in_unit(1e-3, "s")
-    adaptive: bool = False
+    corrected: bool = False
 
     def __post_init__(self) -> None:
         for name, given, least in (("draws", self.draws, 1), ("seed", self.seed, 0)):
@@ -157,7 +157,7 @@ class SpreadQuestion(SweepQuestion):
                 f"model '{model.name}'", "declares no spread, so there are no errors over it",
                 next_step="give numbers a spread",
             )  # fmt: skip
-        gain = None if self.adaptive else CascadeGain()
+        gain = None if self.corrected else CascadeGain()
         observer = design_observer(model, sample_time=self.sample_time, gain=gain)
         bench = observer_bench(model, estimate=torque, measured=angle, sample_time=self.sample_time)
         errors = observer_errors(

@@ -43,7 +43,7 @@ chosen so that Fig. 9 is met, since the paper prints none."""
 def moved(deck: str, gains: TorqueGains, changes: dict[str, float] | None = None) -> ClosedLoop:
     """The bench with a moved load; observer and controller are designed on the fixed one as declared.
 
-    The observer is the cascade, which takes the numbers for granted: an adaptive one learns from what it is
+    The observer is the cascade, which takes the numbers for granted: the default one learns from what it is
     shown, and then what is measured is its learning.
     """
     actuator = declare(load_deck(deck))

@@ -26,7 +26,7 @@ from nlsdesign.feedback.observer import (
     observer_bench,
     observer_errors,
 )
-from nlsdesign.feedback.observer.adaptive.duty_and_directions import Duty
+from nlsdesign.feedback.observer.corrected.duty import Duty
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Prior, declared_prior
 from tests.calibrated import LINEAR, deck

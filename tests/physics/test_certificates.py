@@ -23,7 +23,6 @@ from nlsdesign.feedback.observer import (
     Contraction,
     ObserverDesign,
     certify,
-    clamped_estimate_bound,
     design_observer_with_details,
     observe,
     verify,
@@ -243,18 +242,3 @@ def test_a_wrong_decay_is_refuted_by_the_mathematics() -> None:
     assert verify(found).holds
     forged = verify(replace(found, proof=replace(found.proof, decay=1.1 * found.proof.decay)))
     assert [c.name for c in forged.checks if c.holds is False] == ["contraction", "condition of P"]
-
-
-def test_boxes_bound_an_estimate_at_the_worst_angle() -> None:
-    """Against all corners and angles between the grid points, drawn at random."""
-    draw = np.random.default_rng(8)
-    rows = draw.normal(size=(9, 3))
-    held, true = (np.sort(draw.normal(size=(3, 2)), axis=1) for _ in range(2))
-    bound = clamped_estimate_bound(rows, held, true)
-    worst = 0.0
-    for _ in range(4000):
-        left, share = draw.integers(0, 8), draw.choice([0.0, 1.0, draw.random()])
-        t = (1.0 - share) * rows[left] + share * rows[left + 1]
-        x, y = (box[range(3), draw.integers(0, 2, 3)] for box in (held, true))
-        worst = max(worst, abs(float(t @ (x - y))))
-    assert 0.9 * bound < worst <= bound

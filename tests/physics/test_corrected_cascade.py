@@ -17,10 +17,9 @@ import nlsdesign as nls
 from benchmarks._default_machines import RUBBER, SINGLE, Course, Run
 from benchmarks.observer_defaults import Observer, coordinates, drawn, judged, kinds, known_of, spring_share
 from nlsdesign.export.compilation.compiled_step import CompiledStep
-from nlsdesign.feedback.observer import AdaptiveSettings, CorrectedDesign, design_corrected_observer
-from nlsdesign.feedback.observer.adaptive.balance import DRIVE, OFFSET, RELAXING, REST
-from nlsdesign.feedback.observer.adaptive.correction_equations import rest_torque
-from nlsdesign.feedback.observer.adaptive.duty_and_directions import Duty
+from nlsdesign.feedback.observer import CorrectedDesign, Duty, design_corrected_observer
+from nlsdesign.feedback.observer.corrected.balance import DRIVE, OFFSET, RELAXING, REST
+from nlsdesign.feedback.observer.corrected.correction_equations import rest_torque
 from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.model import FlatModel
 from nlsdesign.simulation.prior import Prior, declared_prior
@@ -55,9 +54,7 @@ def test_factors_of_a_linear_spring_tell_what_is_derived_by_hand() -> None:
     """ln k − ln J and ln s − ln J are seen; E[ln s] = σs²·(σk² + σJ²)-weighted, from Σ⁻¹ of three normals."""
     drive, inertia, spring = 0.1, 0.08, 0.05
     names = {"motor.torque_constant": drive, "motor.inertia": inertia, "spring.stiffness": spring}
-    found = design_corrected_observer(
-        deck(LINEAR), settings=AdaptiveSettings(prior=sure(names), duty=Duty(torque=1.5))
-    ).balance
+    found = design_corrected_observer(deck(LINEAR), prior=sure(names), duty=Duty(torque=1.5)).balance
     assert found.terms[:2] == (DRIVE, REST)
     assert found.terms[-1] == OFFSET
     assert RELAXING not in found.terms
@@ -169,7 +166,7 @@ def test_a_weight_is_refused_and_the_cascade_taken_without_spreads() -> None:
     known = declared_prior(deck(LINEAR)).only(["spring.stiffness"])
     nothing = Prior(known.names, known.values, np.zeros((1, 1)))
     with pytest.raises(ArrangementError, match="no uncertain numbers"):
-        design_corrected_observer(deck(LINEAR), settings=AdaptiveSettings(prior=nothing))
+        design_corrected_observer(deck(LINEAR), prior=nothing)
 
 
 def test_the_correction_is_held_within_its_reach(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def _decks() -> Iterator[Job]:
             "completion",
         ),
         "deck ": ("", "show", "check", "copy", "new", "from-rig", "list"),
-        "observer ": ("", "calibrate", "certify-adaptive", "certify-continuous", "verify"),
+        "observer ": ("", "calibrate", "certify-continuous", "verify"),
         "export ": ("", "c", "controller", "fmu", "modelica", "ssp", "check"),
         "analyse ": ("", "angle", "loop"),
         "study ": ("", "list", "run"),
@@ -88,18 +88,18 @@ def _code() -> Iterator[Job]:
     def c(deck: str, words: str) -> str:
         return f"export c --deck {deck} {words} --json --out c"
 
-    yield Job("code/adaptive", (c(MAIN, ""), "export check c --json"), True)
+    yield Job("code/default", (c(MAIN, ""), "export check c --json"), True)
     yield Job("code/cascade", (c(MAIN, "--kind cascade"), "export check c"), True)
     yield Job(
         "code/loop_float", (c(MAIN, "--what both --kind cascade --real float --flash 64kB --examples"),)
     )
-    yield Job("code/loop_adaptive", (c(MAIN, "--what both"),))
+    yield Job("code/loop_default", (c(MAIN, "--what both"),))
     yield Job("code/controller_pid", (c(MAIN, "--what controller --law pid"),))
     yield Job("code/controller", (f"export controller --deck {MAIN} --bandwidth '8 Hz' --fmu --out c",))
     for kind in ("certified", "kalman", "published"):
         yield Job(f"code/{kind}", (c(MAIN, f"--kind {kind}"),))
-    yield Job("code/soft_adaptive", (c(SOFT, "--what both"),))
-    yield Job("code/one_sided_adaptive", (NEW_FINGER, c("new.toml", "--what both")))
+    yield Job("code/soft_default", (c(SOFT, "--what both"),))
+    yield Job("code/one_sided_default", (NEW_FINGER, c("new.toml", "--what both")))
     yield Job("code/one_sided_cascade", (NEW_FINGER, c("new.toml", "--kind cascade --real float")))
     yield Job("code/observer_errors", (f"observer --deck {MAIN} --errors --draws 4 --json --out c",))
     wires = (
@@ -117,7 +117,7 @@ def _code() -> Iterator[Job]:
         ),
     )
     yield Job("code/fmu2", (f"export fmu --deck {MAIN} --kind cascade --version 2.0 --out fmu",), True)
-    yield Job("code/fmu_adaptive", (f"export fmu --deck {MAIN} --what observer --out fmu",))
+    yield Job("code/fmu_default", (f"export fmu --deck {MAIN} --what observer --out fmu",))
     yield Job("code/finger_fmu", (f"export fmu --deck {FINGER} --what plant --reference --out fmu",))
     for deck in _deck_names():
         yield Job(f"code/modelica_{deck}", (f"export modelica --deck {deck} --out plant.mo",), deck == MAIN)
@@ -135,7 +135,6 @@ def _analysis() -> Iterator[Job]:
     proofs = {
         "certified": "--kind certified --certificate",
         "with_spread": "--kind certified --certificate --with-spread",
-        "adaptive": "certify-adaptive",
         "continuous": "certify-continuous",
     }
     for name, asked in proofs.items():

@@ -137,7 +137,7 @@ def test_export_c(run: Run, tmp_path: Path, scheme: Scheme) -> None:
     machine = renamed(published(), scheme)
     write_deck(machine.assembly, tmp_path / "other.toml")
     sources = []
-    # The adaptive observer under one scheme is enough: its design takes several seconds.
+    # The default observer under one scheme is enough: its design takes several seconds.
     kind = () if scheme is exchanged else ("--kind", "cascade")
     for number, deck in enumerate((DECKS[0], str(tmp_path / "other.toml"))):
         status, _, err = run("export", "c", "--deck", deck, "--out", f"c{number}", *kind)

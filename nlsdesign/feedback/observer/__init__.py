@@ -1,8 +1,5 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
-from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
-from .adaptive.corrected_cascade import CorrectedDesign, design_corrected_observer
-from .adaptive.duty_and_directions import AdaptiveSettings, Trust
 from .certificates import (
     Assumptions,
     Certificate,
@@ -12,14 +9,13 @@ from .certificates import (
     certified_design,
     certify,
     certify_continuous,
-    certify_held_estimate,
-    clamped_estimate_bound,
     declared_assumptions,
     read_certificate,
     verify,
     write_certificate,
 )
-from .certificates.held_estimate import held_assumptions as held_assumptions
+from .corrected.corrected_cascade import CorrectedDesign, design_corrected_observer
+from .corrected.duty import Duty
 from .scheduling.angle_form import Minimal, PaperForm, StateForm
 from .scheduling.measured_angle import observe
 from .scheduling.scheduled import ObserverDesign, design_observer_with_details
@@ -38,8 +34,6 @@ from .spread.observer_bench import ObserverBench, observer_bench
 from .spread.spread_errors import SpreadErrors, errors_beside, observer_errors
 
 __all__ = [
-    "AdaptiveDesign",
-    "AdaptiveSettings",
     "Assumptions",
     "CascadeGain",
     "Certificate",
@@ -49,6 +43,7 @@ __all__ = [
     "Contraction",
     "CorrectedDesign",
     "DesignedObserver",
+    "Duty",
     "FixedGrid",
     "GainRule",
     "Grid",
@@ -63,15 +58,11 @@ __all__ = [
     "SpreadErrors",
     "StateForm",
     "SteadyStateKalman",
-    "Trust",
     "certified_design",
     "certify",
     "certify_continuous",
-    "certify_held_estimate",
     "choose_observer",
-    "clamped_estimate_bound",
     "declared_assumptions",
-    "design_adaptive_observer",
     "design_corrected_observer",
     "design_observer",
     "design_observer_with_details",

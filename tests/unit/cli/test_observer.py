@@ -57,7 +57,7 @@ def test_all_commands_write_what_errs_least_over_the_spread(run: Run, tmp_path: 
 
 
 @pytest.mark.long_cases("kalman")
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("best", "adaptive", "corrected")])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("best", "corrected")])
 def test_every_kind_is_written(run: Run, tmp_path: Path, kind: str) -> None:
     deck = "austin2015_figure_consistent" if kind == "published" else DECK  # its states need a cam
     status, out, err = run("observer", "--deck", deck, "--kind", kind, "--out", "o", "--json")
@@ -158,7 +158,7 @@ def test_a_deck_without_spread_gets_the_cascade_and_the_reason(run: Run, tmp_pat
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--kind", "adaptive", "--certificate"), "an observer of kind 'adaptive' cannot be certified"),
+        (("--kind", "corrected", "--certificate"), "an observer of kind 'corrected' cannot be certified"),
         (("--kind", "cascade", "--certificate", "--decay", "5"), "--decay belongs to --kind certified"),
         (("--decay", "5"), "belong to --certificate"),
         (("--kind", "cascades"), "'cascades' is not one of"),

@@ -33,7 +33,7 @@ from nlsdesign.export.c.guarded_step import (
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
 from nlsdesign.feedback.control import ScheduledTorque, joined, torque_controller
-from nlsdesign.feedback.observer import design_adaptive_observer
+from nlsdesign.feedback.observer import design_corrected_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.model import flatten
@@ -540,7 +540,7 @@ def test_the_default_observer_in_float_passes_its_own_self_test(name, tmp_path):
     Quick, of the soft spring and joined with its controller: the test below.
     """
     plant = flatten(declare(load_deck(f"austin2015_{name}")))
-    source = export_c(design_adaptive_observer(plant).model, tmp_path, real="float")
+    source = export_c(design_corrected_observer(plant).model, tmp_path, real="float")
     program = compile_program([source.source, source.selftest], tmp_path / "selftest")
     assert subprocess.run([program], check=False).returncode == 0
 
@@ -548,7 +548,7 @@ def test_the_default_observer_in_float_passes_its_own_self_test(name, tmp_path):
 def test_the_self_test_allows_what_the_rounding_of_the_states_makes_and_no_more_than_ten_times(tmp_path):
     """Slow states that stay small carry the rounding of their whole range; it once failed at two samples."""
     plant = flatten(declare(load_deck("austin2015_soft_spring")))
-    loop = joined(design_adaptive_observer(plant).model, torque_controller(plant, law=ScheduledTorque()))
+    loop = joined(design_corrected_observer(plant).model, torque_controller(plant, law=ScheduledTorque()))
     source = export_c(loop, tmp_path, real="float")
     program = compile_program([source.source, source.selftest], tmp_path / "selftest")
     assert subprocess.run([program], check=False).returncode == 0

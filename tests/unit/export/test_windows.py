@@ -14,7 +14,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export.compilation.cross_compiler import compile_library, host_platform
 from nlsdesign.export.fmi.fmu import export_fmu
 from nlsdesign.export.fmi.fmu_variables import layout
-from nlsdesign.feedback.observer import design_adaptive_observer
+from nlsdesign.feedback.observer import design_corrected_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
 from tests.hand_built import observer, plant
@@ -23,15 +23,15 @@ LOADER = Path(__file__).with_name("windows_loader.c")
 STEP, COUNT = 1e-3, 300
 
 
-def adaptive():
+def corrected():
     """An observer whose step has a frame of more than one page, which Windows maps page by page."""
-    return design_adaptive_observer(flatten(declare(load_deck("austin2015_stiff_spring")))).model
+    return design_corrected_observer(flatten(declare(load_deck("austin2015_stiff_spring")))).model
 
 
-MODELS = {"plant": plant, "observer": observer, "adaptive": adaptive}
+MODELS = {"plant": plant, "observer": observer, "corrected": corrected}
 
 
-@pytest.mark.long_cases("adaptive")
+@pytest.mark.long_cases("corrected")
 @pytest.mark.parametrize("name", MODELS)
 def test_the_windows_library_gives_the_same_as_the_one_for_this_machine(name, tmp_path):
     # The loader, windows_loader.c, puts x86-64 code into a Linux process and calls it there.

@@ -19,7 +19,6 @@ from nlsdesign.feedback.observer import (
     CascadeGain,
     FixedGrid,
     PaperForm,
-    design_adaptive_observer,
     design_observer,
 )
 from nlsdesign.foundation.deck import deck_names, load_deck, read_deck
@@ -134,7 +133,6 @@ VIEWS: dict[str, Callable[[FlatModel], FlatModel]] = {
     "observer in the published form": lambda m: design_observer(
         m, form=PaperForm(), grid=FixedGrid(-1.5, 1.5, 33)
     ),
-    "adaptive observer": lambda m: design_adaptive_observer(m, grid=FixedGrid(-1.5, 1.5, 33)).model,
     "controller": torque_controller,
 }
 

@@ -275,7 +275,7 @@ def test_the_sentence_is_an_error_of_the_project() -> None:
     assert caught.value.next_step == "tie an elastic element between two bodies"
 
 
-@pytest.mark.parametrize("kind", ["kalman", "cascade", "adaptive"])
+@pytest.mark.parametrize("kind", ["kalman", "cascade", "corrected"])
 def test_a_motion_that_no_state_is_called_by_is_refused(run: Run, kind: str) -> None:
     words = ("--deck", "test_rig", "--kind", kind, "--measured", "motor.angel", "--out", "o")
     status, _, err = run("observer", *words)

@@ -22,7 +22,7 @@ from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ....model.roles import series_spring
 from ....simulation.sampled_batch import PLANT, SampledSystem
-from ...observer.adaptive.corrected_cascade import PREFIX
+from ...observer.corrected.corrected_cascade import PREFIX
 from ..closed_loop import ClosedLoop
 from ..laws.law_writer import DESIRED
 from .linear_parts import (

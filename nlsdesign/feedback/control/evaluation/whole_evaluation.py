@@ -287,7 +287,7 @@ def cascade_loops(
         As for :func:`~nlsdesign.feedback.control.torque_controller`: law, gains, velocity.
     """
     plants = [with_outputs(m, [measured_motion(m), series_spring(m).effort]) for m in (fixed, moved)]
-    # What an adaptive observer has learned depends on what went before, so a loop with it has no one figure.
+    # What a corrected observer has learned depends on what went before, so a loop with it has no one figure.
     observer = design_observer(plants[0], sample_time=sample_time, gain=CascadeGain())
     controller = torque_controller(plants[0], sample_time=sample_time, **law)
     substeps = max(1, round(10 * sample_time / 1e-3))

@@ -1,6 +1,6 @@
 """What is proved of an observer: gains and Lyapunov functions from matrix inequalities, files of proof.
 
-``spread`` and the rooms above may import it; it builds on ``scheduling`` and ``adaptive``.
+``spread`` and the rooms above may import it; it builds on ``scheduling``.
 It never trusts the solver: what is written is checked in exact or interval arithmetic.
 """
 
@@ -8,7 +8,6 @@ from .certificate import CERTIFICATE, Certificate, write_certificate
 from .co_design import CertifiedGain
 from .continuous import certify_continuous
 from .contraction import Contraction, certify, declared_assumptions
-from .held_estimate import certify_held_estimate, clamped_estimate_bound
 from .torque_bound import Assumptions
 from .verification import CodeToCompare, certified_design, read_certificate, verify
 
@@ -22,8 +21,6 @@ __all__ = [
     "certified_design",
     "certify",
     "certify_continuous",
-    "certify_held_estimate",
-    "clamped_estimate_bound",
     "declared_assumptions",
     "read_certificate",
     "verify",

@@ -15,7 +15,6 @@ from ....foundation.errors import MeasurementError, NlsError
 from ....foundation.text_files import text_of, without_stamp
 from ....foundation.written_numbers import prefixed
 from ....model import FlatModel
-from ..adaptive.adaptive_observer import AdaptiveDesign
 from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
 from ..scheduling.table import Grid
 from .certificate import FORMAT, Certificate, certificate_text, hashes_of_code
@@ -23,7 +22,6 @@ from .co_design import GainAndLyapunov
 from .continuous import ContinuousContraction, covers, decays
 from .contraction import Contraction, contracts, within_condition
 from .error_system import error_system
-from .held_estimate import HeldEstimate, designed_again, held_estimate_bound
 from .polytope import ErrorPolytope, error_polytope
 from .torque_bound import TorqueErrorBound, torque_bound
 
@@ -56,10 +54,10 @@ class Verification:
         return "\n".join(f"{words[c.holds]}: {c.name} ({c.detail})" for c in self.checks)
 
 
-AnyProof: TypeAlias = Contraction | ContinuousContraction | HeldEstimate
+AnyProof: TypeAlias = Contraction | ContinuousContraction
 """Whatever a file of proof can hold."""
-PROOFS: dict[str, type[Contraction] | type[ContinuousContraction] | type[HeldEstimate]] = {
-    proof.form: proof for proof in (Contraction, ContinuousContraction, HeldEstimate)
+PROOFS: dict[str, type[Contraction] | type[ContinuousContraction]] = {
+    proof.form: proof for proof in (Contraction, ContinuousContraction)
 }
 """Kind of proof by the format of its file."""
 
@@ -136,7 +134,6 @@ def verify(
     model: FlatModel | None = None,
     deck: str | None = None,
     code: Path | CodeToCompare | None = None,
-    design: AdaptiveDesign | None = None,
     grid: Grid | None = None,
 ) -> Verification:
     """Check a certificate again.
@@ -154,9 +151,6 @@ def verify(
     code
         Folder of C files that should be the certified ones; with what writes them they are written anew from
         the deck and compared character by character.
-    design
-        Of a bound on the estimate of an adaptive observer: that observer; by default it is designed
-        again from the deck with the settings of the certificate.
     grid
         With which a scheduled observer was designed, if not the default one.
     """
@@ -169,12 +163,8 @@ def verify(
         again = _designed_again(certificate, proof, model, grid)
         checks += _against_model(certificate, proof, model, again)
         observer = again[1].model if isinstance(again, tuple) else None
-    elif isinstance(proof, ContinuousContraction):
-        checks += _decay(certificate, proof, model)
     else:
-        held, adaptive = _held(certificate, proof, model, design)
-        checks.append(held)
-        observer = None if adaptive is None else adaptive.model
+        checks += _decay(certificate, proof, model)
     if deck is not None:
         same = _hash(deck) == _hash(certificate.deck[1])
         checks.insert(1, Check("deck", same, f"sha256 {_hash(deck)[:12]}"))
@@ -227,32 +217,6 @@ def _others(certificate: Certificate[AnyProof], model: FlatModel) -> str:
     declared = model.values
     others = [n for n, v in certificate.parameters.items() if declared[n] != v]
     return f"; {len(others)} parameters differ from the deck: {', '.join(others[:3])}" if others else ""
-
-
-def _held(
-    certificate: Certificate[AnyProof],
-    proof: HeldEstimate,
-    model: FlatModel | None,
-    design: AdaptiveDesign | None,
-) -> tuple[Check, AdaptiveDesign | None]:
-    name, claimed = "bound of the estimate", proof.bound
-    if model is None:
-        return Check(name, None, "needs the deck, and the observer designed again from it"), None
-    try:
-        changed = model.with_values(dict(certificate.parameters))
-        design = design or designed_again(certificate, proof, changed)
-        again = held_estimate_bound(changed, design, proof.assumptions)
-    except NlsError as error:  # nothing can be bounded, so nothing may be claimed
-        return Check(name, False, str(error)), None
-    room = 1.0 + 1e-6
-    same = again.limit == claimed.limit and again.boxes.keys() == claimed.boxes.keys()
-    parts = again.learned <= claimed.learned * room and again.cascade <= claimed.cascade * room
-    boxes = same and all(
-        claimed.boxes[n][0] <= low + 1e-6 * (high - low) and claimed.boxes[n][1] >= high - 1e-6 * (high - low)
-        for n, (low, high) in again.boxes.items()
-    )
-    words = f"{again.total:.4g} N·m found again" + _others(certificate, model)
-    return Check(name, same and parts and boxes, words), design
 
 
 def _hash(text: str) -> str:

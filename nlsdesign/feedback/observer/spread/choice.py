@@ -22,21 +22,27 @@ from ....simulation.prior import Prior
 from ....simulation.sampled_batch import PLANT, run_batch
 from ...analysis.kalman import NoiseAssumptions, declared_deviation
 from ...analysis.rest_points import rest_points
-from ..adaptive.adaptive_observer import SPREAD, AdaptiveDesign, design_adaptive_observer, encoder_quantum
-from ..adaptive.corrected_cascade import PREFIX, CorrectedDesign, corrected, design_corrected_observer
-from ..adaptive.duty_and_directions import AdaptiveSettings
-from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from ..certificates.certificate import Certificate
 from ..certificates.co_design import CertifiedGain
 from ..certificates.contraction import Contraction, certify, declared_assumptions
+from ..corrected.corrected_cascade import (
+    PREFIX,
+    SPREAD,
+    CorrectedDesign,
+    corrected,
+    design_corrected_observer,
+    encoder_quantum,
+)
+from ..corrected.duty import Duty
 from ..scheduling.angle_form import PaperForm, StateForm
 from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details, whole_contour
 from ..scheduling.step import CascadeGain, FittedGain, GainRule, SteadyStateKalman
 from ..scheduling.table import Grid
+from .estimator_bound import SensedTorque, estimator_bound, rms_over
 from .observer_bench import ObserverBench, observer_bench
 
 BEST, CORRECTED, CASCADE, CERTIFIED = "best", "corrected", "cascade", "certified"
-KINDS = (BEST, CORRECTED, "adaptive", CASCADE, CERTIFIED, "kalman", "published")
+KINDS = (BEST, CORRECTED, CASCADE, CERTIFIED, "kalman", "published")
 """Kinds of observers by name; the first is the one that errs least over the spread."""
 
 
@@ -55,7 +61,7 @@ class ObserverOfChoice:
         the corrected one where it could be designed.
     """
 
-    design: CorrectedDesign | AdaptiveDesign | ObserverDesign
+    design: CorrectedDesign | ObserverDesign
     reason: str
     expected: tuple[float, ...]
 
@@ -72,7 +78,8 @@ def choose_observer(
     estimate: str | None = None,
     measured: str | None = None,
     sample_time: float = 1e-3,
-    settings: AdaptiveSettings | None = None,
+    prior: Prior | None = None,
+    duty: Duty | None = None,
     grid: Grid | None = None,
 ) -> ObserverOfChoice:
     """Return the observer that errs least over the spread of the deck.
@@ -85,8 +92,10 @@ def choose_observer(
     ----------
     model, estimate, measured, sample_time
         As for :func:`design_observer`.
-    settings
-        What is known, what the actuator does, and how far the equations are trusted.
+    prior
+        What is known of the numbers; the spreads of the deck by default.
+    duty
+        What the actuator does.
     grid
         As for :func:`design_observer`.
 
@@ -103,7 +112,6 @@ def choose_observer(
         If a table does not keep its error bound.
     """
     check_sampling(model, sample_time)
-    settings = settings or AdaptiveSettings()
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
@@ -111,9 +119,9 @@ def choose_observer(
     unit = typeset_unit(model.variable(estimate).unit)
     try:
         learning = corrected(
-            model, cascade, settings=settings, grid=grid, estimate=estimate, measured=measured
+            model, cascade, prior=prior, duty=duty, grid=grid, estimate=estimate, measured=measured
         )
-        learned = expected_error(model, learning, settings)
+        learned = expected_error(model, learning, duty)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
         return ObserverOfChoice(cascade, f"cascade, for it cannot be corrected: {error}", ())
@@ -125,11 +133,11 @@ def choose_observer(
     return ObserverOfChoice(cascade, f"cascade: the corrected one has {both}", (alone, learned))
 
 
-def expected_error(model: FlatModel, design: CorrectedDesign, settings: AdaptiveSettings) -> float:
+def expected_error(model: FlatModel, design: CorrectedDesign, duty: Duty | None) -> float:
     """Return the deviation that the observer expects along the bench with the numbers of the deck."""
     plant = design.step.plant
     bench = observer_bench(
-        model, duty=settings.duty, estimate=plant.estimate.name, measured=plant.angle,
+        model, duty=duty, estimate=plant.estimate.name, measured=plant.angle,
         sample_time=design.step.sample_time,
     )  # fmt: skip
     name = f"observer.{PREFIX}.{SPREAD}"
@@ -164,7 +172,7 @@ class DesignedObserver:
     """
 
     kind: str
-    design: CorrectedDesign | AdaptiveDesign | ObserverDesign
+    design: CorrectedDesign | ObserverDesign
     reason: str = ""
     expected: tuple[float, ...] = ()
 
@@ -272,8 +280,6 @@ def designed_observer(
         )
     if kind == CORRECTED:
         return DesignedObserver(kind, design_corrected_observer(plant, **named))
-    if kind == "adaptive":
-        return DesignedObserver(kind, design_adaptive_observer(plant, **named))
     if kind == "published":
         return DesignedObserver(kind, design_observer_with_details(plant, form=PaperForm(), **named))
     gains: dict[str, Callable[[], Any]] = {
@@ -316,7 +322,7 @@ def design_observer(
     carries an ending: ``.memory`` is what goes from sample to sample, ``.innovation`` the measured minus
     the expected angle, ``.estimate`` the estimate of the angle itself, whose name the input has;
     ``correction.standard_deviation`` what the corrected one expects of its estimate, ``correction.factor[i]``
-    what it has learned; ``.standard_deviation`` and ``.deviation[i]`` those of an adaptive one.
+    what it has learned.
 
     Parameters
     ----------

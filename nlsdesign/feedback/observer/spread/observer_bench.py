@@ -20,7 +20,7 @@ from ....model import FlatModel, Variable
 from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
 from ....simulation.sampled_batch import PLANT, SampledSystem
-from ..adaptive.duty_and_directions import Duty, operating_points, push, spring_inertia
+from ..corrected.duty import Duty, operating_points, push, spring_inertia
 from ..scheduling.angle_form import minimal_form
 from ..scheduling.scheduled import whole_contour
 

@@ -23,9 +23,9 @@ from ....model.roles import measured_motion, series_spring
 from ....simulation.buffered import Translate, as_it_is
 from ....simulation.prior import Prior, declared_prior
 from ....simulation.sampled_batch import PLANT, BatchTrace, run_batch
-from ..adaptive.adaptive_observer import encoder_quantum
-from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
+from ..corrected.corrected_cascade import encoder_quantum
 from .choice import CASCADE, DesignedObserver, designed_observer
+from .estimator_bound import SensedTorque, estimator_bound, rms_over
 from .observer_bench import ObserverBench, observer_bench
 
 FINE = 1e-6

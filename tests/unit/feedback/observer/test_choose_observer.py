@@ -11,22 +11,18 @@ from nlsdesign.components import CurrentDrivenMotor, Gear, Inertia
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import natively
 from nlsdesign.feedback.observer import (
-    AdaptiveDesign,
-    AdaptiveSettings,
     CorrectedDesign,
+    Duty,
     ObserverDesign,
     PaperForm,
     SpreadErrors,
-    Trust,
     choose_observer,
-    design_adaptive_observer,
     design_corrected_observer,
     design_observer,
     design_observer_with_details,
     observer_bench,
     observer_errors,
 )
-from nlsdesign.feedback.observer.adaptive.duty_and_directions import Duty
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
@@ -44,15 +40,15 @@ def linear() -> FlatModel:
 
 
 @pytest.fixture(scope="module")
-def adaptive(linear: FlatModel) -> AdaptiveDesign:
-    return design_adaptive_observer(linear, settings=AdaptiveSettings(duty=DUTY))
+def corrected(linear: FlatModel) -> CorrectedDesign:
+    return design_corrected_observer(linear, duty=DUTY)
 
 
 @pytest.fixture(scope="module")
-def errors(linear: FlatModel, adaptive: AdaptiveDesign) -> SpreadErrors:
+def errors(linear: FlatModel, corrected: CorrectedDesign) -> SpreadErrors:
     cascade = design_observer_with_details(linear)
     return observer_errors(
-        {"adaptive": adaptive.model, "cascade": cascade.model}, observer_bench(linear, duty=DUTY), draws=12,
+        {"corrected": corrected.model, "cascade": cascade.model}, observer_bench(linear, duty=DUTY), draws=12,
         bounded=2, translate=natively,
     )  # fmt: skip
 
@@ -81,18 +77,17 @@ def test_without_an_encoder_the_cascade_is_taken(linear: FlatModel) -> None:
     assert "no encoder" in found.reason
 
 
-def test_a_machine_with_other_names_gets_the_same_observer(adaptive: AdaptiveDesign) -> None:
+def test_a_machine_with_other_names_gets_the_same_observer(corrected: CorrectedDesign) -> None:
     other = renamed(declare(load_deck("austin2015_soft_spring")), nested)
-    found = design_adaptive_observer(flatten(other.assembly), settings=AdaptiveSettings(duty=DUTY))
-    np.testing.assert_allclose(found.directions.effect, adaptive.directions.effect, rtol=1e-12)
-    np.testing.assert_allclose(found.compact.values, adaptive.compact.values, rtol=1e-9)
-    assert set(found.directions.names) == {other.name(n) for n in adaptive.directions.names}
+    found = design_corrected_observer(flatten(other.assembly), duty=DUTY)
+    np.testing.assert_allclose(found.balance.deviations, corrected.balance.deviations, rtol=1e-12)
+    np.testing.assert_allclose(found.model.tables[0].values, corrected.model.tables[0].values, rtol=1e-9)
 
 
-def test_outputs_carry_the_expected_deviation_and_slow_states(adaptive: AdaptiveDesign) -> None:
-    names = [v.name for v in adaptive.model.outputs]
-    assert names[:2] == ["spring.torque", "spring.torque.standard_deviation"]
-    assert sum(".deviation[" in n for n in names) == len(adaptive.directions.effect)
+def test_outputs_carry_the_expected_deviation_and_factors(corrected: CorrectedDesign) -> None:
+    names = [v.name for v in corrected.model.outputs]
+    assert names[:2] == ["spring.torque", "correction.standard_deviation"]
+    assert sum(n.startswith("correction.factor[") for n in names) == len(corrected.balance.terms)
 
 
 def test_errors_over_the_spread_are_those_of_their_runs(errors: SpreadErrors) -> None:
@@ -140,13 +135,11 @@ def test_the_bound_counts_every_input_of_a_machine() -> None:
 
 def test_bad_settings_are_named(linear: FlatModel) -> None:
     with pytest.raises(ValueRangeError, match="sample_time"):
-        design_adaptive_observer(linear, sample_time=0.0)
+        design_corrected_observer(linear, sample_time=0.0)
     with pytest.raises(ValueRangeError, match="torque -1"):
         Duty(torque=-1.0)
-    with pytest.raises(ValueRangeError, match="drift_time"):
-        Trust(drift_time=0.0)
     with pytest.raises(ValueRangeError, match="the spring has at most"):
-        design_adaptive_observer(linear, settings=AdaptiveSettings(duty=Duty(torque=100.0)))
+        design_corrected_observer(linear, duty=Duty(torque=100.0))
     with pytest.raises(ArrangementError, match="one angle"):
         design_observer(flatten(declare(load_deck("one_sided_cable_drive"))))
 
@@ -164,23 +157,17 @@ def test_the_figures_of_the_published_actuator() -> None:
     duty = Duty(torque=2.8)
     trial = observer_bench(model, duty=duty)
     published = design_observer_with_details(model, form=PaperForm()).model
-    # What is known to 1 % is worth its readings only where the equations are trusted as far.
-    trusted = Trust(counts=1.0, unmodelled=0.005)
-    for prior, trust in ((calibrated, trusted), (known, Trust())):
-        settings = AdaptiveSettings(prior=prior, duty=duty, trust=trust)
-        adaptive = design_adaptive_observer(model, settings=settings)
-        corrected = design_corrected_observer(model, settings=settings)
+    for prior in (calibrated, known):
+        corrected = design_corrected_observer(model, prior=prior, duty=duty)
         found = observer_errors(
-            {"adaptive": adaptive.model, "corrected": corrected.model, "published": published}, trial,
+            {"corrected": corrected.model, "published": published}, trial,
             prior=prior, draws=48, bounded=4, translate=natively,
         )  # fmt: skip
         print(found)
-        assert np.all(found.exact[:2] <= 3e-3)
+        assert np.all(found.exact[0] <= 3e-3)
         if prior is calibrated:
-            for kind, median, most in (("adaptive", 15e-3, 40e-3), ("corrected", 30e-3, 60e-3)):
-                assert np.all(found.quantile(kind, 0.5) <= median)
-                assert np.all(found.quantile(kind, 0.9) <= most)
-                assert np.all(4.0 * found.quantile(kind, 0.5) <= found.quantile("published", 0.5))
+            assert np.all(found.quantile("corrected", 0.5) <= 30e-3)
+            assert np.all(found.quantile("corrected", 0.9) <= 60e-3)
+            assert np.all(4.0 * found.quantile("corrected", 0.5) <= found.quantile("published", 0.5))
         else:
-            assert np.all(found.rms("adaptive") <= 1.3 * found.bound)
             assert np.all(found.rms("corrected") <= 1.1 * found.bound)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,6 @@ from nlsdesign.feedback.observer import (
     GridByTolerance,
     GridByTorqueError,
     ObserverDesign,
-    design_adaptive_observer,
     design_observer_with_details,
 )
 from nlsdesign.feedback.observer.scheduling.scheduled import check_stability, whole_contour
@@ -221,11 +218,3 @@ def test_a_fixed_grid_says_its_torque_error_too():
         for grid in (FixedGrid(ends.lower, ends.upper, 33), GridByTolerance(ends.lower, ends.upper))
     )
     assert coarse.largest > 3.0 * old.largest
-
-
-@pytest.mark.slow
-def test_the_adaptive_observer_keeps_its_torque_error(tmp_path: Path):
-    design = design_adaptive_observer(diagnosed(), grid=GridByTorqueError(-END, END, torque_error=2e-3))
-    assert design.compact.torque_error is not None
-    assert design.compact.torque_error.largest <= 2e-3
-    assert 4 * numbers(design.model) <= 8000

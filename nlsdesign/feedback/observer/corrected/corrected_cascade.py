@@ -1,6 +1,6 @@
 """The default observer as a discrete flat model: its names, its table and what went into it.
 
-The equations stand in :mod:`~nlsdesign.feedback.observer.adaptive.correction_equations`.
+The equations stand in :mod:`~nlsdesign.feedback.observer.corrected.correction_equations`.
 """
 
 from __future__ import annotations
@@ -10,23 +10,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ....foundation.errors import ArrangementError
 from ....foundation.quantity import typeset_unit
 from ....foundation.written_numbers import prefixed
 from ....model import FlatModel, Variable
 from ....model.roles import measured_motion, spring_torque
-from ....simulation.prior import declared_prior
+from ....simulation.prior import Prior, declared_prior
 from ..scheduling.angle_form import minimal_form
 from ..scheduling.scheduled import MEMORY, ObserverDesign, design_observer_with_details, whole_contour
 from ..scheduling.step import ObserverStep
 from ..scheduling.table import Compact, Grid
-from .adaptive_observer import INFLATION, SPREAD, encoder_quantum, safe_inputs
 from .balance import OFFSET, TERMS, Balance, balance_of
-from .correction_equations import CorrectionEquations, rest_torque
-from .duty_and_directions import AdaptiveSettings
-from .filter_equations import pairs
+from .correction_equations import CorrectionEquations, pairs, rest_torque
+from .duty import Duty
 
 PREFIX, FILTERED = "correction", ("angle", "drive", "rest", "relaxing")
 """Of all names that the cascade does not have, but for the torque at rest in the table."""
+SPREAD, INFLATION = "standard_deviation", "unrest"
+"""Endings of names: the deviation that is expected of the estimate, and the factor on the noise."""
 
 
 class _Variables:
@@ -165,7 +166,8 @@ class CorrectedDesign:
 def design_corrected_observer(
     model: FlatModel,
     *,
-    settings: AdaptiveSettings | None = None,
+    prior: Prior | None = None,
+    duty: Duty | None = None,
     grid: Grid | None = None,
     sample_time: float = 1e-3,
     estimate: str | None = None,
@@ -181,10 +183,12 @@ def design_corrected_observer(
     ----------
     model
         Continuous, load fixed.
-    settings
-        What is known, and what the actuator does; their trust is that of the adaptive observer alone.
+    prior
+        What is known of the numbers; the spreads of the deck by default.
+    duty
+        What the actuator does.
     grid, sample_time, estimate, measured
-        As for :func:`~nlsdesign.feedback.observer.design_adaptive_observer`.
+        As for :func:`~nlsdesign.feedback.observer.design_observer`.
 
     Raises
     ------
@@ -199,21 +203,15 @@ def design_corrected_observer(
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
-    return corrected(
-        model,
-        cascade,
-        settings=settings or AdaptiveSettings(),
-        grid=grid,
-        estimate=estimate,
-        measured=measured,
-    )
+    return corrected(model, cascade, prior=prior, duty=duty, grid=grid, estimate=estimate, measured=measured)
 
 
 def corrected(
     model: FlatModel,
     cascade: ObserverDesign,
     *,
-    settings: AdaptiveSettings,
+    prior: Prior | None,
+    duty: Duty | None,
     grid: Grid | None,
     estimate: str | None,
     measured: str | None,
@@ -225,11 +223,40 @@ def corrected(
     form, _ = minimal_form(
         model, estimate=estimate, angle=measured, angles=np.linspace(over.lower, over.upper, 65)
     )
-    prior = settings.prior or declared_prior(model)
-    balance = balance_of(form, prior, settings.duty)
+    prior = prior or declared_prior(model)
+    balance = balance_of(form, prior, duty or Duty())
     drive = cascade.model.inputs[1 + balance.place]
     safe = safe_inputs(model, prior).get(drive.name)
     limit = None if safe is None or drive.maximum is None else (safe, drive.maximum)
     equations = CorrectionEquations(cascade, balance, rounding=rounding, limit=limit)
     design = CorrectedDesign(_Variables(equations).flat(), cascade, balance)
     return replace(design, model=design.model.with_values(design.start(0.0)))
+
+
+def encoder_quantum(model: FlatModel, measured: str) -> float:
+    """Return the angle of one count of the encoder that shows a motion, in rad."""
+    for reading in model.readings:
+        if reading.measured == measured:
+            for sensor in reading.sensors:
+                if f"{sensor}.quantum" in model.values:
+                    return model.values[f"{sensor}.quantum"]
+    raise ArrangementError(
+        f"model '{model.name}'", f"declares no encoder of '{measured}', so its resolution is not known",
+        next_step=f'add a part with component = "Encoder" and of = "{measured}"',
+    )  # fmt: skip
+
+
+def safe_inputs(model: FlatModel, prior: Prior) -> dict[str, float]:
+    """Return the size of each limited input up to which the drive surely gives it: two deviations inside."""
+    safe = {}
+    for body in model.bodies:
+        motor = body.motor
+        if motor is not None and motor.command is not None and motor.current_limit is not None:
+            name = motor.current_limit
+            safe[motor.command] = model.values[name]
+            if name in prior.names:
+                k = prior.place(name)
+                safe[motor.command] = float(
+                    prior.kinds[k].number(model.values[name], -2.0 * prior.deviations[k])
+                )
+    return safe

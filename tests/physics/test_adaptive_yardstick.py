@@ -1,4 +1,4 @@
-"""The adaptive observer against what is derived or integrated without it."""
+"""The adaptive yardstick of ``benchmarks`` against what is derived or integrated without it."""
 
 from __future__ import annotations
 
@@ -7,25 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
+from benchmarks._adaptive_directions import UncertainDirections, uncertain_directions
+from benchmarks._adaptive_filter import AdaptiveFilter, Estimates, Side, matrices, truncated_update
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.export import export_c
-from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.analysis.rest import rest_states
-from nlsdesign.feedback.observer import (
-    AdaptiveDesign,
-    AdaptiveSettings,
-    design_adaptive_observer,
-)
-from nlsdesign.feedback.observer.adaptive.adaptive_step import _matrices, _Side
-from nlsdesign.feedback.observer.adaptive.duty_and_directions import (
-    Duty,
-    UncertainDirections,
-    uncertain_directions,
-)
-from nlsdesign.feedback.observer.adaptive.estimator_bound import SensedTorque, estimator_bound
-from nlsdesign.feedback.observer.adaptive.filter_equations import pairs, truncated_update
+from nlsdesign.feedback.observer import Duty
+from nlsdesign.feedback.observer.corrected.correction_equations import pairs
 from nlsdesign.feedback.observer.scheduling.angle_form import minimal_form
+from nlsdesign.feedback.observer.spread.estimator_bound import SensedTorque, estimator_bound
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.transform import named
@@ -51,8 +40,8 @@ def cam() -> FlatModel:
 
 
 @pytest.fixture(scope="module")
-def learning(linear: FlatModel) -> AdaptiveDesign:
-    return design_adaptive_observer(linear, settings=AdaptiveSettings(duty=Duty(torque=1.5)))
+def learning(linear: FlatModel) -> AdaptiveFilter:
+    return AdaptiveFilter(linear, duty=Duty(torque=1.5))
 
 
 def directions_of(model: FlatModel, duty: Duty) -> UncertainDirections:
@@ -127,13 +116,13 @@ def test_a_wide_prediction_is_corrected_as_by_kalman() -> None:
 def test_a_step_is_the_equations_over_one_sample(cam: FlatModel, side: str) -> None:
     """Integrated finely from a moving state; the step reads the angle at both ends."""
     quiet = cam.with_values({"dry_friction.sliding_effort": 0.0})
-    design = design_adaptive_observer(quiet)
-    step, plant = design.step, design.step.nominal.plant
+    design = AdaptiveFilter(quiet)
+    plant = design.plant
     if side == "raised":
         at = np.zeros(len(design.directions.effect))
         at[0] = 1.0
         quiet = quiet.with_values(design.directions.values(quiet.values, at))
-        step_plant, heavier = step.raised[0]
+        step_plant, heavier = design.sides[0][0]
     else:
         step_plant, heavier = plant, 1.0
     start = {ANGLE: 0.5, SPEED: 6.0, "spring.rubber.relaxing.dashpot.strain": 0.05}
@@ -141,18 +130,18 @@ def test_a_step_is_the_equations_over_one_sample(cam: FlatModel, side: str) -> N
     times = np.linspace(0.0, TIME, 11)
     run = simulate(quiet, times, inputs={CURRENT: np.full(11, current)}, start=start)
     ends = np.array([run[ANGLE][0], run[ANGLE][-1]])
-    m = _matrices(_Side(step_plant, heavier), TIME, ends, step.inner)
+    m = matrices(Side(step_plant, heavier), ends)
     before = np.array([start[v.name] for v in plant.states]) - m["shift"][0, :, 0]
     pushed = heavier * np.array(step_plant.driven(current)).ravel()
     light = np.ones(len(before))
-    light[step.inner :] = 1.0 / heavier
+    light[design.inner :] = 1.0 / heavier
     factors = np.ones(m["next"].shape[2])
     following = m["next"][0] * factors
-    following[step.inner :, : step.inner] /= heavier
-    following[step.inner :, len(before) :] /= heavier
+    following[design.inner :, : design.inner] /= heavier
+    following[design.inner :, len(before) :] /= heavier
     memory = following @ np.concatenate([before, [1.0], pushed])
     after = memory + m["prior"][1, :, 0] * light
-    after += (m["coupling"][1] * light[:, None]) @ after[: step.inner]
+    after += (m["coupling"][1] * light[:, None]) @ after[: design.inner]
     after += m["shift"][1, :, 0]
     expected = np.array([run[v.name][-1] for v in plant.states])
     moved = np.abs(expected - np.array([start[v.name] for v in plant.states]))
@@ -160,15 +149,64 @@ def test_a_step_is_the_equations_over_one_sample(cam: FlatModel, side: str) -> N
     assert np.all(np.abs(after - expected) <= 2e-3 * moved)
 
 
-def run(design: AdaptiveDesign, angle: np.ndarray, current: np.ndarray) -> dict[str, np.ndarray]:
-    trace = simulate(
-        design.model, TIME * np.arange(len(angle)), inputs={ANGLE: angle, CURRENT: current}, hold=True
+def expected_states(learning: AdaptiveFilter) -> ca.Function:
+    """(memory, slow states, columns of the table) -> the states that are expected at a sample."""
+    memory, slow = ca.SX.sym("memory", learning.n), ca.SX.sym("slow", learning.slow)
+    return ca.Function("expected", [memory, slow, learning.w], [learning.expected_states(memory, slow)])
+
+
+def table(learning: AdaptiveFilter) -> np.ndarray:
+    """Columns of the table in the middle of its range."""
+    return learning.columns[:, learning.columns.shape[1] // 2]
+
+
+@pytest.mark.parametrize("speed", [3.0, -3.0])
+def test_friction_moves_the_angle_by_what_it_takes_from_the_speed(
+    linear: FlatModel, learning: AdaptiveFilter, speed: float
+) -> None:
+    """ω̇ = −(τ/J)·sign ω for one sample: the angle falls behind ω₀·T by the integral of what is lost."""
+    rate = -np.sign(speed) * linear.values["dry_friction.sliding_effort"] / linear.values["motor.inertia"]
+    time = np.linspace(0.0, TIME, 1001)
+    assert abs(rate * TIME) < 0.2 * abs(speed), "the speed stays well away from zero"
+    memory = np.zeros(learning.n)
+    memory[learning.speed] = speed
+    states = expected_states(learning)
+    moving, standing = (
+        states(m, np.zeros(learning.slow), table(learning)).full().ravel() for m in (memory, 0.0 * memory)
     )
-    return {v.name: trace[v.name] for v in (*design.model.outputs, *design.model.states)}
+    moved = moving - standing - memory
+    assert moved[learning.speed] == pytest.approx(rate * TIME, rel=0.02)
+    assert moved[learning.angle] == pytest.approx(np.trapezoid(rate * time, time), rel=0.02)
 
 
-def slow(design: AdaptiveDesign, seen: dict[str, np.ndarray]) -> np.ndarray:
-    return np.array([seen[f"{TORQUE}.deviation[{d + 1}]"] for d in range(len(design.directions.effect))])
+def test_slopes_are_taken_at_the_deck_and_not_at_the_estimate(learning: AdaptiveFilter) -> None:
+    """By differences at the deck; an estimate that lies elsewhere changes the states but no slope."""
+    memory, slow = ca.SX.sym("memory", learning.n), ca.SX.sym("slow", learning.slow)
+    states = learning.expected_states(memory, slow)
+    slopes = ca.Function("slopes", [memory, slow, learning.w], [learning.slopes(states, memory, slow)])
+    at, away = np.zeros(learning.n), np.full(learning.slow, 1.5)
+    at[learning.speed] = 3.0
+    read, width = expected_states(learning), 1e-4
+
+    def differences(around: np.ndarray) -> np.ndarray:
+        """Central differences of the states by each slow state."""
+        sides = [
+            [read(at, around + sign * width * unit, table(learning)).full().ravel() for sign in (1.0, -1.0)]
+            for unit in np.eye(learning.slow)
+        ]
+        return np.array([(up - down) / (2.0 * width) for up, down in sides]).T
+
+    nominal = slopes(at, 0.0 * away, table(learning)).full()
+    np.testing.assert_allclose(nominal[:, learning.n :], differences(0.0 * away), rtol=1e-5, atol=1e-12)
+    np.testing.assert_array_equal(slopes(at, away, table(learning)).full(), nominal)
+    apart = np.abs(differences(away) - nominal[:, learning.n :])
+    assert np.max(apart) > 0.05 * np.max(np.abs(nominal[:, learning.n :])), (
+        "the slopes at the estimate differ"
+    )
+
+
+def run(design: AdaptiveFilter, angle: np.ndarray, current: np.ndarray) -> Estimates:
+    return design.run(angle, current[None, :])
 
 
 def swing(model: FlatModel, seconds: float, frequency: float, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -178,14 +216,14 @@ def swing(model: FlatModel, seconds: float, frequency: float, size: float) -> tu
     return seen["motor_encoder.reading"], current
 
 
-def test_the_covariance_stays_positive(linear: FlatModel, learning: AdaptiveDesign) -> None:
+def test_the_covariance_stays_positive(linear: FlatModel, learning: AdaptiveFilter) -> None:
     angle, current = swing(linear, 1.5, 3.0, 3.0)
     seen = run(learning, angle, current)
-    size = len(learning.step.nominal.plant.states) + len(learning.directions.effect)
+    size = learning.n + learning.slow
     for k in range(0, len(angle), 100):
         matrix = np.zeros((size, size))
-        for i, j in pairs(size):
-            matrix[i, j] = matrix[j, i] = seen[f"covariance[{i + 1},{j + 1}]"][k]
+        for place, (i, j) in enumerate(pairs(size)):
+            matrix[i, j] = matrix[j, i] = seen.covariance[place, k]
         assert np.min(np.linalg.eigvalsh(matrix)) > 0.0, k
 
 
@@ -193,40 +231,39 @@ def test_a_machine_with_another_spring_is_learned(linear: FlatModel) -> None:
     """A drive that is known exactly shows a spring that is ten per cent stiffer, two deviations."""
     known = declared_prior(linear)
     sure = known.only(["spring.stiffness"])
-    design = design_adaptive_observer(linear, settings=AdaptiveSettings(prior=sure, duty=Duty(torque=1.5)))
+    design = AdaptiveFilter(linear, prior=sure, duty=Duty(torque=1.5))
     angle, current = swing(linear.with_values({"spring.stiffness": 1.7 * 1.1}), 2.0, 2.0, 4.0)
     seen = run(design, angle, current)
     late = slice(1500, None)
-    wrong = seen[TORQUE][late] - 1.7 * 1.1 * angle[late]
+    wrong = seen.torque[late] - 1.7 * 1.1 * angle[late]
     assert np.sqrt(np.mean(wrong**2)) < 0.1 * np.sqrt(np.mean((0.17 * angle[late]) ** 2))
 
 
-def test_nothing_is_learned_at_standstill_nor_near_the_current_limit(learning: AdaptiveDesign) -> None:
+def test_nothing_is_learned_at_standstill_nor_near_the_current_limit(learning: AdaptiveFilter) -> None:
     rng = np.random.default_rng(0)
     still = run(learning, np.full(400, 0.4), 5.0 + rng.normal(size=400))
     # Coming to rest at an angle that nobody told takes a few samples of apparent motion.
-    assert np.max(np.abs(slow(learning, still)[:, 200:] - slow(learning, still)[:, 200:201])) < 0.02
+    assert np.max(np.abs(still.slow[:, 200:] - still.slow[:, 200:201])) < 0.02
     time = TIME * np.arange(400)
     limited = run(learning, 0.5 * np.sin(20.0 * time), np.full(400, 19.0))
-    assert np.max(np.abs(slow(learning, limited))) == 0.0
+    assert np.max(np.abs(limited.slow)) == 0.0
 
 
-def test_slow_states_stay_in_their_box(linear: FlatModel, learning: AdaptiveDesign) -> None:
+def test_slow_states_stay_in_their_box(linear: FlatModel, learning: AdaptiveFilter) -> None:
     angle, current = swing(linear, 1.5, 2.0, 4.0)
     seen = run(learning, 3.0 * angle, -current)
     limit = learning.trust.limit
-    assert np.max(np.abs(slow(learning, seen))) <= limit
-    assert np.max(np.abs(slow(learning, seen))) > 0.9 * limit
+    assert np.max(np.abs(seen.slow)) <= limit
+    assert np.max(np.abs(seen.slow)) > 0.9 * limit
 
 
-def test_noise_that_nobody_declared_is_said(linear: FlatModel, learning: AdaptiveDesign) -> None:
+def test_noise_that_nobody_declared_is_said(linear: FlatModel, learning: AdaptiveFilter) -> None:
     angle, current = swing(linear, 2.0, 2.0, 3.0)
     noisy = angle + 12e-3 * np.random.default_rng(2).standard_normal(len(angle))
     quiet, loud = run(learning, angle, current), run(learning, noisy, current)
-    name = f"{TORQUE}.unrest"
-    assert np.max(quiet[name][500:]) < 2.0
+    assert np.max(quiet.inflation[500:]) < 2.0
     # Standard deviation 12 mrad against four times 0.767/√12.
-    assert loud[name][-1] > 10.0
+    assert loud.inflation[-1] > 10.0
 
 
 def test_the_bound_is_that_of_batch_least_squares(linear: FlatModel) -> None:
@@ -256,16 +293,3 @@ def test_the_bound_is_that_of_batch_least_squares(linear: FlatModel) -> None:
         assert found.deviation[k] == pytest.approx(expected, rel=2e-3)
         assert found.before[k] == pytest.approx(float(np.linalg.norm(wanted)), rel=2e-3)
     assert np.all(found.deviation <= found.before * (1.0 + 1e-9))
-
-
-def test_c_gives_the_same_numbers(linear: FlatModel, learning: AdaptiveDesign, tmp_path) -> None:
-    angle, current = swing(linear, 0.6, 3.0, 3.0)
-    given = {ANGLE: angle, CURRENT: current}
-    inputs = np.column_stack([given[v.name] for v in learning.model.inputs]).tolist()
-    step, reference = CompiledStep(export_c(learning.model, tmp_path)), GuardedModel(learning.model)
-    found, expected = (np.array([side(u)[0] for u in inputs]) for side in (step, reference.step))
-    size = np.max(np.abs(expected), axis=0)
-    # Slow states are in standard deviations: one is their size, also where little was learned.
-    size[-len(learning.directions.effect) :] = 1.0
-    rounding = np.finfo(float).eps * np.max(np.abs(angle))
-    assert np.all(np.max(np.abs(found - expected), axis=0) <= 1e-12 * size + rounding)

@@ -2,7 +2,7 @@
 
 The cascade runs as it is, at the numbers of the deck: no slow state acts on its inner states, so they decay
 whatever is learned. Beside it all terms of the balance
-(:mod:`~nlsdesign.feedback.observer.adaptive.balance`) pass one low-pass, with the second difference of the
+(:mod:`~nlsdesign.feedback.observer.corrected.balance`) pass one low-pass, with the second difference of the
 angle on the other side,
 
     e = F[J·Δ²θ/T² − Σ φⱼ] = Σ cⱼ·F[φⱼ] + c₀.
@@ -45,7 +45,6 @@ from ....model import Table, Variable
 from ....model.flat import stated_equations
 from ..scheduling.scheduled import ObserverDesign
 from .balance import DRIVE, DRY, OFFSET, RELAXING, REST, VISCOUS, Balance
-from .filter_equations import pairs
 
 BANDWIDTH, OF_SAMPLING = 40.0, 0.04
 """Cut-off of each low-pass in Hz, and its largest share of the sample rate."""
@@ -277,6 +276,11 @@ def bend_gain(passed: float, time: float) -> float:
         response.append(into)
     bend = np.diff(response, 2, prepend=0.0, append=0.0) / time**2
     return float(np.linalg.norm(bend))
+
+
+def pairs(size: int) -> list[tuple[int, int]]:
+    """Return the places of the upper triangle of a matrix, row by row."""
+    return [(i, j) for i in range(size) for j in range(i, size)]
 
 
 def square(packed: Expression, vector: Expression) -> Expression:

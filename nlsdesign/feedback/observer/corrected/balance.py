@@ -23,7 +23,7 @@ from ....foundation.errors import ArrangementError
 from ....simulation.prior import Prior
 from ...analysis.rest import evaluate_rows
 from ..scheduling.angle_form import AngleForm
-from .duty_and_directions import (
+from .duty import (
     STEP,
     Duty,
     OperatingPoints,
@@ -169,5 +169,5 @@ def check_spring_alone(form: AngleForm, inertia: float) -> None:
     if np.max(np.abs(other)) > ELSEWHERE * np.max(np.abs(wanted)):
         raise ArrangementError(
             f"model '{form.model.name}'", "is moved by something else than its spring, such as its weight",
-            next_step="the adaptive observer learns there: take --kind adaptive",
+            next_step="take the cascade, which needs no balance: --kind cascade",
         )  # fmt: skip
