@@ -89,8 +89,8 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     "by default.",
 )
 @click.option("--speed", type=Number("rad/s"), help="Largest speed; 20 rad/s by default.")
-@click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a count of "
-              "the deck's encoder by default.")  # fmt: skip
+@click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a count "
+              "of the deck's encoder by default.")  # fmt: skip
 def observer(
     context: click.Context, /, deck_name: str | None, out: Path, as_json: bool, **options: Any
 ) -> None:

@@ -535,10 +535,7 @@ def test_files_are_written_whole_or_not_at_all(tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["figure_consistent", "as_printed", "stiff_spring"])
 def test_the_default_observer_in_float_passes_its_own_self_test(name, tmp_path):
-    """Its covariance once began at the square of the range, which cost single precision its digits.
-
-    Quick, of the soft spring and joined with its controller: the test below.
-    """
+    """Quick, of the soft spring and joined with its controller: the test below."""
     plant = flatten(declare(load_deck(f"austin2015_{name}")))
     source = export_c(design_corrected_observer(plant).model, tmp_path, real="float")
     program = compile_program([source.source, source.selftest], tmp_path / "selftest")
@@ -554,7 +551,7 @@ def test_the_self_test_allows_what_the_rounding_of_the_states_makes_and_no_more_
     assert subprocess.run([program], check=False).returncode == 0
     # A slow state that is wrong by a hundredth of its size is found.
     names = [v.name for v in loop.outputs]
-    place = names.index("spring.torque.deviation[2]")
+    place = names.index("correction.factor[2]")
     text, changes = re.subn(rf"(const \w+ y{place} = )(.*);", r"\1 1.01f * (\2);", source.source.read_text())
     assert changes == 1
     source.source.write_text(text)
