@@ -309,25 +309,6 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
         sys.exit(1)
 
 
-def _plant(deck_name: str) -> tuple[tuple[str, str], FlatModel]:
-    """Return name and text of a deck, and its flat model."""
-    from ..components import declare
-    from ..foundation.deck import load_deck
-    from ..model import flatten
-
-    deck = load_deck(deck_name)
-    return (deck.name, deck.path.read_text(encoding="utf-8-sig")), flatten(declare(deck))
-
-
-def _roles(plant: FlatModel, options: dict[str, Any]) -> dict[str, str]:
-    from ..model import measured_motion, series_spring
-
-    return {
-        "estimate": series_spring(plant, options["spring"]).effort,
-        "measured": measured_motion(plant, options["measured"]),
-    }
-
-
 @observer.command(
     "certify-continuous",
     epilog=examples(
@@ -356,14 +337,19 @@ def certify_continuous_gain(
     **options: Any,
 ) -> None:
     """Prove one gain in continuous time. The proof says that every error vanishes."""
+    from ..components import declare
     from ..feedback.observer import Minimal, PaperForm, certify_continuous, write_certificate
+    from ..foundation.deck import load_deck
+    from ..model import flatten, measured_motion, series_spring
 
-    text, plant = _plant(deck_name)
+    deck = load_deck(deck_name)
+    plant = flatten(declare(deck))
     proved = certify_continuous(
-        plant, **_roles(plant, options), form=PaperForm() if published else Minimal(),
+        plant, estimate=series_spring(plant, options["spring"]).effort,
+        measured=measured_motion(plant, options["measured"]), form=PaperForm() if published else Minimal(),
         decay=options["decay"], condition=options["condition"], angles=angles,
     )  # fmt: skip
-    proved = replace(proved, deck=text)
+    proved = replace(proved, deck=(deck.name, deck.path.read_text(encoding="utf-8-sig")))
     path = write_certificate(proved, out / CERTIFICATE)
     gains = dict(zip(proved.proof.system.states, proved.proof.gain, strict=True))
     rows = [f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}" for name, row in gains.items()]
