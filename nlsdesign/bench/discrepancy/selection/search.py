@@ -374,7 +374,7 @@ class _Search:
         return self._pair(tried, present, open_blocks[0])
 
     def _beside_richer(self, start: Hypothesis, steps: list[Step]) -> tuple[list[Step], list[Step]]:
-        """Return the steps with a richer form of one, and what may be named beside it but not beside the simpler.
+        """Return the steps with a richer form of one, and what may be named beside that alone.
 
         Alone the simpler form is named where it leaves little more, because something else is missing too.
         What it leaves may hide that. If nothing comes of it the steps stay as they are.
