@@ -297,7 +297,7 @@ def test_a_richer_form_takes_its_place_once_the_other_effects_are_named() -> Non
 
 
 def test_what_shows_beside_a_richer_form_alone_is_found_there() -> None:
-    """Friction with a bend, and a delay: either form leaves much, and the delay shows beside the bend only."""
+    """Friction with a bend, and a delay: either form leaves much; the delay shows beside the bend only."""
     left = {
         (): (1e5,), ("plain",): (1.4e4,), ("rich",): (8e3,), ("late",): (9.5e4,),
         ("plain", "late"): (1.1e4,), ("rich", "late"): (10.0,),
