@@ -115,10 +115,17 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     ]
     show_table("Numbers", ("name", "declared", "fitted", "unit", "moved, in spreads"), numbers)
     errors = [
-        (e.block, e.role.replace("_", " "), *(f"{v:.3g}" for v in e[2:5]), typeset_unit(e.unit))
+        (
+            e.block,
+            e.role.replace("_", " "),
+            *(f"{v:.3g}" for v in e[2:5]),
+            typeset_unit(e.unit),
+            "" if e.relative is None else f"{e.relative:.3g}",
+        )
         for e in result.errors()
     ]
-    show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
+    heads = ("block", "records", "declared", "fitted", "noise floor", "unit", "relative, %")
+    show_table("Errors, rms, and average relative error of the fitted", heads, errors)
     show_lines(result.words())
     show_lines(machine.findings() if machine else ())
     click.echo(f"report: {page}")

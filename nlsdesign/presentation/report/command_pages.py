@@ -65,7 +65,8 @@ def write_fit_report(path: Path, result: Refit, *, facts: Mapping[str, str], fil
         KeyNumber(
             f"{e.block}, {ROLES.get(e.role, e.role)}",
             f"{three_digits(e.fitted)} {typeset_unit(e.unit)}",
-            f"rms, declared → fitted; noise {three_digits(e.noise_floor)}",
+            f"rms, declared → fitted; noise {three_digits(e.noise_floor)}"
+            + ("" if e.relative is None else f"; on average {three_digits(e.relative)} % off"),
             before=three_digits(e.declared),
         )
         for e in errors

@@ -80,6 +80,10 @@ def test_the_numbers_of_the_rig_come_back_with_an_honest_error(run: Run, bench: 
     assert {e["block"] for e in held} == {"spring", "motor"}
     for each in held:
         assert each["fitted"] < 1.2 * each["noise_floor"] < each["declared"]
+    # The noise of the force is far below what it measures.
+    force = next(e for e in held if e["block"] == "spring")
+    assert 0.0 < force["relative"] < 3.0
+    assert f"on average {force['relative']:.3g}" in page
     # The multisine is held out, and 25 degrees do not engage the last segment of the rubber.
     assert any("next to nothing of spring.cable.rubber.stiff.modulus[6]" in w for w in found["words"])
     assert {r["record"] for r in found["records"] if r["role"] == "held_out"} == {"multisine"}

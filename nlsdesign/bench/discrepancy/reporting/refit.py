@@ -125,6 +125,9 @@ class BlockError(NamedTuple):
     fitted: float
     noise_floor: float
     unit: str
+    # relative: average percent relative error with the fitted numbers, over the samples beyond a tenth of the
+    # largest; None for predictions over windows
+    relative: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +212,9 @@ def _mean(gaps: Sequence[RecordGap]) -> BlockError:
     def rms(which: str) -> float:
         return math.sqrt(math.fsum(getattr(g, which) ** 2 * g.rows for g in gaps) / total)
 
-    first = gaps[0]
-    return BlockError(first.block, first.role, rms("before"), rms("after"), rms("noise_floor"), first.unit)
+    first, relative = gaps[0], sum(g.relative * g.rows for g in gaps) / total
+    sizes = (rms("before"), rms("after"), rms("noise_floor"))
+    return BlockError(first.block, first.role, *sizes, first.unit, None if math.isnan(relative) else relative)
 
 
 def _silent(text: str) -> None:

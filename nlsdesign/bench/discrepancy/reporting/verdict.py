@@ -16,7 +16,7 @@ from ....model import flatten
 from ...identification.equation_error.block_noise import rate_span
 from ...identification.filters import derivative
 from ...identification.least_squares import Fit
-from ...identification.residuals import Binned, shapes
+from ...identification.residuals import Binned, agreement, shapes
 from ..effects.plain_names import capitalised, simpler_forms, title
 from ..planning.experiment import Experiment
 from ..screening.scale_and_sign import Acting
@@ -110,6 +110,7 @@ class RecordGap:
     unit: str
     signal: float = math.nan
     beside: str = ""
+    relative: float = math.nan  # average percent relative error after, beside what the block is judged by
 
 
 @dataclass(frozen=True, eq=False)
@@ -485,9 +486,12 @@ def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tu
             float(np.sqrt(np.mean(np.square(r)))) for r in (then.error, now.error, then.floor.sigma)
         )
         name, record, unit = then.block.name, then.record, then.block.model.outputs[0].unit
-        size = float(np.std(acting.filtered(then)))
+        acts = acting.filtered(then)
+        size, relative = float(np.std(acts)), agreement(acts, acts - now.error).relative
         rows, beside = len(then.residual), acting.name(then.block)
-        gap = RecordGap(name, record.name, record.role, first, last, floor, rows, unit, size, beside)
+        gap = RecordGap(
+            name, record.name, record.role, first, last, floor, rows, unit, size, beside, relative
+        )
         gaps.append(gap)
     blocks, given = list(dict.fromkeys(g.block for g in gaps)), comparison.bench.given_order
     return tuple(sorted(gaps, key=lambda gap: (blocks.index(gap.block), given[gap.record])))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -153,6 +153,16 @@ class Revision:
                     if other and is_better(other, steps):
                         steps = other
         return steps
+
+    def with_richer(self, steps: Sequence[Step]) -> Iterator[list[Step]]:
+        """Yield the steps anew, in each case with a richer form of one effect."""
+        for place, step in enumerate(steps):
+            before = steps[place - 1].chosen if place else self.start
+            for candidate in self.trials.candidates(before):
+                if _is_richer(candidate, step.chosen.newest):
+                    self.trials.progress(f"trying {candidate.effect} in place of {step.effect}")
+                    if other := self.rebuilt(steps, {place: candidate}):
+                        yield other
 
     def _is_superfluous(self, without: list[Step], with_it: list[Step]) -> bool:
         after = (self.trials.excesses_of(each[-1].chosen) for each in (without, with_it))
@@ -329,24 +339,9 @@ class _Search:
         """Return the effects that may be named, one after the other."""
         present, steps = start, list[Step]()
         while len(steps) < self._most_effects(present):
-            open_blocks = self._lacking(start, present)
-            if not open_blocks:
-                break
-            tried: list[Hypothesis] = []
-            step = None
-            for block in open_blocks:
-                # Effects elsewhere wait for their turn: most blocks have an effect of their own.
-                far = self._is_far_from_closed(start, present, block)
-                tried += self.trials.tried_on(present, block, tried, far=far)
-                # What acts on several blocks was fitted when the first of them was looked at.
-                step = self.trials.step(present, tried, block)
-                if step is not None:
-                    break
-            self.tried = self.tried or account(self.trials, present, tried)
-            further = self._plainer(step, tried, present, block) if step else []
-            room = self._most_effects(present) - len(steps)
-            if room > 1 and not further and self._is_far_from_closed(start, present, open_blocks[0]):
-                further = self._pair(tried, present, open_blocks[0])
+            further = self._further(start, present, len(steps))
+            if not further:
+                steps, further = self._beside_richer(start, steps)
             if not further:
                 break
             # A richer form of what is named comes before one more name.
@@ -356,6 +351,52 @@ class _Search:
             if self.stopped:
                 break
         return steps
+
+    def _further(self, start: Hypothesis, present: Hypothesis, named: int) -> list[Step]:
+        """Return what may be named beside what is: one effect, two that only help together, or nothing."""
+        open_blocks = self._lacking(start, present)
+        tried: list[Hypothesis] = []
+        for block in open_blocks:
+            # Effects elsewhere wait for their turn: most blocks have an effect of their own.
+            far = self._is_far_from_closed(start, present, block)
+            tried += self.trials.tried_on(present, block, tried, far=far)
+            # What acts on several blocks was fitted when the first of them was looked at.
+            if step := self.trials.step(present, tried, block):
+                self.tried = self.tried or account(self.trials, present, tried)
+                return self._plainer(step, tried, present, block)
+        if not open_blocks:
+            return []
+        self.tried = self.tried or account(self.trials, present, tried)
+        if self._most_effects(present) - named < 2 or not self._is_far_from_closed(
+            start, present, open_blocks[0]
+        ):
+            return []
+        return self._pair(tried, present, open_blocks[0])
+
+    def _beside_richer(self, start: Hypothesis, steps: list[Step]) -> tuple[list[Step], list[Step]]:
+        """Return the steps with a richer form of one, and what may be named beside that alone.
+
+        Alone the simpler form is named where it leaves little more, because something else is missing too.
+        What it leaves may hide that. If nothing comes of it the steps stay as they are.
+        """
+        if not steps or not (open_blocks := self._lacking(start, steps[-1].chosen)):
+            return steps, []
+        if not self._is_far_from_closed(start, steps[-1].chosen, open_blocks[0]):
+            return steps, []
+        excesses_of, revision = self.trials.excesses_of, Revision(self.trials, start)
+        richer = [
+            other
+            for other in revision.with_richer(steps)
+            if not any(objections_of_all(self.trials.criteria, other[-1].chosen))
+            and Change(
+                self.trials.criteria, *(excesses_of(each[-1].chosen) for each in (steps, other))
+            ).is_more_than_noise
+        ]
+        if not richer:
+            return steps, []
+        best = min(richer, key=lambda other: total_excess(excesses_of(other[-1].chosen)))
+        further = self._further(start, best[-1].chosen, len(best))
+        return (best, further) if further else (steps, [])
 
     def _is_far_from_closed(self, start: Hypothesis, present: Hypothesis, block: str) -> bool:
         """Tell whether what is left is worth a long search.

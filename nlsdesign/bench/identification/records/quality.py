@@ -68,7 +68,9 @@ _RETURN = 3
 _JUMP, _JUMP_OVER_ALL = 10.0, 3.0
 """A position jumps where it changes by more than these times the largest change nearby, and anywhere else."""
 _CONFIRMS = 4.0
-_NEARBY, _BETTER = (-8, -4, 4, 8), 0.95
+_ORDERS = (2, 3)
+"""Orders of the polynomials by which another channel is asked."""
+_NEARBY, _BETTER = (4, 8), 0.95
 """Samples off a group at which a turn of its own is looked for; it leaves less than this share."""
 _REACH = 12
 """Samples on either side over which another channel is asked whether something happened."""
@@ -199,27 +201,32 @@ class Witness:
         """Tell whether it changes its course where a group is.
 
         Then its samples around the group are better described by two parabolas, one before and one behind,
-        than by one polynomial of as many coefficients over both.
+        than by one polynomial of as many coefficients over both; or by two cubics, where it is pushed for
+        several samples and slows down behind them, as under a controller that is told to step.
         """
         left = np.arange(max(first - reach, 0), first)
         right = np.arange(behind, min(behind + reach, len(self.values)))
         if min(len(left), len(right)) < _LEAST_SIDE:
             return False
-        whole = np.concatenate([left, right])
-        joint = _sum_of_squares(self.values, whole, 5)
-        apart = _sum_of_squares(self.values, left, 2) + _sum_of_squares(self.values, right, 2)
-        least = max(apart, len(whole) * self.least**2)
-        return joint > _CONFIRMS * least and not self._turns_nearby(left[0], first, right[-1] + 1, least)
+        return any(self._turns_as(order, left, right) for order in _ORDERS)
 
-    def _turns_nearby(self, begin: int, place: int, end: int, apart: float) -> bool:
-        """Tell whether a turn a few samples off a place describes the samples better than one there."""
-        for split in (place + shift for shift in _NEARBY):
-            sides = np.arange(begin, split), np.arange(split, end)
-            if min(map(len, sides)) < 3:
-                continue
-            if sum(_sum_of_squares(self.values, side, 2) for side in sides) < _BETTER * apart:
-                return True
-        return False
+    def _turns_as(self, order: int, left: Indices, right: Indices) -> bool:
+        """Tell whether two polynomials of an order are better than one, and none that turns nearby is."""
+        whole = np.concatenate([left, right])
+        joint = _sum_of_squares(self.values, whole, 2 * order + 1)
+        apart = _sum_of_squares(self.values, left, order) + _sum_of_squares(self.values, right, order)
+        least = max(apart, len(whole) * self.least**2)
+        if joint <= _CONFIRMS * least:
+            return False
+        first, behind = int(left[-1]) + 1, int(right[0])
+        places = (*(first - shift for shift in _NEARBY), *(behind + shift for shift in _NEARBY))
+        sides = [(np.arange(left[0], split), np.arange(split, right[-1] + 1)) for split in places]
+        sums = [
+            sum(_sum_of_squares(self.values, side, order) for side in pair)
+            for pair in sides
+            if min(map(len, pair)) > order
+        ]
+        return min(sums, default=np.inf) >= _BETTER * least
 
 
 @dataclass(frozen=True, eq=False)

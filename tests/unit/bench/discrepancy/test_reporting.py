@@ -214,6 +214,9 @@ def test_the_error_of_the_course_is_that_of_its_record_in_the_table(block: str) 
         error = course.measured - getattr(course, when)
         assert float(np.sqrt(np.mean(error**2))) == pytest.approx(getattr(gap, when))
     assert course.noise == pytest.approx(gap.noise_floor)
+    large = np.abs(course.measured) > 0.1 * np.max(np.abs(course.measured))
+    shares = np.abs((course.measured - course.after)[large] / course.measured[large])
+    assert gap.relative == pytest.approx(100.0 * float(np.mean(shares)), nan_ok=not large.any())
 
 
 def driven_wheel(*, with_current: bool) -> tuple[Comparison, Assembly]:

@@ -296,6 +296,26 @@ def test_a_richer_form_takes_its_place_once_the_other_effects_are_named() -> Non
     assert names(outcome(Table(left), *effects)) == ["b", "plain"], "not half of what is left"
 
 
+def test_what_shows_beside_a_richer_form_alone_is_found_there() -> None:
+    """Friction with a bend, and a delay: either form leaves much; the delay shows beside the bend only."""
+    left = {
+        (): (1e5,), ("plain",): (1.4e4,), ("rich",): (8e3,), ("late",): (9.5e4,),
+        ("plain", "late"): (1.1e4,), ("rich", "late"): (10.0,),
+    }  # fmt: skip
+    effects = effect("plain"), effect("rich", 3, simpler=("plain",)), effect("late")
+    found = outcome(Table(left), *effects)
+    assert names(found) == ["rich", "late"]
+    assert found.complete
+    left["rich", "late"] = (7e3,)
+    table = Table(left)
+    assert names(outcome(table, *effects)) == ["plain"], "nothing comes of the richer form"
+    assert ("rich", "late") in table.asked
+    left["rich", "late"], left["rich",] = (10.0,), (1.4e4 - 10.0,)
+    table = Table(left)
+    assert names(outcome(table, *effects)) == ["plain"], "the richer form gains no more than noise"
+    assert ("rich", "late") not in table.asked
+
+
 def forms(name: str, **numbers: int) -> EffectFunction:
     """One effect in several forms, by the name that the table knows each by, with so many numbers."""
 
