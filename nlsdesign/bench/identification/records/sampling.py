@@ -116,7 +116,7 @@ FORMS = (SAMPLED, HELD, HELD_BEFORE, AVERAGED)
 def shifted(samples: float) -> Sampling:
     """Return a signal that acts a part of a sample behind its stamps, read by a polynomial of sixth degree.
 
-    ``samples``: at most one, of either sign.
+    ``samples``: about one at most, of either sign.
     """
     places = range(-_REACH, _REACH + 1)
     # The weights of Lagrange: of the values at whole places in that of their polynomial in between.

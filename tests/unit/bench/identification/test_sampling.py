@@ -118,7 +118,7 @@ noise = {value = 0.005, unit = "A", source = "declared"}
 """
 
 
-def joint(seed: int, *, rate: float = 500.0, missing: float = 0.0) -> Array:
+def joint(seed: int, *, rate: float = 500.0, missing: float = 0.0, late: int = 0) -> Array:
     """Return time, angle and held current of a joint; ``missing`` is Coulomb friction beyond the declared."""
 
     def step(state: Array, current: float, h: float) -> Array:
@@ -128,7 +128,7 @@ def joint(seed: int, *, rate: float = 500.0, missing: float = 0.0) -> Array:
         speed = max(speed - stuck, 0.0) if speed > 0.0 else min(speed + stuck, 0.0)
         return np.array([angle + 0.5 * h * (before + speed), speed, 0.0, 0.0])
 
-    table = held(seed, step, rate=rate, gains=(0.31 * 900.0 / 5.0, 0.31 * 48.0 / 5.0), size=0.9)
+    table = held(seed, step, rate=rate, gains=(0.31 * 900.0 / 5.0, 0.31 * 48.0 / 5.0), size=0.9, late=late)
     return np.column_stack([table[:, 0], 2e-5 * np.round(table[:, 1] / 2e-5), table[:, 3]])
 
 
@@ -158,11 +158,16 @@ def held(
     rate: float,
     gains: tuple[float, float],
     size: float,
+    late: int = 0,
 ) -> Array:
-    """Run a controller that holds its current; return time, both angles and the current at its instants."""
+    """Run a controller that holds its current; return time, both angles and the current at its instants.
+
+    ``late``: steps of the simulation after which a new current acts.
+    """
     draw = np.random.default_rng(seed)
     frequencies, phases = draw.uniform(0.3, 3.0, 4), draw.uniform(0.0, math.tau, 4)
     period, state, before, rows = 1.0 / rate, np.zeros(4), 0.0, []
+    last = 0.0
     for k in range(round(6.0 * rate)):
         ramp = min(1.0, k * period)
         waves = np.sin(math.tau * frequencies * k * period + phases) / frequencies
@@ -171,8 +176,9 @@ def held(
         current = gains[0] * error + gains[1] * (error - before) / period
         before = error
         rows.append((k * period, state[0], state[2], current))
-        for _ in range(_FINE):
-            state = step(state, current, period / _FINE)
+        for fine in range(_FINE):
+            state = step(state, last if fine < late else current, period / _FINE)
+        last = current
     table = np.array(rows)
     table[:, 3] += (0.02 if size < 1.0 else 0.005) * draw.standard_normal(len(table))
     return table
@@ -234,6 +240,13 @@ def test_a_held_current_is_told_beside_friction_that_nobody_declared(tmp_path: P
     assert told["ammeter"] is not None
     assert told["ammeter"].late == pytest.approx(0.5, abs=0.1)
     assert told["encoder"] is SAMPLED
+
+
+def test_a_held_current_that_acts_half_a_sample_late_is_read_so(tmp_path: Path) -> None:
+    """A delay of 1.05 samples is at the least one that an effect could have: nobody would name it."""
+    told = forms(*bench(tmp_path, _JOINT, [joint(seed, late=11) for seed in range(4)]))
+    assert told["ammeter"] is not None
+    assert told["ammeter"].late == pytest.approx(1.05, abs=0.03)
 
 
 @pytest.mark.parametrize("form", FORMS)
