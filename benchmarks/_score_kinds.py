@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from benchmarks._score_cases import CATALOGUE, HALF, KIND_TIERS, NOISES, PAIRS, STRONG, Case, known_effects
 from benchmarks._score_table import Result, describes, diagnosis, exact, share
 from tests.rig import ACTUATORS, OUTSIDE_ANY_CATALOGUE, specimens
-from tests.rig.kind_cases import ALL_KINDS, names_of
+from tests.rig.kind_cases import ALL_KINDS, CASCADED, names_of
 from tests.rig.kinds import KINDS
 
 _AT_LOAD = ("load", "load_encoder", "load_bearing", "arm")
@@ -18,7 +19,7 @@ _FINE = ("torque_ripple", "angle_sensor_delay", "angle_sensor_bias")
 _READ = ("plain", "coarse", "coloured")
 
 
-def kind_cases(seeds: Iterable[int], kinds: Sequence[str]) -> list[Case]:
+def kind_cases(seeds: Iterable[int], kinds: Sequence[str], *, cascaded: bool = False) -> list[Case]:
     """Return the cases of some seeds: of each kind one clean, three singles, a pair, one not listed.
 
     What is hidden goes round from seed to seed, as do coarse counts, coloured noise and, for clean machines,
@@ -30,8 +31,11 @@ def kind_cases(seeds: Iterable[int], kinds: Sequence[str]) -> list[Case]:
         One set of cases each.
     kinds
         Some of :data:`tests.rig.kind_cases.ALL_KINDS`.
+    cascaded
+        Whether all are machines under a robot's cascade that goes from point to point, with a plain log.
     """
-    return [case for seed in seeds for kind in kinds for case in _of_kind(kind, seed)]
+    cases = [case for seed in seeds for kind in kinds for case in _of_kind(kind, seed)]
+    return [replace(c, noise=CASCADED) for c in cases if c.machine in KINDS] if cascaded else cases
 
 
 def all_kinds() -> list[str]:

@@ -101,6 +101,7 @@ def _arguments() -> argparse.Namespace:
         "--seeds", type=seeds_of, default=[], help="200-210 with 210, 0:20 without 20, or 200,205"
     )
     parser.add_argument("--kinds", help="kinds of machines in place of the cam rig, with commas; or: all")
+    parser.add_argument("--cascaded", action="store_true", help="kinds of machines under a robot's cascade")
     parser.add_argument("--tier", action="append", choices=(*TIERS, *KIND_TIERS), help="may be repeated; all")
     parser.add_argument("--effect", action="append", help="only what hides this; may be repeated")
     parser.add_argument("--machine", action="append", help="only this machine; may be repeated")
@@ -140,7 +141,11 @@ def seeds_of(text: str) -> list[int]:
 def _wanted(given: argparse.Namespace) -> list[Case]:
     if given.kinds:
         kinds = all_kinds() if given.kinds == "all" else given.kinds.split(",")
-        pool = [c for c in kind_cases(given.seeds, kinds) if c.tier in (given.tier or KIND_TIERS)]
+        pool = [
+            c
+            for c in kind_cases(given.seeds, kinds, cascaded=given.cascaded)
+            if c.tier in (given.tier or KIND_TIERS)
+        ]
     else:
         pool = cases(given.seeds, given.tier or TIERS)
     if given.effect:

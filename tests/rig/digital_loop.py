@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan
+from math import atan, exp
 from typing import Protocol
 
 import numpy as np
@@ -39,6 +39,42 @@ class Controller:
     limit: float  # A
     counts: float  # rad or m, of the encoder that it reads
     feed: float = 0.0  # A·s²/rad, times the wanted acceleration
+    lag: float = 0.0  # s, of the current behind the command
+
+    def begun(self) -> Callable[[float, float, float, float], float]:
+        """Return what gives the current at each tick for goal, its speed and acceleration, and the place."""
+        period, integral, filtered, before = 1.0 / self.rate, 0.0, 0.0, None
+        smooth = 1.0 - np.exp(-2.0 * np.pi * 60.0 * period)
+
+        def current(goal: float, pace: float, bend: float, place: float) -> float:
+            nonlocal integral, filtered, before
+            read = self.counts * round(place / self.counts)
+            filtered += smooth * (0.0 if before is None else (read - before) / period - filtered)
+            before = read
+            wanted = self.proportional * (goal - read) + self.derivative * (pace - filtered)
+            wanted += integral + self.feed * bend
+            if -self.limit <= wanted <= self.limit:
+                integral += period * self.integral * (goal - read)
+            else:
+                wanted = self.limit if wanted > 0.0 else -self.limit
+            return wanted
+
+        return current
+
+
+class Loop(Protocol):
+    """A controller that samples: that of this module, or a cascade."""
+
+    @property
+    def rate(self) -> float:
+        """Ticks per second."""
+
+    @property
+    def lag(self) -> float:
+        """Time constant of the current behind the command, s."""
+
+    def begun(self) -> Callable[[float, float, float, float], float]:
+        """Return what gives the current at each tick."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +125,7 @@ def eccentric(place: float, missing: Missing) -> float:
 
 
 def run(
-    world: World, controller: Controller, wanted: Wanted, effort_per_ampere: float, missing: Missing,
+    world: World, controller: Loop, wanted: Wanted, effort_per_ampere: float, missing: Missing,
     *, step: float = STEP, disc_on_motor: bool = True,
 ) -> Ticks:  # fmt: skip
     """Run one record from rest.
@@ -110,29 +146,24 @@ def run(
     steps = round(1.0 / (controller.rate * step))
     late, act = round(missing.drive_delay / step), acting(missing)
     push = pushes(missing, np.arange(len(wanted.time) * steps) * step)
-    acted: list[float] = [0.0] * (late // steps + 2)
+    commands: list[float] = [0.0] * (late // steps + 2)
     rows: list[tuple[float, float, float]] = []
-    period, integral, filtered, before = steps * step, 0.0, 0.0, None
-    smooth = 1.0 - np.exp(-2.0 * np.pi * 60.0 * period)
     whole, part = divmod(late, steps)
+    following, flowing = controller.begun(), 0.0
+    share = 1.0 - exp(-step / controller.lag) if controller.lag else 0.0
     for tick, (goal, pace, bend) in enumerate(
         zip(wanted.place.tolist(), wanted.speed.tolist(), wanted.acceleration.tolist(), strict=True)
     ):
         shown = eccentric(world.place, missing) if missing.eccentricity and disc_on_motor else world.place
-        read = controller.counts * round(shown / controller.counts)
-        filtered += smooth * (0.0 if before is None else (read - before) / period - filtered)
-        before = read
-        current = controller.proportional * (goal - read) + controller.derivative * (pace - filtered)
-        current += integral + controller.feed * bend
-        if -controller.limit <= current <= controller.limit:
-            integral += period * controller.integral * (goal - read)
-        else:
-            current = controller.limit if current > 0.0 else -controller.limit
-        rows.append((world.place, world.load_place, current))
-        acted.append(effort_per_ampere * act(current))
-        older, newer = acted[-2 - whole], acted[-1 - whole]
+        commands.append(following(goal, pace, bend, shown))
+        rows.append((world.place, world.load_place, commands[-1]))
+        older, newer = commands[-2 - whole], commands[-1 - whole]
         beside = push[tick * steps : (tick + 1) * steps].tolist()
-        efforts = [older + p for p in beside[:part]] + [newer + p for p in beside[part:]]
+        efforts = []
+        for number, pushed in enumerate(beside):
+            told = older if number < part else newer
+            flowing = flowing + share * (told - flowing) if share else told
+            efforts.append(effort_per_ampere * act(flowing) + pushed)
         world.advance(efforts, missing.payload if 2 * tick > len(wanted.time) else 0.0)
     return Ticks(wanted.time, *np.array(rows).T)
 

@@ -16,12 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from . import specimens
-from .digital_loop import Logger, Ticks, logged, run
+from .cascade import journeys
+from .digital_loop import Logger, Loop, Ticks, logged, run
 from .kind_decks import NAMES, SLIDE_SHARE, deck_of, mapping_of
 from .kinds import COMMAND, KINDS, NOISE, Kind, built, stream, wanted
 from .two_bodies import Missing, Plant, TwoBodies
 
 CONDITIONS = ("plain", "coarse", "coloured", "slow", "averaged")
+CASCADED = "cascaded"
+"""A condition of the loop, not of the log: a robot's cascade goes from point to point."""
 ALL_KINDS = (*KINDS, "specimen")
 _STRIP_NAMES = (
     ("grip", "clamp", "strip", "load_cell"),
@@ -72,7 +75,7 @@ def write_kind_case(
     seed
         Fixes machine, names of parts, motion and noise.
     condition
-        One of :data:`CONDITIONS`.
+        One of :data:`CONDITIONS`, or :data:`CASCADED`.
     says_held
         Whether `records.toml` says that the current is held from row to row, where it is.
 
@@ -103,7 +106,8 @@ def _write_machine(
     (folder / "records.toml").write_text(
         mapping_of(kind, names, logger, says_held=says_held), encoding="utf-8"
     )
-    for number, (name, ticks) in enumerate(simulated(kind, plant, missing, seed, logger.quantum).items()):
+    made = simulated(kind, plant, missing, seed, logger.quantum, cascaded=condition == CASCADED)
+    for number, (name, ticks) in enumerate(made.items()):
         draw = stream(seed, NOISE, number)
         table = logged(ticks, logger, missing, draw, disc_on_motor=kind.sides == 1)
         if kind.radius:
@@ -150,8 +154,9 @@ def truth_of(
 
 
 def simulated(
-    kind: Kind, plant: Plant, missing: Missing, seed: int, counts: float, step: float | None = None
-) -> dict[str, Ticks]:
+    kind: Kind, plant: Plant, missing: Missing, seed: int, counts: float, step: float | None = None,
+    *, cascaded: bool = False,
+) -> dict[str, Ticks]:  # fmt: skip
     """Return the true signals of every record.
 
     Parameters
@@ -162,9 +167,17 @@ def simulated(
         Of the encoder that the loop reads.
     step
         Of the simulation, s; that of the simulator where nothing is given.
+    cascaded
+        Whether a robot's cascade goes from point to point, in place of the loop that tracks sines.
     """
-    made = {}
-    for name, command in wanted(kind, stream(seed, COMMAND)).items():
+    made, draw = {}, stream(seed, COMMAND)
+    loop: Loop = kind.controller(counts)
+    told = {} if cascaded else wanted(kind, draw)
+    if cascaded:
+        # The lag of the current loop stays within what two channels may be late without a fault.
+        loop = kind.cascade(counts, draw.uniform(0.1, 0.4) / kind.rate)
+        told = journeys(kind.sines[0][0], kind.multisine[-1], kind.rate, draw)
+    for name, command in told.items():
         if kind.simulator == "mujoco":
             from .mujoco_machines import MujocoBodies
 
@@ -172,7 +185,7 @@ def simulated(
         else:
             world = TwoBodies(plant, missing, step) if step else TwoBodies(plant, missing)
         made[name] = run(
-            world, kind.controller(counts), command, plant.effort_per_ampere, missing,
+            world, loop, command, plant.effort_per_ampere, missing,
             step=world.step, disc_on_motor=kind.sides == 1,
         )  # fmt: skip
     return made
@@ -311,7 +324,7 @@ def main() -> None:
     parser.add_argument("strength", type=float)
     parser.add_argument("seed", type=int)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--condition", choices=CONDITIONS, default="plain")
+    parser.add_argument("--condition", choices=(*CONDITIONS, CASCADED), default="plain")
     parser.add_argument("--says-held", action="store_true", help='write between_samples = "held"')
     given = parser.parse_args()
     effects = () if given.effect == "nothing" else tuple(given.effect.split("+"))

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .cascade import Cascade
 from .digital_loop import Controller, Logger, Wanted
 from .two_bodies import Missing, Plant
 
@@ -61,6 +62,17 @@ class Kind:
         return Controller(
             rate=self.rate, proportional=gain * self.bandwidth, derivative=1.6 * gain,
             integral=1.5 * gain * self.bandwidth, limit=self.limit, counts=counts,
+            feed=inertia / self.plant.effort_per_ampere,
+        )  # fmt: skip
+
+    def cascade(self, counts: float, lag: float) -> Cascade:
+        """Return the loop of a robot, tuned on the same numbers; slower where a spring lies within it."""
+        inertia = self.plant.inertia + self.plant.load_inertia
+        bandwidth = self.bandwidth * (0.6 if self.plant.load_inertia else 1.0)
+        gain = inertia * bandwidth / self.plant.effort_per_ampere
+        return Cascade(
+            rate=self.rate, position_gain=0.4 * bandwidth, speed_gain=gain, integral=0.3 * gain * bandwidth,
+            cutoff=80.0, limit=self.limit, counts=counts, lag=lag,
             feed=inertia / self.plant.effort_per_ampere,
         )  # fmt: skip
 

@@ -12,8 +12,9 @@ import pytest
 
 from benchmarks._score_run import opened
 from tests.rig import specimens
-from tests.rig.digital_loop import Logger, Ticks, logged, run
-from tests.rig.kind_cases import ALL_KINDS, CONDITIONS, conditioned, truth_of, write_kind_case
+from tests.rig.cascade import journeys
+from tests.rig.digital_loop import Controller, Logger, Ticks, Wanted, logged, run
+from tests.rig.kind_cases import ALL_KINDS, CONDITIONS, conditioned, simulated, truth_of, write_kind_case
 from tests.rig.kinds import COMMAND, KINDS, Kind, built, stream, wanted
 from tests.rig.mujoco_machines import MujocoBodies, available
 from tests.rig.two_bodies import STEP, Missing, Plant, TwoBodies
@@ -137,6 +138,44 @@ def test_a_delay_is_one_of_the_drive_beyond_the_hold() -> None:
     speed = np.concatenate([[0.0], np.cumsum(effort) * STEP / 0.5])
     place = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (speed[1:] + speed[:-1]))])
     assert ticks.place == pytest.approx(place[:-1:10], abs=1e-9)
+
+
+@pytest.mark.long_cases("elastic_joint", "belt_axis", "screw_carriage", "rack_carriage")
+@pytest.mark.parametrize("kind", OWN, ids=lambda kind: kind.name)
+def test_a_cascade_goes_where_it_is_told_and_its_current_lags(kind: Kind) -> None:
+    plant, missing = built(kind, (), 1.0, 5)
+    made = simulated(kind, plant, missing, 5, kind.logger.quantum, cascaded=True)
+    told = journeys(kind.sines[0][0], kind.multisine[-1], kind.rate, stream_behind_the_lag(kind))
+    assert list(made) == list(told) == ["points_1", "chirp", "spline", "slow", "points_2", "steps"]
+    for name, size in (("slow", 0.05), ("points_1", 0.12)):
+        error = made[name].place - told[name].place
+        assert np.std(error) < size * np.std(told[name].place), name
+    assert max(np.max(np.abs(ticks.current)) for ticks in made.values()) <= kind.limit
+
+
+def stream_behind_the_lag(kind: Kind) -> np.random.Generator:
+    """Chance as the motions of seed 5 see it: the lag of the current loop was drawn first."""
+    draw = stream(5, COMMAND)
+    draw.uniform(0.1, 0.4)
+    return draw
+
+
+def test_a_current_that_lags_acts_as_late_as_it_says() -> None:
+    """Of a free body under a ramp of current the speed falls behind by the time constant."""
+    free = replace(ONE, weight=0.0, damping=0.0)
+    time = np.arange(1000) * 1e-3
+    ramp = Wanted(time, np.zeros_like(time), np.zeros_like(time), time)
+    loop = Controller(
+        rate=1000.0, proportional=0.0, derivative=0.0, integral=0.0, limit=9.0, counts=1e-9, feed=1.0
+    )
+    none, lagging = (
+        run(TwoBodies(free, Missing()), replace(loop, lag=lag), ramp, free.effort_per_ampere, Missing())
+        for lag in (0.0, 0.02)
+    )
+    speeds = [np.gradient(each.place, time)[900] for each in (none, lagging)]
+    # The speed is half the square of the time over the inertia; 20 ms late it is less by that times the time.
+    expected = 0.02 * time[900] - 0.02**2
+    assert (speeds[0] - speeds[1]) * free.inertia == pytest.approx(expected, rel=0.01)
 
 
 def test_a_log_is_slow_coarse_averaged_late_and_biased() -> None:

@@ -44,8 +44,8 @@ _LEAST = 0.05
 """Share of the noise that the numbers of a machine leave at least, where they do not make it vanish."""
 _WEIGHINGS = 2
 _MOST = 1.1
-"""Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so little
-longer is no longer than the error of a fit at its least one, so no effect could be named for it."""
+"""Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
+little longer stands at the least one of its search, so no effect could be named for it."""
 
 
 Missing: TypeAlias = Callable[[Block, Record, float], Iterator[Array]]

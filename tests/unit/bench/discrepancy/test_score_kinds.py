@@ -51,6 +51,14 @@ def test_cases_go_round_over_effects_conditions_and_kinds() -> None:
     assert discrepancy_score.seeds_of("0:3,7") == [0, 1, 2, 7]
 
 
+def test_machines_may_be_under_a_cascade_instead() -> None:
+    usual, cascaded = (kind_cases([3], all_kinds(), cascaded=each) for each in (False, True))
+    assert {c.noise for c in cascaded} == {"cascaded"}
+    assert [(c.tier, c.machine, c.effects) for c in cascaded] == [
+        (c.tier, c.machine, c.effects) for c in usual if c.machine in KINDS
+    ]
+
+
 def test_a_name_holds_at_its_body_only() -> None:
     case = Case(SINGLE, "elastic_joint", ("joint_coulomb_friction",), 1.0, 1)
     names = names_of("elastic_joint", 1)
