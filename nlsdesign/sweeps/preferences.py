@@ -32,26 +32,58 @@ class Preference:
 
     @classmethod
     def smaller(cls, answer: str) -> Preference:
-        """The smaller, the better."""
+        """The smaller, the better.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        """
         return cls(answer, 1.0)
 
     @classmethod
     def larger(cls, answer: str) -> Preference:
-        """The larger, the better."""
+        """The larger, the better.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        """
         return cls(answer, -1.0)
 
     @classmethod
     def near(cls, answer: str, value: float) -> Preference:
-        """The nearer to a value in SI, the better."""
+        """The nearer to a value, on either side, the better.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        value
+            In SI.
+        """
         return cls(answer, 1.0, value)
 
     def cost(self, values: Array) -> Array:
-        """Return numbers of answers in SI of which the smaller is the better one; not a number stays so."""
+        """Return numbers of which the smaller is the better one; not a number stays so.
+
+        Parameters
+        ----------
+        values
+            Answers in SI.
+        """
         given = np.asarray(values, dtype=float)
         return self.sign * given if self.value is None else np.abs(given - self.value)
 
     def words(self, unit: str) -> str:
-        """Return the direction as text, with the unit of the answer."""
+        """Return the direction as text.
+
+        Parameters
+        ----------
+        unit
+            Of the answer.
+        """
         if self.value is not None:
             return f"nearer to {with_unit(three_digits(self.value), unit or '1')} is better"
         return f"{'smaller' if self.sign > 0.0 else 'larger'} is better"
@@ -77,20 +109,48 @@ class Requirement:
 
     @classmethod
     def at_most(cls, answer: str, value: float) -> Requirement:
-        """The answer is at most a value in SI."""
+        """The answer is at most a value.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        value
+            In SI.
+        """
         return cls(answer, value, 1.0)
 
     @classmethod
     def at_least(cls, answer: str, value: float) -> Requirement:
-        """The answer is at least a value in SI."""
+        """The answer is at least a value.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        value
+            In SI.
+        """
         return cls(answer, value, -1.0)
 
     def kept(self, values: Array) -> Mask:
-        """Return which values, in SI, keep it; one that is not a number does not."""
+        """Return which values keep it; one that is not a number does not.
+
+        Parameters
+        ----------
+        values
+            Answers in SI.
+        """
         return np.asarray(self.sign * np.asarray(values, dtype=float) <= self.sign * self.value)
 
     def words(self, unit: str) -> str:
-        """Return it as text, with the unit of the answer."""
+        """Return it as text.
+
+        Parameters
+        ----------
+        unit
+            Of the answer.
+        """
         side = "most" if self.sign > 0.0 else "least"
         return f"at {side} {with_unit(three_digits(self.value), unit or '1')}"
 
