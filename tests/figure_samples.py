@@ -27,7 +27,6 @@ from nlsdesign.feedback.control import (
     OutputImpedance,
     SaturationLine,
     SineResponse,
-    SlidingPlant,
 )
 from nlsdesign.feedback.control.evaluation.linear_loop import LinearLoop
 from nlsdesign.feedback.control.evaluation.margins import CoupledStability
@@ -199,7 +198,7 @@ def linear_loop() -> LinearLoop:
     reached = np.ones(count, dtype=bool)
     return LinearLoop(
         angles, 4.0 * angles, angles, reached, 1e-3, ("x",), ("u",), ("y",), 0.9 + shape, shape, shape, shape,
-        shape, SlidingPlant(),
+        shape, 1.0,
     )  # fmt: skip
 
 

@@ -203,17 +203,7 @@ def report(
     say what a miss is.
     """
     from ..foundation.text_files import write_text
-    from ..sweeps import (
-        LargerIsBetter,
-        NearIsBetter,
-        NotAbove,
-        NotBelow,
-        Preference,
-        Requirement,
-        SmallerIsBetter,
-        point_deck_text,
-        read_sweep,
-    )
+    from ..sweeps import Preference, Requirement, point_deck_text, read_sweep
 
     table = read_sweep(folder)
     if deck_of:
@@ -226,14 +216,14 @@ def report(
         return
     from ..presentation.sweep_report import write_sweep_report
 
-    preferences: list[Preference] = [
-        *(SmallerIsBetter(name) for name in given["smaller"]),
-        *(LargerIsBetter(name) for name in given["larger"]),
-        *(NearIsBetter(*_answer_value(table, text, "--near")) for text in given["near"]),
+    preferences = [
+        *(Preference.smaller(name) for name in given["smaller"]),
+        *(Preference.larger(name) for name in given["larger"]),
+        *(Preference.near(*_answer_value(table, text, "--near")) for text in given["near"]),
     ]
-    requirements: list[Requirement] = [
-        *(NotAbove(*_answer_value(table, text, "--at-most")) for text in given["at_most"]),
-        *(NotBelow(*_answer_value(table, text, "--at-least")) for text in given["at_least"]),
+    requirements = [
+        *(Requirement.at_most(*_answer_value(table, text, "--at-most")) for text in given["at_most"]),
+        *(Requirement.at_least(*_answer_value(table, text, "--at-least")) for text in given["at_least"]),
     ]
     written = write_sweep_report(
         table, out, preferences=preferences, requirements=requirements or None, source=folder

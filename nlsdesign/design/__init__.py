@@ -95,7 +95,7 @@ from .statics.contour import Contour, contour_from_lever_arm
 from .statics.declared_cam import contour_of_cam
 from .statics.equilibrium import elastic_law, equilibrium_torque
 from .statics.roller_contour import RollerContour
-from .tolerance.causes import Cause, SeparateModuli, SpreadRules
+from .tolerance.causes import Cause, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
 from .tolerance.trimming import Trim
@@ -162,7 +162,6 @@ __all__ = [
     "RestLengthRange",
     "RollerContour",
     "RubberStock",
-    "SeparateModuli",
     "SmoothContour",
     "Spread",
     "SpreadRules",

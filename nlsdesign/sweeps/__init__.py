@@ -4,10 +4,7 @@ The report of a sweep and the command import it. It decides no physics: question
 """
 
 from .axes import GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
-from .preferences import LargerIsBetter, NearIsBetter, NotBelow, SmallerIsBetter
-from .preferences import NotAbove as NotAbove
-from .preferences import Preference as Preference
-from .preferences import Requirement as Requirement
+from .preferences import Preference, Requirement
 from .questions import AngleQuestion, DesignQuestion, DiagnosisQuestion, LoopQuestion, SpreadQuestion
 from .run_sweep import SweepSettings as SweepSettings
 from .run_sweep import SweepTask, sweep
@@ -27,15 +24,13 @@ __all__ = [
     "DiagnosisQuestion",
     "FunctionQuestion",
     "GridAxis",
-    "LargerIsBetter",
     "LatinHypercube",
     "Listed",
     "LoopQuestion",
-    "NearIsBetter",
-    "NotBelow",
+    "Preference",
     "RandomDraws",
+    "Requirement",
     "SaltelliSample",
-    "SmallerIsBetter",
     "SobolSample",
     "SpreadQuestion",
     "SweepColumn",

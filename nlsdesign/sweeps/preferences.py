@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,76 +13,85 @@ from ..foundation.quantity import three_digits, with_unit
 
 
 @dataclass(frozen=True)
-class Preference(ABC):
-    """Which values of an answer are better.
+class Preference:
+    """Which values of an answer are better: the smaller, the larger, or those near a value.
 
     Parameters
     ----------
     answer
         Full name of the column.
+    sign
+        1 where the smaller, −1 where the larger is the better; minus ten is smaller than one.
+    value
+        In SI: the nearer to it, on either side, the better; ``None`` for no such value.
     """
 
     answer: str
+    sign: float
+    value: float | None = None
 
-    @abstractmethod
+    @classmethod
+    def smaller(cls, answer: str) -> Preference:
+        """The smaller, the better.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        """
+        return cls(answer, 1.0)
+
+    @classmethod
+    def larger(cls, answer: str) -> Preference:
+        """The larger, the better.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        """
+        return cls(answer, -1.0)
+
+    @classmethod
+    def near(cls, answer: str, value: float) -> Preference:
+        """The nearer to a value, on either side, the better.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        value
+            In SI.
+        """
+        return cls(answer, 1.0, value)
+
     def cost(self, values: Array) -> Array:
-        """Return numbers of answers in SI of which the smaller is the better one; not a number stays so."""
+        """Return numbers of which the smaller is the better one; not a number stays so.
 
-    @abstractmethod
+        Parameters
+        ----------
+        values
+            Answers in SI.
+        """
+        given = np.asarray(values, dtype=float)
+        return self.sign * given if self.value is None else np.abs(given - self.value)
+
     def words(self, unit: str) -> str:
-        """Return the direction as text, with the unit of the answer."""
+        """Return the direction as text.
+
+        Parameters
+        ----------
+        unit
+            Of the answer.
+        """
+        if self.value is not None:
+            return f"nearer to {with_unit(three_digits(self.value), unit or '1')} is better"
+        return f"{'smaller' if self.sign > 0.0 else 'larger'} is better"
 
 
 @dataclass(frozen=True)
-class SmallerIsBetter(Preference):
-    """The smaller, the better; minus ten is better than one."""
-
-    def cost(self, values: Array) -> Array:
-        """Return the values."""
-        return np.asarray(values, dtype=float)
-
-    def words(self, unit: str) -> str:
-        """Return the direction as text."""
-        return "smaller is better"
-
-
-@dataclass(frozen=True)
-class LargerIsBetter(Preference):
-    """The larger, the better."""
-
-    def cost(self, values: Array) -> Array:
-        """Return the negative values."""
-        return -np.asarray(values, dtype=float)
-
-    def words(self, unit: str) -> str:
-        """Return the direction as text."""
-        return "larger is better"
-
-
-@dataclass(frozen=True)
-class NearIsBetter(Preference):
-    """The nearer to a value, on either side, the better.
-
-    Parameters
-    ----------
-    value
-        Wanted, in SI.
-    """
-
-    value: float
-
-    def cost(self, values: Array) -> Array:
-        """Return the distances from the value."""
-        return np.abs(np.asarray(values, dtype=float) - self.value)
-
-    def words(self, unit: str) -> str:
-        """Return the direction as text."""
-        return f"nearer to {with_unit(three_digits(self.value), unit or '1')} is better"
-
-
-@dataclass(frozen=True)
-class Requirement(ABC):
-    """What an answer must keep, so that a point is no miss.
+class Requirement:
+    """What an answer must keep, so that a point is no miss: at most or at least a value.
 
     Parameters
     ----------
@@ -91,16 +99,50 @@ class Requirement(ABC):
         Full name of the column.
     value
         In SI.
+    sign
+        1 where it is the largest, −1 where it is the smallest value that keeps it.
     """
 
     answer: str
     value: float
+    sign: float
 
-    @abstractmethod
+    @classmethod
+    def at_most(cls, answer: str, value: float) -> Requirement:
+        """The answer is at most a value.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        value
+            In SI.
+        """
+        return cls(answer, value, 1.0)
+
+    @classmethod
+    def at_least(cls, answer: str, value: float) -> Requirement:
+        """The answer is at least a value.
+
+        Parameters
+        ----------
+        answer
+            Full name of the column.
+        value
+            In SI.
+        """
+        return cls(answer, value, -1.0)
+
     def kept(self, values: Array) -> Mask:
-        """Return which values, in SI, keep it; one that is not a number does not."""
+        """Return which values keep it; one that is not a number does not.
 
-    @abstractmethod
+        Parameters
+        ----------
+        values
+            Answers in SI.
+        """
+        return np.asarray(self.sign * np.asarray(values, dtype=float) <= self.sign * self.value)
+
     def words(self, unit: str) -> str:
         """Return it as text.
 
@@ -109,32 +151,8 @@ class Requirement(ABC):
         unit
             Of the answer.
         """
-
-
-@dataclass(frozen=True)
-class NotAbove(Requirement):
-    """The answer is at most a value."""
-
-    def kept(self, values: Array) -> Mask:
-        """Return which values are at most this one."""
-        return np.asarray(np.asarray(values, dtype=float) <= self.value)
-
-    def words(self, unit: str) -> str:
-        """Return it as text."""
-        return f"at most {with_unit(three_digits(self.value), unit or '1')}"
-
-
-@dataclass(frozen=True)
-class NotBelow(Requirement):
-    """The answer is at least a value."""
-
-    def kept(self, values: Array) -> Mask:
-        """Return which values are at least this one."""
-        return np.asarray(np.asarray(values, dtype=float) >= self.value)
-
-    def words(self, unit: str) -> str:
-        """Return it as text."""
-        return f"at least {with_unit(three_digits(self.value), unit or '1')}"
+        side = "most" if self.sign > 0.0 else "least"
+        return f"at {side} {with_unit(three_digits(self.value), unit or '1')}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,6 @@ from nlsdesign.design import equilibrium_torque
 from nlsdesign.export import natively
 from nlsdesign.feedback.control import (
     ClosedLoop,
-    FrozenTables,
-    StuckPlant,
     TorqueGains,
     coupled_stability,
     encoder_loop,
@@ -95,7 +93,7 @@ def test_the_mode_of_the_plant_decides() -> None:
     loop = loops(NLS, proportional=70.0)[0]
     at = np.radians([40.0])
     assert not linear_loop(loop, at).stable()[0]
-    assert linear_loop(loop, at, mode=StuckPlant()).stable()[0]
+    assert linear_loop(loop, at, speed=0.0).stable()[0]
 
 
 def test_poles_beyond_the_current_limit_are_none() -> None:
@@ -110,7 +108,7 @@ def test_poles_beyond_the_current_limit_are_none() -> None:
 def test_tables_with_and_without_their_slope() -> None:
     loop = loops(NLS)[0]
     at = np.radians([35.0])
-    sloped, frozen = (linear_loop(loop, at, tables=t).radius()[0] for t in (None, FrozenTables()))
+    sloped, frozen = (linear_loop(loop, at, frozen_tables=held).radius()[0] for held in (False, True))
     assert sloped == pytest.approx(frozen, rel=0.05)
 
 

@@ -14,9 +14,8 @@ An effect brings the strategy that suits it. Hypotheses are compared elsewhere.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -247,26 +246,16 @@ class FitProblem:
         return limits
 
 
-class Strategy(ABC):
-    """Where the fits of an effect begin."""
+@dataclass(frozen=True)
+class Strategy:
+    """Where the fits of an effect begin: where its unknowns say, unless a subclass knows better."""
 
-    takes_long: bool = False
-    """Whether its fits take much longer than others, so that they are begun first."""
+    # takes_long: whether its fits take much longer than others, as where the effect moves faster than the
+    # samples, so that they are begun first
+    takes_long: bool = field(default=False, kw_only=True)
 
-    @abstractmethod
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return better starts than those of the unknowns; nothing where there are none."""
-
-
-@dataclass(frozen=True)
-class Plain(Strategy):
-    """Begin where the unknowns of the effect say."""
-
-    # takes_long: set where the effect moves faster than the samples, so that each evaluation takes long
-    takes_long: bool = False
-
-    def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
-        """Return nothing: the unknowns say it."""
         return []
 
 
@@ -281,7 +270,7 @@ class Continuation(Strategy):
 
     through: Assembly  # the assembly with the simpler form of the effect
     hold: float = 1.2  # multiple of each new number at which it is held while the others are fitted once more
-    takes_long: bool = True  # two forms are fitted, one after the other
+    takes_long: bool = field(default=True, kw_only=True)  # two forms are fitted, one after the other
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return the starts that the simpler form leaves; nothing where it has no response."""
@@ -320,27 +309,15 @@ class Continuation(Strategy):
         return {name for name in simple if name in whole and simple[name].value == whole[name].value}
 
 
-class Method(ABC):
-    """How a group of blocks is fitted from its starts."""
-
-    @abstractmethod
-    def fit(self, problem: FitProblem, strategy: Strategy) -> Fit:
-        """Fit the numbers."""
-
-    @abstractmethod
-    def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
-        """Return which blocks and records are to be judged by the others."""
-
-
-class Smooth(Method):
-    """Least squares over all records, from several starts."""
+class Smooth:
+    """How a group of blocks is fitted from its starts: least squares over all records."""
 
     def fit(self, problem: FitProblem, strategy: Strategy) -> Fit:
         """Fit to all records that are predictable."""
         return best_fit(problem.predictable, problem.starts, problem.limits)
 
     def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
-        """Return what was set aside before."""
+        """Return which blocks and records are to be judged by the others: what was set aside before."""
         return frozenset(key for key in problem.unpredictable if key in after)
 
 
@@ -404,7 +381,7 @@ def refusal(problem: FitProblem) -> str:
     return f"is too expensive to try: {problem.instructions} operations per step, {starts} starts"
 
 
-def method_for(problem: FitProblem) -> Method:
+def method_for(problem: FitProblem) -> Smooth:
     """Return how a group of blocks is fitted."""
     return RobustOverFreeFlight() if problem.has_free_flight else Smooth()
 

@@ -5,7 +5,7 @@ fits their numbers, and ``multiple_shooting`` those of a whole simulation. ``dis
 and the rooms above may import it. It never changes the structure of a model.
 """
 
-from .least_squares import Huber, Loss, Squares
+from .least_squares import Huber, Loss
 from .multiple_shooting import (
     Prediction,
     coloured_sigma,
@@ -30,7 +30,6 @@ __all__ = [
     "Record",
     "RecordSet",
     "Shots",
-    "Squares",
     "Weights",
     "agreement",
     "coloured_sigma",

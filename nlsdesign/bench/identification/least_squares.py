@@ -14,7 +14,6 @@ A profile tells how the cost grows when one number is held and all others are fi
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -62,19 +61,18 @@ _PLAIN_SHARE = 0.3
 
 @dataclass(frozen=True)
 class Loss:
-    """Base of what turns residuals into a cost."""
+    """What turns residuals into a cost: half the sum of squares, right where errors are noise."""
 
-    @abstractmethod
     def value(self, residual: Array) -> float:
-        """Return the cost of all residuals together.
+        """Return the cost of all residuals together, ½·Σr².
 
         Parameters
         ----------
         residual
             In standard deviations, shape (n,).
         """
+        return 0.5 * float(residual @ residual)
 
-    @abstractmethod
     def weight(self, residual: Array) -> Array:
         """Return the factor of each residual and its slope that makes least squares follow the loss.
 
@@ -83,18 +81,6 @@ class Loss:
         residual
             In standard deviations, shape (n,).
         """
-
-
-@dataclass(frozen=True)
-class Squares(Loss):
-    """Half the sum of squares: right where errors are noise."""
-
-    def value(self, residual: Array) -> float:
-        """Return ½·Σr²."""
-        return 0.5 * float(residual @ residual)
-
-    def weight(self, residual: Array) -> Array:
-        """Return ones."""
         return np.ones_like(residual)
 
 

@@ -22,7 +22,7 @@ from scipy.optimize import lsq_linear
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, MeasurementError, missing_library
 from ...model import FlatModel
-from .least_squares import Fit, Loss, Squares, covariance_of
+from .least_squares import Fit, Loss, covariance_of
 from .parameters import Parameter, box
 from .records.measurement import Record
 from .residuals import effective_size, rmse
@@ -101,7 +101,7 @@ def fit_by_simulation(
     wiring
         Of measured signals to inputs and outputs; by name where ``None``.
     loss
-        :class:`Squares` by default; :class:`Huber` where some samples are outliers.
+        Squares by default; :class:`Huber` where some samples are outliers.
     weights
         What counts how much, among it what earlier fits have found; see :class:`Weights`.
 
@@ -111,7 +111,7 @@ def fit_by_simulation(
         If there is no simulation at the start, or the descent stops before the windows join.
     """
     problem = SimulationError(model, records, parameters, shots=shots, wiring=wiring, weights=weights)
-    loss = loss or Squares()
+    loss = loss or Loss()
     place, iterations, converged = _descended(problem, loss)
     priors, size = problem.priors, len(problem.parameters)
     covariance = covariance_of(place.residual[priors:], place.slope, priors)[:size, :size]

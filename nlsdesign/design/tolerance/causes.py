@@ -8,7 +8,7 @@ them.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -143,58 +143,22 @@ _CABLE = _Assumed(2.5e-5 / math.sqrt(3.0), "assumed: diameter within ± 0.05 mm,
 
 
 @dataclass(frozen=True)
-class MaterialScatter(ABC):
-    """Base of the ways in which the moduli of one piece of material deviate."""
-
-    @abstractmethod
-    def grouped(self, piece: str, moduli: Mapping[str, Sequence[Variable]]) -> dict[str, list[Variable]]:
-        """Return the moduli that move together by the name of what they are.
-
-        Parameters
-        ----------
-        piece
-            Path of the piece.
-        moduli
-            The numbers of each modulus or row of moduli by its full name.
-        """
-
-
-@dataclass(frozen=True)
-class OneBatch(MaterialScatter):
-    """All moduli of a piece move together.
-
-    They are fitted to one curve, and what differs between batches and samples is mostly how stiff the whole
-    curve is. It is also the careful choice: deviations of their own would average out in the torque.
-    """
-
-    def grouped(self, piece: str, moduli: Mapping[str, Sequence[Variable]]) -> dict[str, list[Variable]]:
-        """Return one group for all."""
-        return {f"{piece}.moduli": [v for row in moduli.values() for v in row]} if moduli else {}
-
-
-@dataclass(frozen=True)
-class SeparateModuli(MaterialScatter):
-    """Each modulus, also each of a row, deviates on its own: the form of the curve is uncertain too."""
-
-    def grouped(self, piece: str, moduli: Mapping[str, Sequence[Variable]]) -> dict[str, list[Variable]]:
-        """Return a group for each number."""
-        return {v.name: [v] for row in moduli.values() for v in row}
-
-
-@dataclass(frozen=True)
 class SpreadRules:
     """How the spreads of a deck become deviations.
 
     Parameters
     ----------
-    material
-        How the moduli of one piece deviate.
+    separate_moduli
+        Whether each modulus of a piece, also each of a row, deviates on its own: the form of its curve is
+        uncertain too. Else all move together: they are fitted to one curve, and what differs between batches
+        and samples is mostly how stiff the whole curve is. That is also the careful choice, for deviations of
+        their own would average out in the torque.
     given
         Spreads that replace declared and assumed ones, by name of the cause: a :class:`Spread`, or one
         standard deviation in the unit of the number, of rows and moduli relative as in a deck; zero for none.
     """
 
-    material: MaterialScatter = field(default_factory=OneBatch)
+    separate_moduli: bool = False
     given: Mapping[str, Spread | Quantity | float] = field(default_factory=dict)
 
 
@@ -222,8 +186,11 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
             for name, row in groups.items()
             if name.startswith(f"{piece.name}.") and row[0].unit == "Pa" and any(v.spread for v in row)
         }
-        grouped = rules.material.grouped(piece.name, moduli)
-        groups = {name: row for name, row in groups.items() if name not in moduli} | grouped
+        groups = {name: row for name, row in groups.items() if name not in moduli}
+        if rules.separate_moduli:
+            groups |= {v.name: [v] for row in moduli.values() for v in row}
+        elif moduli:
+            groups[f"{piece.name}.moduli"] = [v for row in moduli.values() for v in row]
     # What deviates besides the numbers: the edge of the cam, and the cable on it.
     cable = _CABLE
     if cam.cable is not None:

@@ -1,7 +1,7 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
 from .closed_loop import ClosedLoop, encoder_loop, joined
-from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant, with_fine_counts
+from .evaluation.linear_parts import with_fine_counts
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .evaluation.margins import (
     LoopMargins,
@@ -46,7 +46,6 @@ __all__ = [
     "DisturbanceObserver",
     "FilteredDifference",
     "FrictionCompensation",
-    "FrozenTables",
     "GivenRate",
     "LimitCycleOnset",
     "LoopChoice",
@@ -62,9 +61,6 @@ __all__ = [
     "SaturationLine",
     "ScheduledTorque",
     "SineResponse",
-    "SlidingPlant",
-    "SlopedTables",
-    "StuckPlant",
     "TorqueGains",
     "TorqueLaw",
     "Tracking",

@@ -13,7 +13,7 @@ from ...foundation.command_words import typed_command
 from ...foundation.errors import MissingLibraryError, NlsError, visible
 from ...foundation.text_files import write_table, write_text
 from ...sweeps import SweepTable
-from ...sweeps.preferences import NotBelow, Preference, RankedPoints, Requirement, rank_points
+from ...sweeps.preferences import Preference, RankedPoints, Requirement, rank_points
 from ...sweeps.sensitivity import AnswerSensitivity, sensitivity
 from ...sweeps.sweep_table import point_deck_texts
 from ..report import FileSection, Section, TableSection, TextSection, write_report
@@ -195,7 +195,7 @@ def _written(
 
 def usual_requirements(table: SweepTable) -> list[Requirement]:
     """Return what a point must keep where nothing is stated: a design must have met its target."""
-    return [NotBelow(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
+    return [Requirement.at_least(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
 
 
 def _sensitivities(

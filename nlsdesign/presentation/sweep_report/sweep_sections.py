@@ -11,7 +11,7 @@ from ...foundation.arrays import Array
 from ...foundation.quantity import three_digits, typeset_unit, with_unit
 from ...sweeps import SweepColumn, SweepTable
 from ...sweeps.answer_statistics import AnswerSurface, BoundedQuantile, answer_quantiles, answer_surface
-from ...sweeps.preferences import NearIsBetter, RankedPoints
+from ...sweeps.preferences import RankedPoints
 from ..figures.sweep_figures import (
     MOST_COORDINATES,
     MOST_PANELS,
@@ -161,7 +161,7 @@ def front_sections(content: PageContent) -> list[Section]:
     table, shown = content.table, content.shown
     columns = [shown_column(table, table.column(each.answer), shown.rows) for each in preferences]
     wanted = [
-        each.value * shown_unit(table.column(each.answer).unit)[1] if isinstance(each, NearIsBetter) else None
+        None if each.value is None else each.value * shown_unit(table.column(each.answer).unit)[1]
         for each in preferences
     ]
     directions = "; ".join(f"`{p.answer}`: {p.words(table.column(p.answer).unit)}" for p in preferences)

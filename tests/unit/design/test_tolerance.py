@@ -12,7 +12,6 @@ from nlsdesign.components import Pulley, Through
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.design import (
     PowerTorque,
-    SeparateModuli,
     SpreadRules,
     ToleranceResult,
     Trim,
@@ -96,12 +95,12 @@ def test_given_spreads_replace_declared_and_assumed_ones() -> None:
 
 def test_moduli_may_deviate_separately() -> None:
     model = flatten(declare(load_deck("austin2015_figure_consistent")))
-    names = [cause.name for cause in spring_causes(model, None, SpreadRules(material=SeparateModuli()))]
+    names = [cause.name for cause in spring_causes(model, None, SpreadRules(separate_moduli=True))]
     assert "spring.rubber.stiff.modulus[6]" in names
     assert "spring.rubber.moduli" not in names
     together = tolerance_analysis(model, target=CURVE, draws=200, trims=[])
     apart = tolerance_analysis(
-        model, target=CURVE, draws=200, trims=[], rules=SpreadRules(material=SeparateModuli())
+        model, target=CURVE, draws=200, trims=[], rules=SpreadRules(separate_moduli=True)
     )
     assert apart.quantiles[-1].value < together.quantiles[-1].value
 

@@ -18,14 +18,14 @@ from nlsdesign.foundation.errors import UnknownNameError
 from nlsdesign.presentation.sweep_report import write_sweep_report
 from nlsdesign.presentation.sweep_report.shown_points import MOST_KEPT, MOST_OTHERS, shown_points
 from nlsdesign.presentation.sweep_report.sweep_page import SweepPage, usual_requirements
-from nlsdesign.sweeps import SmallerIsBetter
-from nlsdesign.sweeps.preferences import NotAbove, nondominated, rank_points
+from nlsdesign.sweeps import Preference
+from nlsdesign.sweeps.preferences import Requirement, nondominated, rank_points
 from nlsdesign.sweeps.sweep_table import SweepTable, point_deck_text, point_deck_texts
 from tests.sweep_tables import AREA, HOSTILE, INERTIA, RUBBER, spread_table, table_of
 
 pytest.importorskip("SALib")
 
-BOTH = (SmallerIsBetter("error"), SmallerIsBetter("mass"))
+BOTH = (Preference.smaller("error"), Preference.smaller("mass"))
 
 
 def page_of(table: SweepTable, folder: Path, **options: Any) -> str:
@@ -60,11 +60,15 @@ def table() -> SweepTable:
 
 @pytest.fixture(scope="module")
 def written(table: SweepTable, tmp_path_factory: pytest.TempPathFactory) -> SweepPage:
-    both = (SmallerIsBetter(f"{HOSTILE} 2"), SmallerIsBetter("mass"))
+    both = (Preference.smaller(f"{HOSTILE} 2"), Preference.smaller("mass"))
     limit = float(np.nanquantile(table.values["mass"], 0.9))
     folder = tmp_path_factory.mktemp("page")
     return write_sweep_report(
-        table, folder, preferences=both, requirements=[NotAbove("mass", limit)], source="out/some sweep"
+        table,
+        folder,
+        preferences=both,
+        requirements=[Requirement.at_most("mass", limit)],
+        source="out/some sweep",
     )
 
 
@@ -194,7 +198,7 @@ def test_all_failed_is_a_page_without_a_result(tmp_path: Path) -> None:
 
 def test_a_direction_for_an_answer_that_does_not_exist_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'error'"):
-        write_sweep_report(spread_table(), tmp_path / "page", preferences=[SmallerIsBetter("eror")])
+        write_sweep_report(spread_table(), tmp_path / "page", preferences=[Preference.smaller("eror")])
     assert not (tmp_path / "page").exists()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.presentation.sweep_report import write_sweep_report
-from nlsdesign.sweeps import SmallerIsBetter
+from nlsdesign.sweeps import Preference
 from nlsdesign.sweeps.sweep_table import SweepTable
 from tests.browser import Tab, chromium
 from tests.sweep_tables import HOSTILE, spread_table
@@ -27,7 +27,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     columns = tuple(replace(c, name=HOSTILE) if c.name == "error" else c for c in table.columns)
     values = {**table.values, HOSTILE: table.values["error"]}
     named = SweepTable(columns, values, table.about, table.decks)
-    both = (SmallerIsBetter(HOSTILE), SmallerIsBetter("mass"))
+    both = (Preference.smaller(HOSTILE), Preference.smaller("mass"))
     return write_sweep_report(named, tmp_path_factory.mktemp("page"), preferences=both).page
 
 

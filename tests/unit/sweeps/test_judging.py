@@ -9,11 +9,8 @@ from scipy.stats import norm
 from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError
 from nlsdesign.sweeps.answer_statistics import AnswerSurface, answer_quantiles, answer_surface, dependent_axes
 from nlsdesign.sweeps.preferences import (
-    LargerIsBetter,
-    NearIsBetter,
-    NotAbove,
-    NotBelow,
-    SmallerIsBetter,
+    Preference,
+    Requirement,
     nondominated,
     rank_points,
 )
@@ -33,23 +30,23 @@ def test_the_front_of_points_drawn_by_hand() -> None:
         "mass": np.array([5.0, 5.0, 4.0, 3.0, 1.0, NAN, INF, 1.0, NAN]),
     }
     done = np.array([True] * 5 + [False] + [True] * 3)
-    both = [SmallerIsBetter("error"), SmallerIsBetter("mass")]
+    both = [Preference.smaller("error"), Preference.smaller("mass")]
     ranked = rank_points(answers, done, preferences=both)
     assert ranked.front.tolist() == [0, 3, 4, 7]
     assert np.flatnonzero(ranked.failed).tolist() == [5]
     assert np.flatnonzero(ranked.incomplete).tolist() == [6, 8]
     assert not ranked.missed.any()
-    turned = rank_points(answers, done, preferences=[LargerIsBetter("error"), LargerIsBetter("mass")])
+    turned = rank_points(answers, done, preferences=[Preference.larger("error"), Preference.larger("mass")])
     assert turned.front.tolist() == [4, 7, 2, 1]
-    near = rank_points(answers, done, preferences=[NearIsBetter("error", 2.2)])
+    near = rank_points(answers, done, preferences=[Preference.near("error", 2.2)])
     assert near.front.tolist() == [1, 3]
 
 
 def test_a_miss_is_on_no_front_and_betters_nothing() -> None:
     answers = {"error": np.array([1.0, 2.0, 3.0]), "strain": np.array([9.0, 1.0, NAN])}
     ranked = rank_points(
-        answers, np.ones(3, dtype=bool), preferences=[SmallerIsBetter("error")],
-        requirements=[NotAbove("strain", 3.0), NotBelow("error", 1.5)],
+        answers, np.ones(3, dtype=bool), preferences=[Preference.smaller("error")],
+        requirements=[Requirement.at_most("strain", 3.0), Requirement.at_least("error", 1.5)],
     )  # fmt: skip
     assert ranked.front.tolist() == [1]
     assert np.flatnonzero(ranked.missed).tolist() == [0, 2]
@@ -60,7 +57,7 @@ def test_nothing_is_better_where_no_direction_is_stated() -> None:
     ranked = rank_points({"a": np.array([1.0, NAN])}, np.array([True, False]))
     assert not len(ranked.front)
     assert ranked.compared.tolist() == [True, False]
-    empty = rank_points({"a": np.zeros(0)}, np.zeros(0, dtype=bool), preferences=[SmallerIsBetter("a")])
+    empty = rank_points({"a": np.zeros(0)}, np.zeros(0, dtype=bool), preferences=[Preference.smaller("a")])
     assert not len(empty.front)
 
 
@@ -75,8 +72,8 @@ def test_the_front_agrees_with_its_definition_on_random_points() -> None:
 def test_a_name_that_does_not_exist_and_two_directions_are_refused() -> None:
     answers, done = {"torque_error": np.zeros(2)}, np.ones(2, dtype=bool)
     with pytest.raises(UnknownNameError, match="did you mean 'torque_error'"):
-        rank_points(answers, done, preferences=[SmallerIsBetter("torque_eror")])
-    twice = [SmallerIsBetter("torque_error"), LargerIsBetter("torque_error")]
+        rank_points(answers, done, preferences=[Preference.smaller("torque_eror")])
+    twice = [Preference.smaller("torque_error"), Preference.larger("torque_error")]
     with pytest.raises(ValueRangeError, match="two directions"):
         rank_points(answers, done, preferences=twice)
 

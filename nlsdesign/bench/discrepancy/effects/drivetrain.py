@@ -28,7 +28,7 @@ from ....components import (
 from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity
 from ....foundation.spread import RelativeSpread
-from ..fitting import Continuation, Plain
+from ..fitting import Continuation, Strategy
 from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, wrapped
 from .friction import tied
 from .places import (
@@ -258,7 +258,7 @@ def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
     edited, body, unknowns = _shaft(assembly, driver, (4.0,))
     ends = tuple(body if end == driver else end for end in part.between)
     yield Edit(
-        edited.with_part(name, replace(part, between=ends)), unknowns, {"strategy": Plain(takes_long=True)}
+        edited.with_part(name, replace(part, between=ends)), unknowns, {"strategy": Strategy(takes_long=True)}
     )
 
 
@@ -291,7 +291,7 @@ def _gear_with_play(assembly: Assembly, body: str) -> Iterator[Edit]:
         replace(stiffness, name=f"{shaft}.flanks.stiffness.stiffness", null=None),
         replace(loss, name=f"{shaft}.flanks.loss.damping", starts=(2.5 * inertia.starts[0],)),
     )
-    yield Edit(edited, unknowns, {"strategy": Plain(takes_long=True)})
+    yield Edit(edited, unknowns, {"strategy": Strategy(takes_long=True)})
 
 
 torque_ripple = Effect(

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 from ....components import Assembly, Element, Part
 from ....components.sensing.sensors import Sensor
 from ....foundation.quantity import Quantity
-from ..fitting import Plain, Strategy
+from ..fitting import Strategy
 
 SOURCE = "fitted to bench records"
 
@@ -95,7 +95,7 @@ class Candidate:
     unknowns: tuple[Unknown, ...]
     signature: str
     source: str
-    strategy: Strategy = field(default_factory=Plain)
+    strategy: Strategy = field(default_factory=Strategy)
     explains_lag: bool = False
     bends_reading: bool = False
     simpler: tuple[str, ...] = ()

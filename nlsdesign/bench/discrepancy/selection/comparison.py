@@ -30,8 +30,8 @@ from ..effects.friction import with_resolved_signs
 from ..fitting import (
     FitProblem,
     Key,
-    Plain,
     Start,
+    Strategy,
     Tally,
     explains_enough,
     fit_of_nothing,
@@ -86,7 +86,7 @@ class HypothesisFit:
                 reason,
                 next_step="declare one of them in the deck and diagnose what is left",
             )
-        method, strategy = method_for(problem), hypothesis.newest.strategy if new else Plain()
+        method, strategy = method_for(problem), hypothesis.newest.strategy if new else Strategy()
         try:
             screened = bool(new) and problem.coarse and not problem.has_free_flight
             if screened and (none := fit_of_nothing(problem)):

@@ -25,16 +25,7 @@ from ....simulation.sampled_batch import PLANT, SampledSystem
 from ...observer.corrected.corrected_cascade import PREFIX
 from ..closed_loop import ClosedLoop
 from ..laws.law_writer import DESIRED
-from .linear_parts import (
-    LinearMode,
-    LinearPlant,
-    SlidingPlant,
-    SlopedTables,
-    TableSlope,
-    block_at,
-    linear_plant,
-    with_fine_counts,
-)
+from .linear_parts import SLIDING, LinearPlant, block_at, linear_plant, with_fine_counts
 
 Complex = NDArray[np.complex128]
 
@@ -66,7 +57,12 @@ class LinearLoop:
     b_next: Array
     c: Array
     d: Array
-    mode: LinearMode  # of the plant's dry friction
+    speed: float  # of the driven body, at which the slopes of the plant are taken
+
+    @property
+    def mode(self) -> str:
+        """In which mode of its dry friction the plant is linearised, in words."""
+        return f"sliding (slopes at {self.speed:g} rad/s)" if self.speed else "stuck (slopes at rest)"
 
     def poles(self) -> Complex:
         """Return the closed-loop poles s = ln(z)/T in 1/s, the slowest first, shape (n, states).
@@ -127,15 +123,16 @@ def linear_loop(
     angles: Sequence[float] | Array,
     *,
     opened: Sequence[str] = (),
-    mode: LinearMode | None = None,
-    tables: TableSlope | None = None,
+    speed: float = SLIDING,
+    frozen_tables: bool = False,
 ) -> LinearLoop:
     """Linearise a closed loop at rest at many angles of its spring.
 
     ``opened``: inputs by full name at which the loop is cut open: the current of the plant, or an input of
     observer or controller. What would drive them is an output. The desired torque and the prescribed motions
-    of the plant are inputs always. ``mode``: of the plant's dry friction; sliding by default. ``tables``: how
-    looked-up tables take part; with their slopes by default.
+    of the plant are inputs always. ``speed``: of the driven body, at which the slopes of the plant are taken;
+    zero for a plant that is stuck in its dry friction. ``frozen_tables``: whether looked-up tables are held
+    at the angle, where they follow it in the controller.
     """
     at = np.atleast_1d(np.asarray(angles, dtype=float))
     if not len(at):
@@ -146,19 +143,18 @@ def linear_loop(
     for name in opened:
         if name not in (*system.sources, f"{PLANT}.{system.driven}"):
             raise unknown_name("input of the loop", name, [*system.sources, f"{PLANT}.{system.driven}"])
-    plant = plant_of(system, at, mode or SlidingPlant())
-    return assembled(system, plant, at, cut=tuple(opened), tables=tables or SlopedTables(),
-                     mode=mode or SlidingPlant())  # fmt: skip
+    plant = plant_of(system, at, speed)
+    return assembled(system, plant, at, cut=tuple(opened), frozen_tables=frozen_tables, speed=speed)
 
 
-def plant_of(system: SampledSystem, angles: Array, mode: LinearMode) -> LinearPlant:
+def plant_of(system: SampledSystem, angles: Array, speed: float) -> LinearPlant:
     """Return the plant of a system, linearised with all signals that are wired."""
     start = f"{PLANT}."
     wired = [s.removeprefix(start) for s in system.sources.values() if s.startswith(start)]
     spring = series_spring(system.plant)
     signals = [*wired, spring.effort, spring.motion]
     signals = [name for name in dict.fromkeys(signals) if name != system.driven]
-    return linear_plant(system.plant, angles, driven=str(system.driven), signals=tuple(signals), mode=mode)
+    return linear_plant(system.plant, angles, driven=str(system.driven), signals=tuple(signals), speed=speed)
 
 
 def assembled(
@@ -167,13 +163,13 @@ def assembled(
     angles: Array,
     *,
     cut: tuple[str, ...],
-    tables: TableSlope,
-    mode: LinearMode,
+    frozen_tables: bool,
+    speed: float,
 ) -> LinearLoop:
     """Return the whole loop of a linearised plant and the blocks of a system, at rest."""
-    writer = _Assembler(system, plant, cut, tables)
+    writer = _Assembler(system, plant, cut, frozen_tables=frozen_tables)
     writer.rest()
-    return writer.loop(angles, mode)
+    return writer.loop(angles, speed)
 
 
 def restless(system: SampledSystem) -> ConvergenceError:
@@ -189,9 +185,9 @@ class _Assembler:
     """Puts plant and blocks together by rows over all states and open inputs."""
 
     def __init__(
-        self, system: SampledSystem, plant: LinearPlant, cut: tuple[str, ...], tables: TableSlope
+        self, system: SampledSystem, plant: LinearPlant, cut: tuple[str, ...], *, frozen_tables: bool
     ) -> None:
-        self.system, self.plant, self.cut, self.tables = system, plant, cut, tables
+        self.system, self.plant, self.cut, self.frozen_tables = system, plant, cut, frozen_tables
         self.n = len(plant.drive)
         self.driven = f"{PLANT}.{system.driven}"
         prescribed = [f"{PLANT}.{name}" for name in plant.inputs[1:]]
@@ -323,7 +319,9 @@ class _Assembler:
             sources = [name if name in self.cut else self.system.sources[name] for name in names]
             # A cut loop rests where the closed one does.
             resting = [values[self.system.sources[name]] for name in names]
-            point = block_at(model, self.tables, self.state[b], np.stack(resting, axis=1))
+            point = block_at(
+                model, self.state[b], np.stack(resting, axis=1), frozen_tables=self.frozen_tables
+            )
             given = np.stack([rows[source] for source in sources], axis=1)
             first, count = self.first[b], len(model.states)
             after, out = point.b @ given, point.d @ given
@@ -334,7 +332,7 @@ class _Assembler:
             following[b] = (point.following, after)
         return following
 
-    def loop(self, angles: Array, mode: LinearMode) -> LinearLoop:
+    def loop(self, angles: Array, speed: float) -> LinearLoop:
         """Return the whole."""
         step, states, n = self.system.sample_time, len(self.plant.states), self.n
         _, rows, following = self.evaluated(at_rest=False)
@@ -362,5 +360,5 @@ class _Assembler:
         return LinearLoop(
             angles, self.torque, self.plant.drive, reached, step, self.states, self.inputs, outputs,
             whole[:, :, : len(self.states)], whole[:, :, len(self.states) :], after,
-            shown[:, :, : len(self.states)], shown[:, :, len(self.states) :], mode,
+            shown[:, :, : len(self.states)], shown[:, :, len(self.states) :], speed,
         )  # fmt: skip

@@ -9,7 +9,6 @@ the count of an encoder of the model; other uses of floor, such as the interval 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -27,6 +26,12 @@ from ....model.transform import named
 from ....simulation.buffered import Buffered
 from ...analysis.rest import evaluate_rows, rate_state, rest_states
 
+SLIDING = 1.0
+"""Speed in rad/s or m/s at which the slopes of a moving plant are taken.
+
+It lies far above the creep speed of smooth dry friction, which is constant there and adds no slope. At speed
+zero the plant is stuck: dry friction acts as a dashpot, its limit over its creep speed.
+"""
 _PARAMETER = 3
 _FOLLOWS: dict[tuple[object, ...], str] = {
     (ca.OP_DIV, "", "count"): "ratio",
@@ -83,87 +88,6 @@ def _without_rounding(operation: int, operands: Sequence[_Counted]) -> _Counted:
     return _Counted(applied(operation, [each.value for each in operands]), kind, ratio)
 
 
-class LinearMode(ABC):
-    """In which mode of its dry friction the plant is linearised."""
-
-    @property
-    @abstractmethod
-    def speed(self) -> float:
-        """Speed of the driven body at which the slopes are taken, in rad/s or m/s."""
-
-
-@dataclass(frozen=True)
-class SlidingPlant(LinearMode):
-    """The plant moves: dry friction is constant and adds no slope.
-
-    Parameters
-    ----------
-    at
-        Speed at which the slopes are taken, in rad/s; far above the creep speed of smooth dry friction.
-    """
-
-    at: float = 1.0
-
-    @property
-    def speed(self) -> float:
-        """Speed at which the slopes are taken, in rad/s."""
-        return self.at
-
-    def __str__(self) -> str:
-        return f"sliding (slopes at {self.at:g} rad/s)"
-
-
-@dataclass(frozen=True)
-class StuckPlant(LinearMode):
-    """The plant rests: smooth dry friction acts as a dashpot, its limit over its creep speed."""
-
-    @property
-    def speed(self) -> float:
-        """Zero."""
-        return 0.0
-
-    def __str__(self) -> str:
-        return "stuck (slopes at rest)"
-
-
-class TableSlope(ABC):
-    """How the looked-up tables of a block take part in a linearisation."""
-
-    @abstractmethod
-    def of(self, table: Table, at: Array) -> Array:
-        """Return the slopes of all columns over the argument, shape (n, columns).
-
-        Parameters
-        ----------
-        table
-            Of a block.
-        at
-            Arguments, shape (n,).
-        """
-
-
-@dataclass(frozen=True)
-class SlopedTables(TableSlope):
-    """The tables follow their argument, as they do in the controller."""
-
-    def of(self, table: Table, at: Array) -> Array:
-        """Return the slope between the grid points around each argument; zero beyond the ends."""
-        grid = table.grid
-        left = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
-        cell = (grid[left + 1] - grid[left])[:, None]
-        slope: Array = (table.values[left + 1] - table.values[left]) / cell
-        return np.where(((at >= grid[0]) & (at <= grid[-1]))[:, None], slope, 0.0)
-
-
-@dataclass(frozen=True)
-class FrozenTables(TableSlope):
-    """The tables are held at the angle, as in the usual argument for scheduled gains."""
-
-    def of(self, table: Table, at: Array) -> Array:
-        """Return zeros."""
-        return np.zeros((len(at), table.values.shape[1]))
-
-
 @dataclass(frozen=True, eq=False)
 class LinearPlant:
     """A plant linearised at many angles: ẋ = A x + B u, signals = C x + D u."""
@@ -200,11 +124,12 @@ class LinearPlant:
 
 
 def linear_plant(
-    plant: FlatModel, angles: Array, *, driven: str, signals: tuple[str, ...], mode: LinearMode
+    plant: FlatModel, angles: Array, *, driven: str, signals: tuple[str, ...], speed: float
 ) -> LinearPlant:
     """Linearise a plant at rest at many angles of its driven body.
 
-    ``plant``: continuous; prescribed motions stay at their start values.
+    ``plant``: continuous; prescribed motions stay at their start values. ``speed``: of the driven body, at
+    which the slopes are taken.
     """
     motion = measured_motion(plant)
     names = [v.name for v in plant.states]
@@ -228,7 +153,7 @@ def linear_plant(
     inputs = np.tile(start, (len(angles), 1))
     inputs[:, places[0]] = drive
     moving = rest.copy()
-    moving[:, rate] = mode.speed
+    moving[:, rate] = speed
     at_rest = evaluate_rows(function, rest, inputs, p)[4]
     a, b, c, d = evaluate_rows(function, moving, inputs, p)[:4]
     n, states, count = len(angles), len(names), len(order)
@@ -274,10 +199,11 @@ class BlockPoint:
     d: Array
 
 
-def block_at(model: FlatModel, tables: TableSlope, state: Array, inputs: Array) -> BlockPoint:
+def block_at(model: FlatModel, state: Array, inputs: Array, *, frozen_tables: bool) -> BlockPoint:
     """Return values and slopes of a discrete block with its tables at many points.
 
-    ``state``, ``inputs``: shapes (n, states) and (n, inputs).
+    ``state``, ``inputs``: shapes (n, states) and (n, inputs). ``frozen_tables``: whether tables are held at
+    the angle, as in the usual argument for scheduled gains; else they follow it, as in the controller.
     """
     names, n = [v.name for v in (*model.states, *model.inputs)], len(state)
     columns, into = [np.zeros((n, 0))], [np.zeros((n, 0, len(names)))]
@@ -286,7 +212,7 @@ def block_at(model: FlatModel, tables: TableSlope, state: Array, inputs: Array) 
         at = np.concatenate([state, inputs], axis=1)[:, place]
         columns.append(np.array([table.look_up(float(v)) for v in at]))
         slope = np.zeros((n, table.values.shape[1], len(names)))
-        slope[:, :, place] = tables.of(table, at)
+        slope[:, :, place] = 0.0 if frozen_tables else _table_slope(table, at)
         into.append(slope)
     w, dw = np.concatenate(columns, axis=1), np.concatenate(into, axis=1)
     p = model.start(model.parameters)
@@ -297,6 +223,15 @@ def block_at(model: FlatModel, tables: TableSlope, state: Array, inputs: Array) 
         fx + fw @ dw[:, :, :count], fu + fw @ dw[:, :, count:],
         yx + yw @ dw[:, :, :count], yu + yw @ dw[:, :, count:],
     )  # fmt: skip
+
+
+def _table_slope(table: Table, at: Array) -> Array:
+    """Return the slopes of all columns around each argument, shape (n, columns); zero beyond the ends."""
+    grid = table.grid
+    left = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+    cell = (grid[left + 1] - grid[left])[:, None]
+    slope: Array = (table.values[left + 1] - table.values[left]) / cell
+    return np.where(((at >= grid[0]) & (at <= grid[-1]))[:, None], slope, 0.0)
 
 
 class _AtPoints:

@@ -21,7 +21,7 @@ from ....simulation.sampled_batch import PLANT
 from ..closed_loop import ClosedLoop
 from ..laws.law_writer import GAIN
 from .linear_loop import Complex, LinearLoop, assembled, linear_loop, plant_of
-from .linear_parts import LinearMode, LinearPlant, SlidingPlant, SlopedTables, TableSlope, with_fine_counts
+from .linear_parts import SLIDING, LinearPlant, with_fine_counts
 
 _POINTS = 600
 
@@ -66,8 +66,8 @@ def loop_margins(
     angles: Sequence[float] | Array,
     *,
     opening: str | None = None,
-    mode: LinearMode | None = None,
-    tables: TableSlope | None = None,
+    speed: float = SLIDING,
+    frozen_tables: bool = False,
 ) -> LoopMargins:
     """Return gain, phase and delay margins at rest at many angles.
 
@@ -82,28 +82,32 @@ def loop_margins(
         ``loop.desired`` cuts where desired and estimated torque are compared, so that the gain is that of the
         whole torque controller while its compensation and velocity loop stay closed. What a law feeds forward
         from the desired torque passes beside that comparison and takes no part.
-    mode
-        Of the plant's dry friction; sliding by default.
-    tables
-        How looked-up tables take part; with their slopes by default.
+    speed
+        Of the driven body, at which the slopes of the plant are taken; zero for one stuck in its friction.
+    frozen_tables
+        Whether looked-up tables are held at the angle, where they follow it in the controller.
 
     Raises
     ------
     UnknownNameError
         If the opening is no input of the loop.
     """
-    closed = linear_loop(loop, angles, mode=mode, tables=tables)
+    closed = linear_loop(loop, angles, speed=speed, frozen_tables=frozen_tables)
     frequencies = np.geomspace(0.02, 0.5 / loop.sample_time, _POINTS)
     current = f"{PLANT}.{loop.names.current}"
     opening = opening or current
     if opening == loop.desired:
         compared = _compared_only(loop)
-        plain = closed if compared is loop else linear_loop(compared, angles, mode=mode, tables=tables)
+        plain = (
+            closed
+            if compared is loop
+            else linear_loop(compared, angles, speed=speed, frozen_tables=frozen_tables)
+        )
         followed = plain.response(loop.estimate, loop.desired, frequencies)
         followed[~closed.stable()] = 0.0  # has no margins; neither has a loop that does not rest
         gain = followed / (1.0 - followed)
     else:
-        opened = linear_loop(loop, angles, opened=(opening,), mode=mode, tables=tables)
+        opened = linear_loop(loop, angles, opened=(opening,), speed=speed, frozen_tables=frozen_tables)
         system = loop.system([loop.desired])
         last = list(system.blocks)[-1]
         source = f"{last}.{system.blocks[last].outputs[0].name}"
@@ -205,8 +209,8 @@ def output_impedance(
     *,
     frequencies: Sequence[float] | Array | None = None,
     load: str | None = None,
-    mode: LinearMode | None = None,
-    tables: TableSlope | None = None,
+    speed: float = SLIDING,
+    frozen_tables: bool = False,
 ) -> OutputImpedance:
     """Return the impedance that a load feels at many angles of the spring.
 
@@ -220,10 +224,10 @@ def output_impedance(
         In Hz; by default 200 from 0.1 Hz to 0.4 of the sampling frequency.
     load
         Name of the load; decided from the structure of the plant if it is left out.
-    mode
-        Of the plant's dry friction; sliding by default.
-    tables
-        How looked-up tables take part; with their slopes by default.
+    speed
+        Of the driven body, at which the slopes of the plant are taken; zero for one stuck in its friction.
+    frozen_tables
+        Whether looked-up tables are held at the angle, where they follow it in the controller.
 
     Raises
     ------
@@ -241,7 +245,7 @@ def output_impedance(
             f"frequencies {at.min():g} to {at.max():g} Hz",
             f"must lie between 0 and {0.5 / loop.sample_time:g} Hz",
         )
-    linear = linear_loop(loop, angles, mode=mode, tables=tables)
+    linear = linear_loop(loop, angles, speed=speed, frozen_tables=frozen_tables)
     turn = 2j * math.pi * at
     torque = linear.response(loop.torque, f"{PLANT}.{moved.motion}", at)
     torque = torque + turn * linear.response(loop.torque, f"{PLANT}.{moved.rate}", at)
@@ -277,7 +281,7 @@ def coupled_stability(
     stiffnesses: Sequence[float] | Array,
     damping: float = 0.0,
     load: str | None = None,
-    mode: LinearMode | None = None,
+    speed: float = SLIDING,
 ) -> CoupledStability:
     """Return whether the loop is stable on each load of a range, at rest at one angle of the spring.
 
@@ -296,8 +300,8 @@ def coupled_stability(
         Between load and frame in N·m·s/rad.
     load
         Name of the load; decided from the structure of the plant if it is left out.
-    mode
-        Of the plant's dry friction; sliding by default.
+    speed
+        Of the driven body, at which the slopes of the plant are taken; zero for one stuck in its friction.
 
     Raises
     ------
@@ -312,14 +316,13 @@ def coupled_stability(
         raise ValueRangeError(
             "load", "needs positive inertias, and stiffnesses and a damping that are not negative"
         )
-    mode = mode or SlidingPlant()
     fine = replace(loop, plant=with_fine_counts(loop.plant))
     system = fine.system([loop.desired])
-    plant = plant_of(system, np.array([angle]), mode)
+    plant = plant_of(system, np.array([angle]), speed)
     masses, springs = (grid.ravel() for grid in np.meshgrid(j, k, indexing="ij"))
     names = (moved.motion, moved.rate, series_spring(loop.plant).effort)
     free = _on_load(plant, names, masses, springs, damping)
-    whole = assembled(system, free, np.full(len(masses), angle), cut=(), tables=SlopedTables(), mode=mode)
+    whole = assembled(system, free, np.full(len(masses), angle), cut=(), frozen_tables=False, speed=speed)
     z = np.linalg.eigvals(whole.a)
     largest = np.take_along_axis(z, np.argmax(np.abs(z), axis=1)[:, None], axis=1)[:, 0]
     shape = (len(j), len(k))

@@ -21,7 +21,6 @@ from ...analysis.rest import rate_state, rest_states
 from ..closed_loop import CONTROLLER, ClosedLoop
 from ..laws.known_drive import check_torque
 from .linear_loop import linear_loop
-from .linear_parts import LinearMode
 from .loop_verdict import DIVERGED, LIMIT_CYCLE, LoopJudge, LoopVerdict
 from .responses import PeriodicDrive, PeriodicRun, held_drive, run_periodic, sine_drive
 
@@ -320,20 +319,17 @@ def linear_onset(
     *,
     between: tuple[float, float],
     largest: float,
-    mode: LinearMode | None = None,
 ) -> tuple[float, float]:
     """Return the gain at which the linearised loop becomes unstable at some angle, and the frequency in Hz.
 
     Infinite and not a number where it is stable up to the end of the range; zero where it is unstable already
     at its beginning.
-
-    ``mode``: of the plant's dry friction; sliding by default.
     """
     angles = np.linspace(-largest, largest, 21)
 
     def lost(value: float) -> tuple[bool, float]:
         changed = replace(loop, controller=loop.controller.with_values({gain: value}))
-        linear = linear_loop(changed, angles, mode=mode)
+        linear = linear_loop(changed, angles)
         z = np.linalg.eigvals(linear.a[linear.reached]).ravel()
         worst = z[np.argmax(np.abs(z))]
         return bool(np.abs(worst) > 1.0 + 1e-9), float(abs(np.angle(worst))) / (

@@ -149,7 +149,7 @@ class LoopEvaluation:
                 "settled_after_kick": json_number(kicked.held) if kicked else None,
                 "limit_cycling_after_kick": json_number(self.spread.cycling),
             },
-            "angle_rad": _plain(linear.angles), "mode": str(linear.mode),
+            "angle_rad": _plain(linear.angles), "mode": linear.mode,
             "resolution_Nm": _plain(self.resolution),
             "impedance": {"angle_rad": _plain(self.impedance.linear.angles),
                           "active_from_Hz": _plain(self.impedance.first_active())},

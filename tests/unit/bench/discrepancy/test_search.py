@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy.effects.effect import Candidate, EffectFunction, Unknown
-from nlsdesign.bench.discrepancy.fitting import Continuation, Plain, Tally
+from nlsdesign.bench.discrepancy.fitting import Continuation, Strategy, Tally
 from nlsdesign.bench.discrepancy.selection.comparison import Comparison
 from nlsdesign.bench.discrepancy.selection.criteria import Criteria
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
@@ -34,13 +34,13 @@ def effect(
     name: str,
     numbers: int = 1,
     *,
-    strategy: Plain | Continuation | None = None,
+    strategy: Strategy | None = None,
     simpler: tuple[str, ...] = (),
 ) -> EffectFunction:
     unknowns = tuple(Unknown(f"{name}.{k}", (1.0,), 0.1, 10.0) for k in range(numbers))
 
     def of(assembly: Assembly) -> Sequence[Candidate]:
-        way = strategy or Plain()
+        way = strategy or Strategy()
         return [Candidate(name, "motor", assembly, unknowns, "sign", "source", way, simpler=simpler)]
 
     return of

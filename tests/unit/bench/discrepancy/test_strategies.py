@@ -20,7 +20,6 @@ from nlsdesign.bench.discrepancy.fitting import (
     FitProblem,
     Key,
     Limits,
-    Plain,
     RobustOverFreeFlight,
     Smooth,
     Start,
@@ -158,7 +157,7 @@ def test_only_a_further_effect_can_be_too_expensive() -> None:
 def test_the_best_start_is_fitted_first_and_what_promises_less_not_at_all(notebook: Notebook) -> None:
     notebook.costs = {0.1: 5.0, 0.5: 2.0}
     assert isinstance(method_for(problem()), Smooth)
-    ended = method_for(problem()).fit(problem(), Plain())
+    ended = method_for(problem()).fit(problem(), Strategy())
     assert ended.values == {"spring.gap": 0.5}
     assert [f["start"] for f in notebook.fits] == [0.5]
     assert notebook.fits[0]["records"] == ["a", "b", "c", "d"]
@@ -185,10 +184,10 @@ def test_a_start_without_a_response_says_nothing_of_the_others(notebook: Noteboo
 
 def test_a_fit_does_not_follow_what_is_unpredictable_unless_nothing_else_is_left(notebook: Notebook) -> None:
     set_aside = problem(unpredictable=frozenset({("spring", "d")}))
-    Smooth().fit(set_aside, Plain())
+    Smooth().fit(set_aside, Strategy())
     assert notebook.fits[0]["records"] == ["a", "b", "c"]
     everything = problem(unpredictable=frozenset(("spring", n) for n in "abcd"))
-    Smooth().fit(everything, Plain())
+    Smooth().fit(everything, Strategy())
     assert notebook.fits[-1]["records"] == ["a", "b", "c", "d"]
     after = {("spring", n): Tally(1e9, 100, 50.0) for n in "abcde"}
     assert Smooth().set_aside(set_aside, ENDED, after) == {("spring", "d")}
@@ -212,7 +211,7 @@ def test_free_flight_is_fitted_to_the_slower_records_first_and_robustly(notebook
     flying = problem(stiff=True)
     method = method_for(flying)
     assert isinstance(method, RobustOverFreeFlight)
-    method.fit(flying, Plain())
+    method.fit(flying, Strategy())
     slow, last = notebook.fits[0], notebook.fits[-1]
     assert (slow["records"], slow["evaluations"], slow["known"]) == (["a", "b", "c"], 6, {})
     assert slow["least"] == pytest.approx(0.1 * last["least"])
@@ -221,10 +220,10 @@ def test_free_flight_is_fitted_to_the_slower_records_first_and_robustly(notebook
 
 
 def test_a_further_effect_and_a_polish_have_fewer_evaluations(notebook: Notebook) -> None:
-    RobustOverFreeFlight().fit(problem(stiff=True, effects=2), Plain())
+    RobustOverFreeFlight().fit(problem(stiff=True, effects=2), Strategy())
     assert [f["evaluations"] for f in notebook.fits] == [2, 1]
     notebook.fits.clear()
-    RobustOverFreeFlight().fit(problem(stiff=True, coarse=False), Plain())
+    RobustOverFreeFlight().fit(problem(stiff=True, coarse=False), Strategy())
     assert [(f["evaluations"], f["records"]) for f in notebook.fits] == [(2, ["a", "b", "c", "d"])]
 
 
@@ -283,7 +282,7 @@ def test_backlash_alone_brings_a_continuation_and_it_keeps_what_means_the_same()
     (candidate,) = backlash(declare(load_deck("test_rig")))
     strategy = candidate.strategy
     assert isinstance(strategy, Continuation)
-    assert (strategy.takes_long, Plain().takes_long, strategy.hold) == (True, False, 1.2)
+    assert (strategy.takes_long, Strategy().takes_long, strategy.hold) == (True, False, 1.2)
     same = strategy._same_numbers(candidate.assembly)
     assert "spring.gap" in same
     assert "motor.inertia" not in same, "a tenth of it is behind the gap in the whole effect"
