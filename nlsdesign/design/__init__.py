@@ -87,6 +87,7 @@ from .optimisation.pareto import ParetoFront, pareto
 from .optimisation.result import CamDesign, LimitState
 from .optimisation.roller_limits import MaximumPressureAngle, MinimumHollowRadius
 from .optimisation.settings import DesignSettings
+from .optimisation.sides import SidesDesign, design_sides
 from .optimisation.solve import GOALS as GOALS
 from .optimisation.solve import design_cam
 from .optimisation.stock import CoilStock, RubberStock, Stock
@@ -163,6 +164,7 @@ __all__ = [
     "RollerContour",
     "RubberStock",
     "SeparateModuli",
+    "SidesDesign",
     "SmoothContour",
     "Spread",
     "SpreadRules",
@@ -189,6 +191,7 @@ __all__ = [
     "contour_of_cam",
     "curve_for_task",
     "design_cam",
+    "design_sides",
     "design_summary",
     "elastic_law",
     "equilibrium_torque",
