@@ -1,6 +1,7 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
 from ..foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
+from .curves.beside import BesideCurve, EngagedSpring, SpringChoice, choose_spring, curve_beside
 from .curves.compliance import OddSpring, OneSidedSpring, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.target import (
@@ -106,6 +107,7 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "AtMost",
+    "BesideCurve",
     "BoltCircle",
     "BothStrokes",
     "CamDesign",
@@ -117,6 +119,7 @@ __all__ = [
     "DesignJob",
     "DesignSettings",
     "EnergyLost",
+    "EngagedSpring",
     "ExponentialTorque",
     "FerruleSeat",
     "Goal",
@@ -168,6 +171,7 @@ __all__ = [
     "SmoothContour",
     "Spread",
     "SpreadRules",
+    "SpringChoice",
     "SpringLimits",
     "Stock",
     "TabulatedStiffness",
@@ -187,8 +191,10 @@ __all__ = [
     "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
+    "choose_spring",
     "contour_from_lever_arm",
     "contour_of_cam",
+    "curve_beside",
     "curve_for_task",
     "design_cam",
     "design_sides",
