@@ -50,6 +50,7 @@ from .jobs.written_design import (
     design_summary,
     write_design,
     write_part,
+    write_sides,
 )
 from .optimisation.coil_limits import GoodmanSafety, MaximumSpringIndex, MaximumTravel, MinimumSpringIndex
 from .optimisation.defaults import safe_limits
@@ -216,4 +217,5 @@ __all__ = [
     "write_design",
     "write_drawings",
     "write_part",
+    "write_sides",
 ]

@@ -171,7 +171,7 @@ def test_the_place_follows_from_what_the_task_asks_for() -> None:
     )
     choice = choose_spring(slow, DRIVE)
     assert choice.best.startswith("beside the drive")
-    assert "100 % of the squared motor torque holds the torque of the joint" in choice.reason
+    assert "follows the angle of the joint, here 100 % of the squared motor torque" in choice.reason
     # A load of friction, moved slowly: no spring can take that over.
     rubbing = Task(
         time=10.0 * time, angle=0.5 * np.sin(2 * np.pi * time), torque=6.0 * np.cos(2 * np.pi * time)

@@ -121,21 +121,22 @@ def curve_beside(
     errors: list[InfeasibleError] = []
     for ways in ((1.0, -1.0),) if both_ways else ((1.0,), (-1.0,)):
         try:
-            options.append(solved(problem, _program(task, drive, problem, ways)))
+            options.append(solved(problem, beside_program(task, drive, problem, ways)))
         except InfeasibleError as error:
             errors.append(error)
     if not options:
         raise errors[0]
     program, optimum = min(options, key=lambda each: problem.goal.of(each[0].motor(each[1].unknowns)))
-    sides = tuple(_sides(program, program.coefficients(optimum.unknowns)))
+    sides = tuple(engaged_sides(program, program.coefficients(optimum.unknowns)))
     cycle = program.cycle
     spring = np.sum([side.torque(cycle.angle) for side in sides], axis=0) if sides else 0.0 * cycle.time
     return BesideCurve(sides, problem.goal, beside_cycle(cycle, program.drive, spring), optimum.bound)
 
 
-def _program(
+def beside_program(
     task: Task | MixedTask, drive: MotorAndGear, problem: TaskProblem, ways: tuple[float, ...]
 ) -> BesideProgram:
+    """Return the program for a spring with a side in each of some ways."""
     cycle, limits = task.sampled(), problem.limits
     span = float(np.ptp(cycle.angle))
     most = float(np.max(np.abs(cycle.torque)))
@@ -152,7 +153,7 @@ def _program(
     )  # fmt: skip
 
 
-def _sides(program: BesideProgram, coefficients: Array) -> list[EngagedSpring]:
+def engaged_sides(program: BesideProgram, coefficients: Array) -> list[EngagedSpring]:
     """Return each side of the torque of the spring, from where it engages or changes its sign, as a table."""
     low, high = (float(f(program.cycle.angle)) for f in (np.min, np.max))
     angles = np.linspace(low, high, _POINTS * program.spline.pieces + 1)
@@ -252,13 +253,24 @@ class SpringChoice:
             share, word = 100.0 * (1.0 - paid[best] / value), "less" if paid[best] < value else "more"
             if name != best:
                 others.append(f"{abs(share):.0f} % {word} than {name} ({value:.3g} {unit})")
-        held, turned = (100.0 * share for share in _shares(self.none))
+        most = motors[best].peaks
+        taken = []
+        for spring, does in (
+            (
+                self.both_ways or self.beside,
+                "A spring beside the drive gives what follows the angle of the joint",
+            ),
+            (self.series, "one in series changes only how the rotor moves"),
+        ):
+            if spring:
+                with_it = spring.best
+                alone = beside_cycle(self.none.cycle, with_it.drive, np.zeros_like(with_it.torque))
+                share = 100.0 * (1.0 - float(np.mean(with_it.torque**2) / np.mean(alone.torque**2)))
+                taken.append(f"{does}, here {share:.0f} % of the squared motor torque")
         return (
             f"{best[0].upper()}{best[1:]}: {paid[best]:.3g} {unit} of {what} a period, {', '.join(others)}. "
-            f"Without a spring {held:.0f} % of the squared motor torque holds the torque of the joint, which "
-            f"a spring beside the drive can take over, and {turned:.0f} % turns the rotor, whose motion one in "
-            f"series can change; now the motor is left with {motors[best].peaks['torque']:.3g} N·m and "
-            f"{motors[best].peaks['speed']:.3g} rad/s at most."
+            f"{'; '.join(taken)}; the motor is left with {most['torque']:.3g} N·m at most, and with "
+            f"{most['speed']:.3g} rad/s."
         )
 
     def __str__(self) -> str:
@@ -270,18 +282,6 @@ class SpringChoice:
             [] if self.beside is None else [f"beside the drive it acts {each}" for each in self.beside.sides]
         )
         return "\n".join([*lines, *sides, self.reason])
-
-
-def _shares(motor: MotorCycle) -> tuple[float, float]:
-    """Return the shares of load and rotor in the mean squares that the motor's torque is the sum of."""
-    cycle, drive = motor.cycle, motor.drive
-    ratio = plain(drive.gear_ratio)
-    squares: list[float] = [
-        float(np.mean(each**2))
-        for each in (cycle.torque / ratio, ratio * plain(drive.inertia) * cycle.acceleration)
-    ]
-    whole = sum(squares)
-    return squares[0] / whole, squares[1] / whole
 
 
 def choose_spring(

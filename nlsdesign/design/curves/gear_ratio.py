@@ -30,17 +30,20 @@ def best_ratio(
     ``first``: unknowns to begin with, at the ratio of the program; ``ratios``: the range.
     """
     size, begin = len(first), program.motor(first)
-    unit = _units(program)
+    # Units of the unknowns in which the energy has slopes of one size.
+    diagonal = np.diag(program.quadratic()[0])
+    unit = 1.0 / np.sqrt(np.maximum(diagonal, max(1e-12 * np.max(diagonal), 1e-300)))
     x = ca.MX.sym("x", size + 2)  # y in its units, log n, and the peak power over that at the beginning
     z, n = ca.vertcat(unit * x[:size], 1.0), ca.exp(x[size])
     paid: Any = ca.MX(0, 1)
     objective: Any = x[size + 1]
     if power:
-        rows = _powers(program, z, n) / begin.peak_power
+        load, rotor, speed = (ca.DM(_whole(each)[::2]) @ z for each in program.parts[:3])
+        rows = (load * speed + n**2 * rotor * speed) / begin.peak_power
         paid = ca.vertcat(rows - objective, -rows - objective)
     else:
-        objective = _energy(program, z, n) / max(begin.heat, 1e-300)
-    limits = _limits(program)
+        objective = energy_of_period(program, z, n) / max(begin.heat, 1e-300)
+    limits = limit_matrices(program)
     held = np.zeros(len(limits[0]), dtype=bool)  # most limits are far away: a row comes in when it is passed
     low = np.concatenate([program.floor / unit, np.log(ratios[:1]), [0.0]])
     high = np.concatenate([np.full(size, np.inf), np.log(ratios[1:]), [np.inf if power else 1.0]])
@@ -68,17 +71,11 @@ def best_ratio(
         held |= passed
 
 
-def _units(program: TaskProgram) -> Array:
-    """Return units of the unknowns in which the energy has slopes of one size."""
-    diagonal = np.diag(program.quadratic()[0])
-    return np.asarray(1.0 / np.sqrt(np.maximum(diagonal, max(1e-12 * np.max(diagonal), 1e-300))))
-
-
 def _whole(affine: Affine) -> Array:
     return np.column_stack([affine.matrix, affine.offset])
 
 
-def _energy(program: TaskProgram, z: Any, n: Any) -> Any:
+def energy_of_period(program: TaskProgram, z: Any, n: Any) -> Any:
     """Return heat and work of the damping in a period over z = (y, 1) and the ratio."""
     drive, cycle = program.drive, program.cycle
     load, rotor, speed = (_whole(each) for each in program.parts[:3])
@@ -89,13 +86,7 @@ def _energy(program: TaskProgram, z: Any, n: Any) -> Any:
     return cycle.period / len(cycle.time) * (over / n**2 + beside + n**2 * times)
 
 
-def _powers(program: TaskProgram, z: Any, n: Any) -> Any:
-    """Return the power at the motor shaft at every other time."""
-    load, rotor, speed = (ca.DM(_whole(each)[::2]) @ z for each in program.parts[:3])
-    return load * speed + n**2 * rotor * speed
-
-
-def _limits(program: TaskProgram) -> list[Array]:
+def limit_matrices(program: TaskProgram) -> list[Array]:
     """Return matrices P, Q and K of the limits |P·z/n + Q·z·n + K·z| ≤ 1."""
     drive, parts = program.drive, program.parts
     load, rotor, speed = (_whole(each)[::THIN] for each in parts[:3])

@@ -194,9 +194,8 @@ class BesideProgram(TaskProgram):
 
     def linear(self) -> BesideProgram:
         """Return the program of springs that are linear from the end of the range on."""
-        size = self.spline.size
-        ones = np.kron(np.eye(len(self.ways)), np.ones((size, 1)))
-        return replace(self, freedom=self.freedom @ ones)
+        ones: Array = np.kron(np.eye(len(self.ways)), np.ones((self.spline.size, 1)))
+        return replace(self, freedom=ones)
 
     def motor(self, unknowns: Array) -> MotorCycle:
         """Return what the motor does beside this spring."""
@@ -357,16 +356,20 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     best end is taken.
     """
     if not np.any(program.parts.speed.matrix):
-        return _least_peak_power_at_known_speed(program)
+        known, ends = program.affine(), np.full(program.freedom.shape[1], np.inf)
+        (torque, offset), speed = known["torque"], known["speed"].offset
+        bounds = program.floor * np.ones_like(ends), ends
+        solution = _least_largest(speed[:, None] * torque, speed * offset, program.limits(), bounds)
+        if not np.all(np.isfinite(solution)):
+            raise conflict(program)
+        return TaskOptimum(solution, float(np.max(np.abs(speed * (torque @ solution + offset)))))
     energetic = least_energy(program).unknowns
     # The spring of least peak power of a motor without inertia: a linear program.
     light = replace(program, drive=replace(program.drive, inertia=0.0, output_inertia=0.0, damping=0.0))
     rows = light.affine()
-    torque, (matrix, offset) = rows["torque"][1][::THIN], rows["speed"]
+    load, (matrix, offset) = rows["torque"][1][::THIN], rows["speed"]
     bounds = np.full(len(energetic), program.floor), np.full(len(energetic), np.inf)
-    solution = _least_largest(
-        torque[:, None] * matrix[::THIN], torque * offset[::THIN], light.limits(), bounds
-    )
+    solution = _least_largest(load[:, None] * matrix[::THIN], load * offset[::THIN], light.limits(), bounds)
     without_inertia = solution if np.all(np.isfinite(solution)) else energetic
     starts = [energetic, without_inertia]
     if len(energetic) > 1:
@@ -379,16 +382,6 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     ]
     tried = starts + [_descended(program, start) for start in starts]
     return TaskOptimum(min(tried, key=lambda each: program.motor(each).peak_power), None)
-
-
-def _least_peak_power_at_known_speed(program: TaskProgram) -> TaskOptimum:
-    rows, size = program.affine(), program.freedom.shape[1]
-    (matrix, offset), (_, speed) = rows["torque"], rows["speed"]
-    bounds = np.full(size, program.floor), np.full(size, np.inf)
-    solution = _least_largest(speed[:, None] * matrix, speed * offset, program.limits(), bounds)
-    if not np.all(np.isfinite(solution)):
-        raise conflict(program)
-    return TaskOptimum(solution, float(np.max(np.abs(speed * (matrix @ solution + offset)))))
 
 
 def _linear_of_least_peak_power(program: TaskProgram) -> list[float]:

@@ -34,6 +34,12 @@ class LipEdge:
     last_support: float  # distance of the last tangent from the centre in m
 
 
+Contours = tuple[Contour, Contour]
+"""Those for positive and for negative angles."""
+Lips = tuple[LipEdge, LipEdge]
+"""Edges under the cable at positive and at negative angles."""
+
+
 def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> LipEdge:
     """Return the edge on which a cable has its centre line on the contour.
 
@@ -155,9 +161,7 @@ def _run_out_end(contour: Contour, over_travel: float) -> float:
     return phi + float(np.interp(over_travel, turned[end - 1 : end + 1], steps[end - 1 : end + 1]))
 
 
-def two_sided_outlines(
-    lips: tuple[LipEdge, LipEdge], numbers: Mapping[str, Quantity]
-) -> tuple[ArcPath, ArcPath]:
+def two_sided_outlines(lips: Lips, numbers: Mapping[str, Quantity]) -> tuple[ArcPath, ArcPath]:
     """Return the lower and the upper half, each closed and clockwise.
 
     ``lips``: under the cable at positive and at negative angles. Turned by half a turn the halves are alike.
@@ -185,7 +189,7 @@ def two_sided_outlines(
     return lower, lower.turned(math.pi)
 
 
-def back_of(lips: tuple[LipEdge, LipEdge], numbers: Mapping[str, Quantity]) -> ArcPath:
+def back_of(lips: Lips, numbers: Mapping[str, Quantity]) -> ArcPath:
     """Return the back from the end of one lip to that of the other, mirrored: round ends, and the body."""
     for lip in lips:
         if lip.last_direction >= math.pi:

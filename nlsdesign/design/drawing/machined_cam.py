@@ -15,7 +15,7 @@ from ...foundation.quantity import Quantity, quantity
 from ..curves.numbers import in_si, plain
 from ..statics.contour import Contour
 from .arc_path import ArcPath
-from .cam_outline import LipEdge, lip_edge, one_sided_outline, two_sided_outlines
+from .cam_outline import Contours, LipEdge, Lips, lip_edge, one_sided_outline, two_sided_outlines
 from .cam_part import CamPart, Hole, check_machinable
 
 _CLEARANCE = quantity(0.1, "mm", source="assumed: a braided cable of this size passes a gap so much wider")
@@ -282,12 +282,7 @@ class MachinedCam(ABC):
         """Return the edge; adds its sharpest radius and what else it derives."""
 
     @abstractmethod
-    def _drawn(
-        self,
-        contours: tuple[Contour, Contour],
-        lips: tuple[LipEdge, LipEdge],
-        numbers: dict[str, Quantity],
-    ) -> DrawnCam:
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
         """Return what is drawn of the contours for both signs of the angle; adds numbers that it derives."""
 
     def _body_radius(self, limit: float, numbers: dict[str, Quantity]) -> None:
@@ -390,12 +385,7 @@ class MachinedTwoSidedCam(MachinedCableCam):
     4.0
     """
 
-    def _drawn(
-        self,
-        contours: tuple[Contour, Contour],
-        lips: tuple[LipEdge, LipEdge],
-        numbers: dict[str, Quantity],
-    ) -> DrawnCam:
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
         radius, clearance = numbers["cable_radius"].number, numbers["channel_clearance"].number
         offset = max((float(each.lever_arms[0]) for each in contours), key=abs)
         if abs(offset) > max(clearance / 2, 1e-6) or min(each.slopes[0] for each in contours) <= 0.0:
@@ -469,12 +459,7 @@ class MachinedOneSidedCam(MachinedCableCam):
         )
         return numbers
 
-    def _drawn(
-        self,
-        contours: tuple[Contour, Contour],
-        lips: tuple[LipEdge, LipEdge],
-        numbers: dict[str, Quantity],
-    ) -> DrawnCam:
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
         contour, lip = contours[0], lips[0]
         radius, wall = numbers["cable_radius"].number, plain(self.minimum_wall)
         self._body_radius(float(np.min(contour.lever_arms)) - radius, numbers)

@@ -16,7 +16,7 @@ from ..curves.numbers import plain
 from ..statics.contour import Contour
 from ..statics.roller_contour import STRAIGHT, RollerContour
 from .arc_path import ArcPath, biarc, joined
-from .cam_outline import LipEdge, back_of, few_arcs
+from .cam_outline import Contours, LipEdge, Lips, back_of, few_arcs
 from .cam_part import Hole
 from .machined_cam import DrawnCam, MachinedCam, derived_size
 
@@ -80,12 +80,7 @@ class MachinedRollerCam(MachinedCam):
         numbers["pitch_radius"] = derived_size(float(contour.centre_radii[0]), "base radius of the contour")
         return roller_edge(contour, over_travel=numbers["over_travel"].number)
 
-    def _drawn(
-        self,
-        contours: tuple[Contour, Contour],
-        lips: tuple[LipEdge, LipEdge],
-        numbers: dict[str, Quantity],
-    ) -> DrawnCam:
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
         made, lip = cast(RollerContour, contours[0]), lips[0]
         self._body_radius(min(lip.last_support, float(made.radii.min())), numbers)
         outline = joined(lip.path, back_of(lips, numbers), lip.path.mirrored(), closed=True)

@@ -12,7 +12,6 @@ from ...foundation.errors import ArrangementError, InfeasibleError, NlsError
 from ...model import flatten
 from ...model.origin import derived
 from ...model.roles import series_cam
-from ...model.structure import CamNames
 from ..curves.target import Target
 from ..statics.equilibrium import with_smooth_cables
 from .goals import Goal
@@ -103,11 +102,19 @@ def design_sides(
                     machine, target=targets[side], free=released, keep=keep, spring=spring, goals=goals,
                     settings=settings,
                 )  # fmt: skip
-                machine, released = _turned(sides[side].actuator, names, cam, side), [names.contour]
+                # The other side on what this one chose.
+                machine, released, other = sides[side].actuator, [names.contour], cam.side(back=side == 0)
+                made = machine[names.name]
+                assert isinstance(made, TwoSidedCam)
+                made = replace(made, lever_arm=other.lever_arm, last_angle=other.last_angle)
+                machine = machine.with_part(names.name, made)
         except InfeasibleError as error:
             errors.append(error.at(_NAMES[1 - first if sides else first]))
             continue
-        designs.append(_joined(actuator, names.name, cam, (sides[0], sides[1]), _NAMES[first]))
+        both = sides[0], sides[1]
+        parts = sides[first].actuator.with_part(names.name, two_contours(cam, names.name, both)).parts
+        joined = derived(replace(actuator, parts=parts), actuator, "designed")
+        designs.append(SidesDesign(joined, *both, _NAMES[first]))
         if designs[-1].met:
             return designs[-1]
     if not designs:
@@ -118,25 +125,12 @@ def design_sides(
 _NAMES = ("front", "back")
 
 
-def _turned(machine: Assembly, names: CamNames, cam: LopsidedCam, side: int) -> Assembly:
-    """Return a machine with a designed side, with the other contour in its place."""
-    other, made = cam.side(back=side == 0), machine[names.name]
-    assert isinstance(made, TwoSidedCam)
-    made = replace(made, lever_arm=other.lever_arm, last_angle=other.last_angle)
-    return machine.with_part(names.name, made)
-
-
-def _joined(
-    actuator: Assembly, path: str, cam: LopsidedCam, sides: tuple[CamDesign, CamDesign], first: str
-) -> SidesDesign:
-    """Return both sides in one cam, with the sizes that the first one chose."""
+def two_contours(cam: LopsidedCam, path: str, sides: tuple[CamDesign, CamDesign]) -> LopsidedCam:
+    """Return both designed contours in one cam, with what the sides share."""
     front, back = (side.actuator[path] for side in sides)
     assert isinstance(front, TwoSidedCam)
     assert isinstance(back, TwoSidedCam)
-    made = replace(
+    return replace(
         cam, lever_arm=front.lever_arm, last_angle=front.last_angle, back_lever_arm=back.lever_arm,
         back_last_angle=back.last_angle, elements=front.elements, anchor_distance=front.anchor_distance,
     )  # fmt: skip
-    chosen = sides[_NAMES.index(first)].actuator
-    machine = replace(actuator, parts=chosen.with_part(path, made).parts)
-    return SidesDesign(derived(machine, actuator, "designed"), *sides, first)
