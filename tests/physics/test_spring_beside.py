@@ -7,6 +7,7 @@ a driven joint integrated by scipy from laws that are written here.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,19 +31,28 @@ from nlsdesign.components import (
     through,
     tie,
 )
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.design import (
     DesignSettings,
+    MachinedTwoSidedCam,
     MaximumCableTension,
+    MinimumRadiusOfCurvature,
     PowerTorque,
     PretensionRange,
     design_cam,
     design_sides,
     equilibrium_torque,
+    motor_and_gear,
+    walking_task,
+    write_sides,
 )
+from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, InfeasibleError
 from nlsdesign.model import FlatModel, flatten
+from nlsdesign.model.roles import passed_ends
 from nlsdesign.simulation import simulate
+from nlsdesign.simulation.limits_reached import limits_reached
 from tests.physics.table import Row
 
 FRONT = (0.0, 0.001, 0.004, 0.009, 0.0128, 0.0147, 0.0158)
@@ -225,3 +235,47 @@ def test_what_cannot_be_designed_on_both_sides_says_so() -> None:
     keep = [PretensionRange(4e-3, 5e-3), MaximumCableTension(1.0)]
     with pytest.raises(InfeasibleError, match=r"front: .*MaximumCableTension"):
         design_sides(knee(), targets=SIDES, keep=keep, settings=QUICK)
+
+
+def test_each_side_ends_where_its_own_contour_does() -> None:
+    """Ends that are passed are named by their own side, at rest and over time."""
+    model = shaft(LOPSIDED)
+    assert passed_ends(model, -0.45, 1.0) == {}
+    assert passed_ends(model, -1.2, 0.2) == {"s.cam.back": 0.5}
+    assert passed_ends(model, -0.45, 1.2) == {"s.cam": 1.1}
+    run = simulate(
+        model,
+        np.linspace(0.0, 1.0, 101),
+        inputs={
+            "shaft.angle": lambda t: 0.7 * math.sin(6.0 * t),
+            "shaft.speed": lambda t: 4.2 * math.cos(6.0 * t),
+        },
+    )
+    (reached,) = limits_reached(model, run)
+    assert reached.limit == -0.5
+
+
+def test_the_drive_of_the_deck_loses_little_beside_its_spring(tmp_path: Path) -> None:
+    """The bundled deck on the task that it was made for; and the files of a design of both sides."""
+    model = flatten(declare(load_deck("spring_beside_drive")))
+    cycle = walking_task("hip", body_mass=75.0).scaled(0.05).sampled()
+    drive = motor_and_gear(model, resistance=0.3)
+    rest = cycle.torque + drive.reflected_inertia * cycle.acceleration
+    spring = -equilibrium_torque(model, "spring", cycle.angle)
+    assert np.mean((rest - spring) ** 2) < 0.1 * np.mean(rest**2)
+    free, pressed = (
+        ["spring.cam.contour", "spring.pretension"],
+        [PretensionRange(0.01, 0.03), MinimumRadiusOfCurvature(1e-3)],
+    )
+    straight = [PowerTorque(coefficient=c, exponent=1.0, angle=a) for c, a in ((1.5, 0.6), (1.0, 0.4))]
+    both = design_sides(knee(), targets=(straight[0], straight[1]), free=free, keep=pressed, settings=QUICK)
+    assert both.met
+    files = write_sides(both, tmp_path, machined=MachinedTwoSidedCam(cable_radius=2e-4))
+    assert {file.name for file in files} == {
+        "model.toml", "cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "cam_back.csv"
+    }  # fmt: skip
+    again = flatten(declare(load_deck(tmp_path / "model.toml")))
+    assert np.array_equal(
+        equilibrium_torque(again, None, [-0.3, 0.5]),
+        equilibrium_torque(flatten(both.actuator), None, [-0.3, 0.5]),
+    )

@@ -194,7 +194,7 @@ class BesideProgram(TaskProgram):
 
     def linear(self) -> BesideProgram:
         """Return the program of springs that are linear from the end of the range on."""
-        ones: Array = np.kron(np.eye(len(self.ways)), np.ones((self.spline.size, 1)))
+        ones = np.asarray(np.kron(np.eye(len(self.ways)), np.ones((self.spline.size, 1))), dtype=float)
         return replace(self, freedom=ones)
 
     def motor(self, unknowns: Array) -> MotorCycle:
