@@ -37,7 +37,7 @@ _FORMS = {
     "stock": '"spring.cam.elements" = [1, 2, 4]',
 }
 """How an entry of each option is written."""
-_TASK_FILES = ("task_curve.svg", "task_motor.svg")
+_TASK_FILES = ("task_curve.svg", "task_motor.svg", "task_springs.svg")
 
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
@@ -253,17 +253,21 @@ def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Tar
     from ..design import Target, TaskTarget
     from ..foundation.text_files import make_folder
     from ..model import flatten
-    from ..presentation.figures import curve_of_task, motor_over_task, write_figures
+    from ..presentation.figures import curve_of_task, motor_over_task, springs_for_task, write_figures
 
     if isinstance(job.target, Target):
         return job.target
     assert isinstance(job.target, TaskTarget)
     with steps.step("curve for the task"):
-        curve = job.target.curve(flatten(actuator), job.path.parent)
+        choice = job.target.choice(flatten(actuator), job.path.parent)
     make_folder(out)
-    write_figures(out, {"task_curve": curve_of_task(curve), "task_motor": motor_over_task(curve)})
-    click.echo(str(curve))
-    return curve.target
+    pictures = {"task_springs": springs_for_task(choice)}
+    if choice.series:
+        pictures |= {"task_curve": curve_of_task(choice.series), "task_motor": motor_over_task(choice.series)}
+        click.echo(str(choice.series))
+    write_figures(out, pictures)
+    click.echo(str(choice))
+    return job.target.target(choice)
 
 
 def show_kinds(what: str, as_json: bool) -> None:

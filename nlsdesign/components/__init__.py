@@ -115,6 +115,7 @@ from .transmission.cam_drive import Through, through
 from .transmission.cam_error import CamWithProfileError
 from .transmission.cam_shapes import AnchoredCam, OneSidedCam
 from .transmission.capstan import CapstanFriction, Guide, WrapProduct
+from .transmission.lopsided_cam import LopsidedCam
 from .transmission.roller_cam import RollerCam, SlidingGuide
 from .transmission.stretchy_cable import StretchyCable
 from .transmission.unilateral_cable import Buckling, InextensibleCable, PullOnly, pull_only
@@ -194,6 +195,7 @@ __all__ = [
     "LinearElastic",
     "LoadFriction",
     "LoadNonlinearity",
+    "LopsidedCam",
     "LossHeat",
     "LossyGear",
     "LuGreFriction",

@@ -1,6 +1,7 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
 from ..foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
+from .curves.beside import BesideCurve, EngagedSpring, SpringChoice, choose_spring, curve_beside
 from .curves.compliance import OddSpring, OneSidedSpring, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.target import (
@@ -49,6 +50,7 @@ from .jobs.written_design import (
     design_summary,
     write_design,
     write_part,
+    write_sides,
 )
 from .optimisation.coil_limits import GoodmanSafety, MaximumSpringIndex, MaximumTravel, MinimumSpringIndex
 from .optimisation.defaults import safe_limits
@@ -87,6 +89,7 @@ from .optimisation.pareto import ParetoFront, pareto
 from .optimisation.result import CamDesign, LimitState
 from .optimisation.roller_limits import MaximumPressureAngle, MinimumHollowRadius
 from .optimisation.settings import DesignSettings
+from .optimisation.sides import SidesDesign, design_sides
 from .optimisation.solve import GOALS as GOALS
 from .optimisation.solve import design_cam
 from .optimisation.stock import CoilStock, RubberStock, Stock
@@ -105,6 +108,7 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "AtMost",
+    "BesideCurve",
     "BoltCircle",
     "BothStrokes",
     "CamDesign",
@@ -116,6 +120,7 @@ __all__ = [
     "DesignJob",
     "DesignSettings",
     "EnergyLost",
+    "EngagedSpring",
     "ExponentialTorque",
     "FerruleSeat",
     "Goal",
@@ -162,9 +167,11 @@ __all__ = [
     "RestLengthRange",
     "RollerContour",
     "RubberStock",
+    "SidesDesign",
     "SmoothContour",
     "Spread",
     "SpreadRules",
+    "SpringChoice",
     "SpringLimits",
     "Stock",
     "TabulatedStiffness",
@@ -184,10 +191,13 @@ __all__ = [
     "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
+    "choose_spring",
     "contour_from_lever_arm",
     "contour_of_cam",
+    "curve_beside",
     "curve_for_task",
     "design_cam",
+    "design_sides",
     "design_summary",
     "elastic_law",
     "equilibrium_torque",
@@ -206,4 +216,5 @@ __all__ = [
     "write_design",
     "write_drawings",
     "write_part",
+    "write_sides",
 ]

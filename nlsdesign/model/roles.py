@@ -157,19 +157,29 @@ def _choice(examples: Sequence[str], otherwise: str) -> str:
 
 
 def contour_ends(model: FlatModel, spring: SpringNames | None = None) -> dict[str, float]:
-    """Return the angle in rad at which each cam ends, of one spring or of all; not every cam has an end."""
+    """Return the angle in rad at which each cam ends, of one spring or of all; not every cam has an end.
+
+    A cam whose sides differ has a second one, for negative angles, as ``NAME.back``.
+    """
     cams = [cam for each in ([spring] if spring else model.springs) for cam in each.cams]
-    return {cam.name: model.values[cam.last_angle] for cam in cams if cam.last_angle}
+    ends = {cam.name: cam.last_angle for cam in cams}
+    ends |= {f"{cam.name}.back": cam.back_last_angle for cam in cams}
+    return {name: model.values[end] for name, end in ends.items() if end}
 
 
 _SAME_ANGLE = 1e-4
 """Relative: a design finds the end of its contour numerically, and what is said of it has four digits."""
 
 
-def passed_ends(model: FlatModel, furthest: float) -> dict[str, float]:
-    """Return the ends of the cams that an angle in rad lies beyond, where a model goes on and no cam does."""
-    ends = contour_ends(model)
-    return {name: end for name, end in ends.items() if furthest > end * (1.0 + _SAME_ANGLE)}
+def passed_ends(model: FlatModel, lowest: float, highest: float) -> dict[str, float]:
+    """Return the ends of the cams that angles in rad lie beyond, where a model goes on and no cam does."""
+    ends, passed = contour_ends(model), {}
+    for name, end in ends.items():
+        below = 0.0 if f"{name}.back" in ends else -lowest
+        furthest = -lowest if name.endswith(".back") else max(highest, below)
+        if furthest > end * (1.0 + _SAME_ANGLE):
+            passed[name] = end
+    return passed
 
 
 class DeclaredReading(NamedTuple):

@@ -180,6 +180,8 @@ class CamNames:
     guides: tuple[tuple[str, ...], ...] = ()
     coils: tuple[CoilNames, ...] = ()  # the coils in it
     roller: RollerNames | None = None  # the roller that runs on the cam; None for a cam with a cable
+    # back_last_angle: parameter: where the contour for negative angles ends; None where it is no other one
+    back_last_angle: str | None = None
 
     @property
     def contour(self) -> str:
@@ -377,7 +379,7 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
         elements=f"{cam}.elements",
         control_values=tuple(
             name
-            for row in ("lever_arm", "support")
+            for row in ("lever_arm", "back_lever_arm", "support")
             if row in of_cam
             for name in number_names(cam, part.cam, row)
         ),
@@ -394,6 +396,7 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
         ),
         coils=tuple(_coil(name, p) for name, p in pieces.items() if isinstance(p, Coil)),
         roller=roller,
+        back_last_angle=f"{cam}.back_last_angle" if "back_last_angle" in of_cam else None,
     )
 
 

@@ -49,8 +49,9 @@ class PoleError(NamedTuple):
     def remarks(self, model: FlatModel, run: WatchedRecord) -> Iterator[str]:
         """Yield what makes the error mean little, each with the next step."""
         name = f"record '{self.record}'"
-        furthest = float(np.max(np.abs(run.trace[run.readings.get(run.motion, run.motion)])))
-        for cam, end in passed_ends(model, furthest).items():
+        angles = run.trace[run.readings.get(run.motion, run.motion)]
+        furthest = float(np.max(np.abs(angles)))
+        for cam, end in passed_ends(model, float(np.min(angles)), float(np.max(angles))).items():
             yield (
                 f"{name}: {run.motion} goes to {math.degrees(furthest):.4g}°, the contour of {cam} ends at "
                 f"{math.degrees(end):.4g}° -> check unit and mapping of the angle, or declare a longer one"

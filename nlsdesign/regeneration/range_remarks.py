@@ -60,12 +60,13 @@ def usual_last(model: FlatModel) -> float:
 
 def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
     """Return which cams end before an angle."""
+    angles = list(angles)
     furthest = max(abs(angle) for angle in angles)
     return [
         f"the contour of {name} ends at {math.degrees(end):.4g}°, the "
         f"angles go to {math.degrees(furthest):.4g}°: beyond its end the lever arm stays what it is there -> "
         "stay within it (--to), or declare a longer contour"
-        for name, end in passed_ends(model, furthest).items()
+        for name, end in passed_ends(model, min(angles), max(angles)).items()
     ]
 
 

@@ -90,10 +90,11 @@ def _cams(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
     for cam in (cam for spring in model.springs for cam in spring.cams):
         if cam.last_angle is None or cam.angle not in run:
             continue
-        last, angle = model.values[cam.last_angle], run[cam.angle]
+        angle, ends_at = run[cam.angle], {1.0: cam.last_angle, -1.0: cam.back_last_angle or cam.last_angle}
         ends = f"the contour of {cam.name} ends, its lever arm is held"
         slack = f"{cam.name} has no lever arm on this side, nothing pulls back"
         for side in (-1.0, 1.0):
+            last = model.values[ends_at[side]]
             outside = side * angle > last
             acts = cam.lever_arm not in run or bool(np.any(run[cam.lever_arm][outside] != 0.0))
             limits = (-last, math.inf) if side < 0.0 else (-math.inf, last)

@@ -46,7 +46,7 @@ def _plant(assembly: Assembly, spring: str, measured: str) -> tuple[FlatModel, s
 def _require_contour(model: FlatModel, first: float, last: float) -> None:
     """Refuse angles beyond the end of a cam."""
     furthest = max(abs(first), abs(last))
-    for name, end in passed_ends(model, furthest).items():
+    for name, end in passed_ends(model, min(first, last), max(first, last)).items():
         raise ValueRangeError(
             f"angles to {math.degrees(furthest):.4g}°",
             f"go beyond the contour of {name}, which ends at {math.degrees(end):.4g}°",

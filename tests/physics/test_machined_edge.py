@@ -24,6 +24,7 @@ from nlsdesign.design import (
     write_drawings,
 )
 from nlsdesign.design.statics.contour import contour_from_curvature
+from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.foundation.quantity import quantity
 from tests.dxf_reading import TautString, header_of, offset_points, polylines_of
 
@@ -189,3 +190,17 @@ def test_an_edge_for_a_thinner_cable_is_seen_by_this_string(tmp_path: Path) -> N
     _, laid, _ = string.pulled(contour.angles[-1], 25.0)
     # Drawn for a cable a tenth as thick, the thick one lies 0.225 mm farther out.
     assert laid - 1e3 * contour.lever_arms[-1] > 0.2
+
+
+def test_a_cam_with_unequal_sides_is_drawn_with_both_contours(tmp_path: Path) -> None:
+    front, back = two_sided(25e-3), sharp(25e-3)
+    part = MachinedTwoSidedCam(cable_radius=CABLE).part(front, back=back)
+    *_, file = write_drawings(tmp_path, front, machined=part)
+    for contour, string in zip((front, back), strings(file.read_text(encoding="utf-8")), strict=True):
+        angles = np.linspace(contour.angles[0], contour.angles[-1], 30)
+        laid = np.array([string.pulled(angle, 25.0)[1] for angle in angles])
+        assert laid == pytest.approx(1e3 * np.interp(angles, contour.angles, contour.lever_arms), abs=2e-3)
+    assert part.number("back_last_angle") == pytest.approx(float(back.angles[-1]))
+    assert part.number("sharpest_edge") == pytest.approx(0.75e-3, rel=1e-3), "that of the sharper side"
+    with pytest.raises(ArrangementError, match="no second contour"):
+        MachinedOneSidedCam(cable_radius=CABLE).part(one_sided(math.inf), back=back)

@@ -60,6 +60,7 @@ def test_some_documents_show_code() -> None:
     "how_to/own_study.md",
     "how_to/pareto_front.md",
     "how_to/pull_a_coil.md",
+    "how_to/spring_beside_the_drive.md",
     "how_to/read_a_sweep.md",
     "how_to/tolerances_and_trim.md",
     "observers.md",

@@ -265,6 +265,12 @@ def driven_cycle(
     return MotorCycle(cycle, drive, deflection, ratio * speed, torque)
 
 
+def beside_cycle(cycle: TaskCycle, drive: MotorAndGear, spring: Array) -> MotorCycle:
+    """Return what the motor does where a spring beside it puts a torque in N·m on the joint, shape (n,)."""
+    rest = replace(cycle, torque=cycle.torque - spring)
+    return driven_cycle(rest, drive, np.zeros_like(spring), (cycle.speed, cycle.acceleration))
+
+
 def _deflections(spring: Target, size: Array) -> tuple[Array, Array, Array]:
     """Return deflection, its slope and its bend over torque, at torques of one sign."""
     most = float(spring.torque(spring.last_angle))

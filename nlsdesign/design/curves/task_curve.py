@@ -5,18 +5,21 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar, TypeVar
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError
 from ...foundation.quantity import Quantity, with_unit
 from .compliance import OddSpring, SpringSymmetry, TwoBranchSpring
-from .motor_and_gear import MotorAndGear, MotorCycle, motor_cycle
+from .gear_ratio import best_ratio
+from .motor_and_gear import MotorAndGear, MotorCycle, beside_cycle, motor_cycle
 from .numbers import in_si, plain
 from .target import TabulatedTorque
 from .task import MixedTask, Task
-from .task_program import TaskOptimum, TaskProgram, least_energy, least_peak_power
+from .task_program import SeriesProgram, TaskOptimum, TaskProgram, least_energy, least_peak_power
 
 _RIGID = 0.01
 """Deflection in rad under the largest torque below which a spring counts as rigid."""
@@ -28,6 +31,9 @@ _RATIO, _HALVINGS = 1.5, 8
 
 class TaskGoal(ABC):
     """What is made small over a period of a task; a small object, chosen by the designer."""
+
+    power: ClassVar[bool] = False
+    """Whether it is a peak of the power, else the energy."""
 
     @abstractmethod
     def best(self, program: TaskProgram) -> TaskOptimum:
@@ -56,7 +62,13 @@ class LeastEnergy(TaskGoal):
 
 @dataclass(frozen=True)
 class LeastPeakPower(TaskGoal):
-    """Least peak power at the motor shaft in W. Not convex: the best of three local optima, unproved."""
+    """Least peak power at the motor shaft in W.
+
+    Of a spring beside the drive a linear program, with its bound. In series it is not convex: the best of
+    three local optima, unproved.
+    """
+
+    power: ClassVar[bool] = True
 
     def best(self, program: TaskProgram) -> TaskOptimum:
         """Return the best local optimum."""
@@ -201,15 +213,35 @@ class TaskProblem:
     limits
         Of the spring.
     pieces
-        Of the compliance over the range of torque.
+        Of the compliance over the range of torque, or of the stiffness over that of the angle.
+    gear_ratios
+        Least and greatest gear ratio, of which the best is found together with the spring; ``None`` for that
+        of the drive.
+
+    Raises
+    ------
+    ValueRangeError
+        If the range of the gear ratio is none.
     """
 
     goal: TaskGoal = field(default_factory=LeastEnergy)
     symmetry: SpringSymmetry = field(default_factory=OddSpring)
     limits: SpringLimits = field(default_factory=SpringLimits)
     pieces: int = 48
+    gear_ratios: tuple[Quantity | float, Quantity | float] | None = None
 
-    def program(self, task: Task | MixedTask, drive: MotorAndGear) -> TaskProgram:
+    def __post_init__(self) -> None:
+        if self.gear_ratios is None:
+            return
+        low, high = (in_si("gear_ratios", end, "1", minimum=1e-3, maximum=1e4) for end in self.gear_ratios)
+        if not low < high:
+            raise ValueRangeError(
+                f"gear_ratios = ({low:g}, {high:g})", "must ascend",
+                next_step="give the least and the greatest, or one ratio with drive.geared(...)",
+            )  # fmt: skip
+        object.__setattr__(self, "gear_ratios", (low, high))
+
+    def program(self, task: Task | MixedTask, drive: MotorAndGear) -> SeriesProgram:
         """Return the program.
 
         Parameters
@@ -236,7 +268,7 @@ class TaskProblem:
                 next_step="turn the signs of angle and torque",
             )  # fmt: skip
         limits = self.limits
-        return TaskProgram(
+        return SeriesProgram(
             cycle, drive, spline, freedom, offset, floor, plain(limits.deflection), plain(limits.motor_speed)
         )
 
@@ -275,31 +307,75 @@ def curve_for_task(
     True
     """
     problem = problem or TaskProblem()
-    program = problem.program(task, drive)
-    solution = problem.goal.best(program)
+    whole = problem.program(task, drive)
+    program, solution = solved(problem, whole)
     target, opposite = _branches(program, solution.unknowns)
     odd = isinstance(problem.symmetry, OddSpring)
-    straight = _best_or_none(problem.goal, program.linear())
-    wider = replace(problem, symmetry=TwoBranchSpring()).program(task, drive)
-    any_spring = _best_or_none(problem.goal, wider)
+    straight = _solved_or_none(problem, whole.linear())
+    any_spring = _solved_or_none(problem, replace(problem, symmetry=TwoBranchSpring()).program(task, drive))
     return TaskCurve(
         target=target,
         opposite=None if odd else opposite,
         goal=problem.goal,
-        rigid=motor_cycle(task, drive),
-        linear=program.linear().motor(straight.unknowns) if straight else None,
-        best=motor_cycle(task, drive, spring=target, opposite=None if odd else opposite),
-        linear_stiffness=1.0 / float(straight.unknowns[0]) if straight else None,
+        rigid=rigid_motor(problem, task, drive),
+        linear=straight[0].motor(straight[1].unknowns) if straight else None,
+        best=motor_cycle(task, program.drive, spring=target, opposite=None if odd else opposite),
+        linear_stiffness=1.0 / float(straight[1].unknowns[0]) if straight else None,
         bound=solution.bound,
-        two_branch=problem.goal.of(wider.motor(any_spring.unknowns)) if any_spring else None,
+        two_branch=problem.goal.of(any_spring[0].motor(any_spring[1].unknowns)) if any_spring else None,
     )
 
 
-def _best_or_none(goal: TaskGoal, program: TaskProgram) -> TaskOptimum | None:
+Program = TypeVar("Program", bound=TaskProgram)
+
+
+def _solved_or_none(problem: TaskProblem, program: Program) -> tuple[Program, TaskOptimum] | None:
     try:
-        return goal.best(program)
+        return solved(problem, program)
     except InfeasibleError:  # the curve keeps the limits and this comparison does not: there is none to show
         return None
+
+
+def solved(problem: TaskProblem, program: Program) -> tuple[Program, TaskOptimum]:
+    """Return the best spring of a program, and the program at the best gear ratio where that is free."""
+    goal, ratios = problem.goal, problem.gear_ratios
+    if ratios is None:
+        return program, goal.best(program)
+    ends = plain(ratios[0]), plain(ratios[1])
+    begin = program.geared(_rigid_ratio(goal, program, ends))
+    try:
+        first = goal.best(begin).unknowns
+    except InfeasibleError:  # another ratio may do
+        first = np.full(program.freedom.shape[1], program.floor)
+    ratio, unknowns = best_ratio(begin, first, ends, power=goal.power)
+    made = program.geared(ratio)
+    together = TaskOptimum(unknowns, None)
+    try:  # the same ratio with the bound of its own program
+        again = goal.best(made)
+    except InfeasibleError:  # the limits leave one point, which the tolerance of a solver misses
+        return made, together
+    one, other = (goal.of(made.motor(each.unknowns)) for each in (again, together))
+    return made, again if one <= other + 1e-6 * abs(other) else together
+
+
+def _rigid_ratio(goal: TaskGoal, program: TaskProgram, ratios: tuple[float, float]) -> float:
+    """Return the gear ratio of a motor without a spring that has the least of the goal."""
+    cycle = program.cycle
+
+    def paid(log_ratio: float) -> float:
+        drive = program.drive.geared(float(np.exp(log_ratio)))
+        return goal.of(beside_cycle(cycle, drive, np.zeros_like(cycle.time)))
+
+    found = minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options={"xatol": 1e-6})
+    return float(np.exp(found.x))
+
+
+def rigid_motor(problem: TaskProblem, task: Task | MixedTask, drive: MotorAndGear) -> MotorCycle:
+    """Return the motor without a spring, at its best gear ratio if that is free; it need not keep limits."""
+    if problem.gear_ratios is not None:
+        ends = plain(problem.gear_ratios[0]), plain(problem.gear_ratios[1])
+        drive = drive.geared(_rigid_ratio(problem.goal, problem.program(task, drive), ends))
+    return motor_cycle(task, drive)
 
 
 def _branches(program: TaskProgram, unknowns: Array) -> tuple[TabulatedTorque, TabulatedTorque]:

@@ -1,15 +1,18 @@
-"""The convex program for the spring of a task: unknown is the compliance over the torque.
+"""The convex programs for the spring of a task, in series and beside the drive.
 
-Motor torque, current, voltage and speed are affine in the compliance, so Joule heat and the work of the
-damping are convex quadratic and the limits linear: a convex quadratic program, whose optimum is global and
-proved by its dual. The peak power is a product of two affine functions and not convex.
-Source: Bolívar et al. 2018.
+In series the unknown is the compliance over the torque, beside the drive the stiffness over the angle. Motor
+torque, current, voltage and speed are affine in it, so Joule heat and the work of the damping are convex
+quadratic and the limits linear: a convex quadratic program, whose optimum is global and proved by its dual.
+The peak power of a motor whose speed depends on the spring is a product of two affine functions and not
+convex. Source: Bolívar et al. 2018, for the series spring.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -18,11 +21,12 @@ from scipy.optimize import linprog, nnls
 from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError
 from .compliance import ComplianceSpline
-from .motor_and_gear import MotorAndGear, MotorCycle, driven_cycle, motion_through
+from .motor_and_gear import MotorAndGear, MotorCycle, beside_cycle, driven_cycle, motion_through
 from .numbers import plain
 from .task import TaskCycle
 
-_THIN = 4
+_BEFORE = 1e-3
+THIN = 4
 """Limits stand at every fourth time: between them smooth motions change by less than a thousandth."""
 
 
@@ -39,71 +43,92 @@ class LimitRows:
     largest: float  # in unit; infinite for none
 
 
+class Affine(NamedTuple):
+    """A column over time that is matrix·y + offset; shapes (n, m) and (n,)."""
+
+    matrix: Array
+    offset: Array
+
+    def with_factor(self, factor: float) -> Affine:
+        """Return a multiple of it."""
+        return Affine(factor * self.matrix, factor * self.offset)
+
+    def plus(self, other: Affine) -> Affine:
+        """Return the sum."""
+        return Affine(self.matrix + other.matrix, self.offset + other.offset)
+
+
+class MotorParts(NamedTuple):
+    """What motor torque and speed are made of, whatever the gear ratio n: load/n + n·rotor, and n·speed."""
+
+    load: Affine  # torque at the output that does not turn with the rotor, in N·m
+    rotor: Affine  # torque of the rotor's inertia and damping per ratio, in N·m
+    speed: Affine  # of the gear's output, in rad/s
+    deflection: Affine  # of a series spring, in rad
+
+
 @dataclass(frozen=True, eq=False)
-class TaskProgram:
-    """A task, a drive and a spring with unknown compliances y ≥ floor."""
+class TaskProgram(ABC):
+    """A task, a drive and a spring with unknowns y ≥ floor."""
 
     # cycle, drive: what is asked for and what drives
     cycle: TaskCycle
     drive: MotorAndGear
-    spline: ComplianceSpline  # compliance over torque
+    spline: ComplianceSpline
     # freedom, offset: coefficients of the spline are offset + freedom·y
     freedom: Array
     offset: Array
-    floor: float  # smallest compliance in rad/(N·m)
+    floor: float  # smallest compliance in rad/(N·m), or stiffness in N·m/rad
     # largest_deflection, largest_speed: in rad, and of the motor in rad/s; infinite for none
     largest_deflection: float
     largest_speed: float
-
-    def linear(self) -> TaskProgram:
-        """Return the program of a linear spring: one unknown, its compliance."""
-        return replace(self, freedom=self.freedom @ np.ones((self.freedom.shape[1], 1)))
 
     def coefficients(self, unknowns: Array) -> Array:
         """Return the coefficients of the spline."""
         return self.offset + self.freedom @ unknowns
 
+    def geared(self, ratio: float) -> Self:
+        """Return the same program behind another gear."""
+        return replace(self, drive=self.drive.geared(ratio))
+
+    @abstractmethod
+    def linear(self) -> TaskProgram:
+        """Return the program of a linear spring: one unknown."""
+
+    @abstractmethod
     def motor(self, unknowns: Array) -> MotorCycle:
         """Return what the motor does with this spring."""
-        deflection, slope, bend = (
-            each @ self.coefficients(unknowns) for each in self.spline.matrices(self.cycle.torque)
-        )
-        return driven_cycle(self.cycle, self.drive, deflection, motion_through(self.cycle, slope, bend))
 
-    def affine(self) -> dict[str, tuple[Array, Array]]:
-        """Return matrix and offset of deflection, motor speed and motor torque, as affine in y."""
-        cycle, drive = self.cycle, self.drive
-        deflection, slope, bend = self.spline.matrices(cycle.torque)
-        ratio, damping = plain(drive.gear_ratio), plain(drive.damping)
-        speed = ratio * slope * cycle.torque_rate[:, None]
-        inertial = slope * cycle.torque_acceleration[:, None] + bend * cycle.torque_rate[:, None] ** 2
-        torque = drive.reflected_inertia / ratio * inertial + damping * speed
-        rigid_speed = ratio * cycle.speed
-        rigid_torque = (cycle.torque + drive.reflected_inertia * cycle.acceleration) / ratio
-        rows = {
-            "deflection": (deflection, np.zeros_like(cycle.time)),
-            "speed": (speed, rigid_speed),
-            "torque": (torque, rigid_torque + damping * rigid_speed),
-        }
-        return {
-            name: (matrix @ self.freedom, matrix @ self.offset + offset)
-            for name, (matrix, offset) in rows.items()
-        }
+    @cached_property
+    @abstractmethod
+    def parts(self) -> MotorParts:
+        """Load, rotor, speed and deflection as affine in y."""
+
+    def affine(self) -> dict[str, Affine]:
+        """Return deflection, motor speed and motor torque as affine in y."""
+        ratio, parts = plain(self.drive.gear_ratio), self.parts
+        torque = parts.load.with_factor(1.0 / ratio).plus(parts.rotor.with_factor(ratio))
+        return {"deflection": parts.deflection, "speed": parts.speed.with_factor(ratio), "torque": torque}
+
+    def own_limits(self) -> tuple[LimitRows, ...]:
+        """Return the limits of the spring alone."""
+        deflection = self.parts.deflection
+        rows = deflection.matrix[::THIN], deflection.offset[::THIN]
+        return (LimitRows("deflection", "rad", *rows, self.largest_deflection),)
 
     def limits(self) -> tuple[LimitRows, ...]:
         """Return the limits that are stated."""
-        rows, drive = {name: (m[::_THIN], o[::_THIN]) for name, (m, o) in self.affine().items()}, self.drive
+        rows, drive = {name: (m[::THIN], o[::THIN]) for name, (m, o) in self.affine().items()}, self.drive
         constant = plain(drive.torque_constant)
         (a, b), (c, d) = rows["torque"], rows["speed"]
         current = a / constant, b / constant
         resistance = plain(drive.resistance)
         voltage = resistance * current[0] + constant * c, resistance * current[1] + constant * d
-        deflection = rows["deflection"]
         stated = (
             LimitRows("motor current", "A", current[0], current[1], plain(drive.current_limit)),
             LimitRows("motor voltage", "V", voltage[0], voltage[1], plain(drive.voltage_limit)),
             LimitRows("motor speed", "rad/s", c, d, self.largest_speed),
-            LimitRows("deflection", "rad", deflection[0], deflection[1], self.largest_deflection),
+            *self.own_limits(),
         )
         return tuple(each for each in stated if np.isfinite(each.largest))
 
@@ -119,6 +144,95 @@ class TaskProgram:
             gradient += 2.0 * weight * step * matrix.T @ offset
             constant += weight * step * float(offset @ offset)
         return hessian, gradient, constant
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesProgram(TaskProgram):
+    """The spring between gear and joint: unknown is its compliance over the torque, in rad/(N·m)."""
+
+    def linear(self) -> SeriesProgram:
+        """Return the program of a linear spring: one unknown, its compliance."""
+        return replace(self, freedom=self.freedom @ np.ones((self.freedom.shape[1], 1)))
+
+    def motor(self, unknowns: Array) -> MotorCycle:
+        """Return what the motor does with this spring."""
+        deflection, slope, bend = (
+            each @ self.coefficients(unknowns) for each in self.spline.matrices(self.cycle.torque)
+        )
+        return driven_cycle(self.cycle, self.drive, deflection, motion_through(self.cycle, slope, bend))
+
+    @cached_property
+    def parts(self) -> MotorParts:
+        """Load, rotor, speed and deflection as affine in the compliances."""
+        cycle, drive = self.cycle, self.drive
+        deflection, slope, bend = self.spline.matrices(cycle.torque)
+        speed = slope * cycle.torque_rate[:, None]
+        bent = slope * cycle.torque_acceleration[:, None] + bend * cycle.torque_rate[:, None] ** 2
+        inertia, behind, damping = (
+            plain(each) for each in (drive.inertia, drive.output_inertia, drive.damping)
+        )
+        rows = (
+            (behind * bent, cycle.torque + behind * cycle.acceleration),
+            (inertia * bent + damping * speed, inertia * cycle.acceleration + damping * cycle.speed),
+            (speed, cycle.speed),
+            (deflection, np.zeros_like(cycle.time)),
+        )
+        return MotorParts(*(Affine(m @ self.freedom, m @ self.offset + o) for m, o in rows))
+
+
+@dataclass(frozen=True, eq=False)
+class BesideProgram(TaskProgram):
+    """A spring between joint and frame: unknown is its stiffness over the angle beyond an end, in N·m/rad.
+
+    A side acts on the joint beyond an angle of engagement, against the way on: its torque is the integral of
+    its stiffness from one end of the range of the angle, so that the stiffness says where it engages: where
+    it begins.
+    """
+
+    ways: tuple[float, ...]  # 1 for a side that acts at large angles, −1 for one that acts at small ones
+    largest_stiffness: float
+
+    def linear(self) -> BesideProgram:
+        """Return the program of springs that are linear from the end of the range on."""
+        ones = np.asarray(np.kron(np.eye(len(self.ways)), np.ones((self.spline.size, 1))), dtype=float)
+        return replace(self, freedom=ones)
+
+    def motor(self, unknowns: Array) -> MotorCycle:
+        """Return what the motor does beside this spring."""
+        torque = self._torques @ self.coefficients(unknowns)
+        return beside_cycle(self.cycle, self.drive, torque)
+
+    @cached_property
+    def _torques(self) -> Array:
+        """What maps the coefficients to the torque of the spring on the joint, shape (n, sides·size)."""
+        return np.hstack(
+            [-way * self.spline.matrices(self.beyond(self.cycle.angle, way))[0] for way in self.ways]
+        )
+
+    def beyond(self, angle: Array, way: float) -> Array:
+        """Return the angle from the end of its range at which a side begins, a thousandth of it before."""
+        ends = way * np.min(self.cycle.angle), way * np.max(self.cycle.angle)
+        return np.asarray(way * angle - min(ends) + _BEFORE * self.spline.high)
+
+    @cached_property
+    def parts(self) -> MotorParts:
+        """Load, rotor, speed and deflection as affine in the stiffnesses; the load alone depends on them."""
+        cycle, drive = self.cycle, self.drive
+        inertia, behind, damping = (
+            plain(each) for each in (drive.inertia, drive.output_inertia, drive.damping)
+        )
+        none = np.zeros((len(cycle.time), self.freedom.shape[1]))
+        return MotorParts(
+            Affine(-self._torques @ self.freedom, cycle.torque + behind * cycle.acceleration),
+            Affine(none, inertia * cycle.acceleration + damping * cycle.speed),
+            Affine(none, cycle.speed),
+            Affine(none, np.zeros_like(cycle.time)),
+        )
+
+    def own_limits(self) -> tuple[LimitRows, ...]:
+        """Return the limit of the stiffness; the spring has no other deflection than the joint."""
+        rows = self.freedom, np.zeros(len(self.freedom))
+        return (LimitRows("stiffness of the spring", "N·m/rad", *rows, self.largest_stiffness),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,14 +291,14 @@ def _solved(
         "f": 0.5 * ca.bilin(ca.DM(hessian), y, y) + ca.dot(ca.DM(gradient), y),
         "g": ca.DM(matrix) @ y + ca.DM(offset),
     }
-    solver = ca.nlpsol("least_energy", "ipopt", inside, {**_QUIET, **_QUADRATIC})
+    solver = ca.nlpsol("least_energy", "ipopt", inside, {**QUIET, **_QUADRATIC})
     solution = solver(x0=floor, lbx=floor, lbg=-1.0, ubg=1.0)
     if not solver.stats()["success"]:
         return None
     return np.array(solution["x"]).ravel(), np.array(solution["lam_g"]).ravel()
 
 
-_QUIET: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+QUIET: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
 _QUADRATIC: dict[str, Any] = {
     "ipopt.hessian_constant": "yes", "ipopt.jac_d_constant": "yes", "ipopt.tol": 1e-10,
     "ipopt.bound_relax_factor": 0.0,
@@ -233,21 +347,29 @@ def conflict(program: TaskProgram) -> InfeasibleError:
 
 
 def least_peak_power(program: TaskProgram) -> TaskOptimum:
-    """Return a spring with small peak power at the motor shaft; a local optimum, the problem is not convex.
+    """Return a spring with small peak power at the motor shaft.
 
-    Without the inertia of the motor it is convex (linear). From that spring, from the one of least energy and
-    from the linear one of least peak power a sequence of linear programs goes down, each within a region in
-    which the tangents of the power proved to hold; the best end is taken.
+    Beside the drive a spring leaves the speed alone, so that is a linear program with its bound. In series it
+    is a local optimum, as the problem is not convex. Without the inertia of the motor it is convex (linear).
+    From that spring, from the one of least energy and from the linear one of least peak power a sequence of
+    linear programs goes down, each within a region in which the tangents of the power proved to hold; the
+    best end is taken.
     """
+    if not np.any(program.parts.speed.matrix):
+        known, ends = program.affine(), np.full(program.freedom.shape[1], np.inf)
+        (torque, offset), speed = known["torque"], known["speed"].offset
+        bounds = program.floor * np.ones_like(ends), ends
+        solution = _least_largest(speed[:, None] * torque, speed * offset, program.limits(), bounds)
+        if not np.all(np.isfinite(solution)):
+            raise conflict(program)
+        return TaskOptimum(solution, float(np.max(np.abs(speed * (torque @ solution + offset)))))
     energetic = least_energy(program).unknowns
     # The spring of least peak power of a motor without inertia: a linear program.
     light = replace(program, drive=replace(program.drive, inertia=0.0, output_inertia=0.0, damping=0.0))
     rows = light.affine()
-    torque, (matrix, offset) = rows["torque"][1][::_THIN], rows["speed"]
+    load, (matrix, offset) = rows["torque"][1][::THIN], rows["speed"]
     bounds = np.full(len(energetic), program.floor), np.full(len(energetic), np.inf)
-    solution = _least_largest(
-        torque[:, None] * matrix[::_THIN], torque * offset[::_THIN], light.limits(), bounds
-    )
+    solution = _least_largest(load[:, None] * matrix[::THIN], load * offset[::THIN], light.limits(), bounds)
     without_inertia = solution if np.all(np.isfinite(solution)) else energetic
     starts = [energetic, without_inertia]
     if len(energetic) > 1:

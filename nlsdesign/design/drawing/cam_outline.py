@@ -34,6 +34,12 @@ class LipEdge:
     last_support: float  # distance of the last tangent from the centre in m
 
 
+Contours = tuple[Contour, Contour]
+"""Those for positive and for negative angles."""
+Lips = tuple[LipEdge, LipEdge]
+"""Edges under the cable at positive and at negative angles."""
+
+
 def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> LipEdge:
     """Return the edge on which a cable has its centre line on the contour.
 
@@ -155,37 +161,46 @@ def _run_out_end(contour: Contour, over_travel: float) -> float:
     return phi + float(np.interp(over_travel, turned[end - 1 : end + 1], steps[end - 1 : end + 1]))
 
 
-def two_sided_outlines(lip: LipEdge, numbers: Mapping[str, Quantity]) -> tuple[ArcPath, ArcPath]:
-    """Return the lower and the upper half, each closed and clockwise."""
-    back = mirrored_back(lip, numbers)
-    mouth, wall = lip.path.points[0], -numbers["channel_width"].number / 2.0
-    relief = _relief(mouth, lip.first_direction, wall, numbers["tool_radius"].number)
+def two_sided_outlines(lips: Lips, numbers: Mapping[str, Quantity]) -> tuple[ArcPath, ArcPath]:
+    """Return the lower and the upper half, each closed and clockwise.
+
+    ``lips``: under the cable at positive and at negative angles. Turned by half a turn the halves are alike.
+    """
+    wall = -numbers["channel_width"].number / 2.0
     seat = [_seat(numbers["ferrule_seat"].number / 2.0, -wall)] if "ferrule_seat" in numbers else []
     taken = float(seat[0].points[-1][0]) if seat else 0.0
-    if relief.points[0][0] < taken:
-        raise ValueRangeError(
-            f"channel, {MM * float(mouth[0]):.4g} mm from the axis to its mouth",
-            f"needs {MM * (float(mouth[0] - relief.points[0][0]) + taken):.4g} mm for its relief"
-            + (" and the ferrule" if seat else ""),
-            next_step="take a smaller channel_clearance or ferrule, or a contour that begins farther out",
-        )
+    reliefs = []
+    for lip in lips:
+        mouth = lip.path.points[0]
+        relief = _relief(mouth, lip.first_direction, wall, numbers["tool_radius"].number)
+        if relief.points[0][0] < taken:
+            raise ValueRangeError(
+                f"channel, {MM * float(mouth[0]):.4g} mm from the axis to its mouth",
+                f"needs {MM * (float(mouth[0] - relief.points[0][0]) + taken):.4g} mm for its relief"
+                + (" and the ferrule" if seat else ""),
+                next_step="take a smaller channel_clearance or ferrule, or a contour that begins farther out",
+            )
+        reliefs.append(relief)
+    (front, back), (right, left) = lips, reliefs
+    around = back_of(lips, numbers)
     lower = joined(
-        lip.path, back, lip.path.mirrored(), relief.mirrored(), *seat, relief, closed=True
+        front.path, around, back.path.mirrored(), left.mirrored(), *seat, right, closed=True
     )  # fmt: skip
     return lower, lower.turned(math.pi)
 
 
-def mirrored_back(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:
-    """Return the back from the end of a lip to that of its mirror image: round ends, and the body."""
-    if lip.last_direction >= math.pi:
-        raise ValueRangeError(
-            "run-out", f"the lip ends at the direction {math.degrees(lip.last_direction):.4g}°, beyond 180°",
-            next_step="take a smaller over_travel",
-        )  # fmt: skip
-    end = _end_circle(lip, numbers)
-    across = (end[0] * [-1.0, 1.0], end[1])
-    back = [end, (np.zeros(2), numbers["body_radius"].number), across]
-    return _back(back, lip.last_direction, 2.0 * math.pi - lip.last_direction)
+def back_of(lips: Lips, numbers: Mapping[str, Quantity]) -> ArcPath:
+    """Return the back from the end of one lip to that of the other, mirrored: round ends, and the body."""
+    for lip in lips:
+        if lip.last_direction >= math.pi:
+            ends = f"{math.degrees(lip.last_direction):.4g}°"
+            raise ValueRangeError(
+                "run-out", f"the lip ends at the direction {ends}, beyond 180°",
+                next_step="take a smaller over_travel",
+            )  # fmt: skip
+    end, (across, radius) = (_end_circle(lip, numbers) for lip in lips)
+    circles = [end, (np.zeros(2), numbers["body_radius"].number), (across * [-1.0, 1.0], radius)]
+    return _back(circles, lips[0].last_direction, 2.0 * math.pi - lips[1].last_direction)
 
 
 def one_sided_outline(lip: LipEdge, numbers: Mapping[str, Quantity]) -> ArcPath:

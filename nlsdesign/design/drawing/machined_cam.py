@@ -15,7 +15,7 @@ from ...foundation.quantity import Quantity, quantity
 from ..curves.numbers import in_si, plain
 from ..statics.contour import Contour
 from .arc_path import ArcPath
-from .cam_outline import LipEdge, lip_edge, one_sided_outline, two_sided_outlines
+from .cam_outline import Contours, LipEdge, Lips, lip_edge, one_sided_outline, two_sided_outlines
 from .cam_part import CamPart, Hole, check_machinable
 
 _CLEARANCE = quantity(0.1, "mm", source="assumed: a braided cable of this size passes a gap so much wider")
@@ -223,28 +223,44 @@ class MachinedCam(ABC):
             }
         return numbers
 
-    def part(self, contour: Contour) -> CamPart:
+    def part(self, contour: Contour, *, back: Contour | None = None) -> CamPart:
         """Return the cam as it is made, checked.
 
         Parameters
         ----------
         contour
             Curve of the cable's centre line.
+        back
+            That for negative angles, of a cam through whose centre the cable runs; the same if left out.
 
         Raises
         ------
         ArrangementError
-            If the edge crosses itself, or a bore would cut the channel.
+            If the edge crosses itself, a bore would cut the channel, or the cam has one contour only.
         ValueRangeError
             If the contour, the cable, a hole or the plate does not fit; the message names it.
         """
         numbers = self.given()
-        lip = self._edge(contour, numbers)
+        if back is not None and not isinstance(self, MachinedTwoSidedCam):
+            raise ArrangementError(
+                f"a {type(self).__name__}", "has no second contour",
+                next_step="leave back out, or draw it as a MachinedTwoSidedCam",
+            )  # fmt: skip
+        contours = (contour, contour if back is None else back)
+        lips, sharpest = [], []
+        for each in contours:
+            lips.append(self._edge(each, numbers))
+            sharpest.append(numbers["sharpest_edge"])
+        deviation = max(lip.deviation for lip in lips)
         numbers |= {
+            "sharpest_edge": min(sharpest, key=lambda size: size.number),
             "last_angle": quantity(math.degrees(contour.angles[-1]), "deg", source="contour"),
-            "edge_deviation": derived_size(lip.deviation, "largest distance of the arcs from the exact edge"),
+            "edge_deviation": derived_size(deviation, "largest distance of the arcs from the exact edge"),
         }
-        outlines, holes, cables, rollers = self._drawn(contour, lip, numbers)
+        if back is not None:
+            end = quantity(math.degrees(back.angles[-1]), "deg", source="contour for negative angles")
+            numbers["back_last_angle"] = end
+        outlines, holes, cables, rollers = self._drawn(contours, (lips[0], lips[1]), numbers)
         if self.bolts is not None:
             holes += [
                 Hole(f"bolt hole {k}", c, plain(self.bolts.hole)) for k, c in enumerate(self.bolts.centres, 1)
@@ -266,8 +282,8 @@ class MachinedCam(ABC):
         """Return the edge; adds its sharpest radius and what else it derives."""
 
     @abstractmethod
-    def _drawn(self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
-        """Return what is drawn; adds the numbers that it derives."""
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
+        """Return what is drawn of the contours for both signs of the angle; adds numbers that it derives."""
 
     def _body_radius(self, limit: float, numbers: dict[str, Quantity]) -> None:
         """Add the body radius where it is not given: what holes need, else half of what fits."""
@@ -369,10 +385,10 @@ class MachinedTwoSidedCam(MachinedCableCam):
     4.0
     """
 
-    def _drawn(self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
         radius, clearance = numbers["cable_radius"].number, numbers["channel_clearance"].number
-        offset = float(contour.lever_arms[0])
-        if abs(offset) > max(clearance / 2, 1e-6) or contour.slopes[0] <= 0.0:
+        offset = max((float(each.lever_arms[0]) for each in contours), key=abs)
+        if abs(offset) > max(clearance / 2, 1e-6) or min(each.slopes[0] for each in contours) <= 0.0:
             raise ArrangementError(
                 f"contour with a lever arm of {1e3 * offset:.4g} mm at angle zero",
                 "its cable does not run through the centre, so there is no channel between two halves",
@@ -393,9 +409,10 @@ class MachinedTwoSidedCam(MachinedCableCam):
         numbers["mouth_width"] = derived_size(
             2 * (radius - offset), "cable diameter: the lips guide the cable"
         )
-        numbers["channel_length"] = derived_size(2 * float(contour.slopes[0]), "between the mouths")
-        self._body_radius(lip.last_support, numbers)
-        outlines = list(two_sided_outlines(lip, numbers))
+        mouths = sum(float(each.slopes[0]) for each in contours)
+        numbers["channel_length"] = derived_size(mouths, "between the mouths")
+        self._body_radius(min(lip.last_support for lip in lips), numbers)
+        outlines = list(two_sided_outlines(lips, numbers))
         holes = []
         if self.hub_bore is not None:
             holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore), base_only=True))
@@ -405,11 +422,11 @@ class MachinedTwoSidedCam(MachinedCableCam):
             # Beside the bore in the base, which lies under them.
             aside = plain(self.hub_bore) / 2 + plain(self.minimum_wall) + size / 2 if self.hub_bore else 0.0
             holes += [Hole("clamp hole", side * np.array([-aside, away]), size) for side in (-1.0, 1.0)]
-        beyond = 0.35 * float(contour.radii.max())
-        half = _cable(contour, float(contour.angles[-1]), beyond)
-        turned = np.vstack([-half[::-1], half])
-        end = min(1.3 * float(contour.radii.max()), contour.anchor_distance)
-        lines = (np.array([[-end, 0.0], [end, 0.0]]), turned, turned * [1.0, -1.0])
+        reach = max(float(each.radii.max()) for each in contours)
+        halves = [_cable(each, float(each.angles[-1]), 0.35 * reach) for each in contours]
+        front, back = (np.vstack([-half[::-1], half]) for half in halves)
+        end = min(1.3 * reach, contours[0].anchor_distance)
+        lines = (np.array([[-end, 0.0], [end, 0.0]]), front, back * [1.0, -1.0])
         return DrawnCam(outlines, holes, [ArcPath(points, np.zeros(len(points))) for points in lines])
 
 
@@ -442,7 +459,8 @@ class MachinedOneSidedCam(MachinedCableCam):
         )
         return numbers
 
-    def _drawn(self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
+        contour, lip = contours[0], lips[0]
         radius, wall = numbers["cable_radius"].number, plain(self.minimum_wall)
         self._body_radius(float(np.min(contour.lever_arms)) - radius, numbers)
         outline = one_sided_outline(lip, numbers)

@@ -16,7 +16,7 @@ from ..curves.numbers import plain
 from ..statics.contour import Contour
 from ..statics.roller_contour import STRAIGHT, RollerContour
 from .arc_path import ArcPath, biarc, joined
-from .cam_outline import LipEdge, few_arcs, mirrored_back
+from .cam_outline import Contours, LipEdge, Lips, back_of, few_arcs
 from .cam_part import Hole
 from .machined_cam import DrawnCam, MachinedCam, derived_size
 
@@ -80,10 +80,10 @@ class MachinedRollerCam(MachinedCam):
         numbers["pitch_radius"] = derived_size(float(contour.centre_radii[0]), "base radius of the contour")
         return roller_edge(contour, over_travel=numbers["over_travel"].number)
 
-    def _drawn(self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
-        made = cast(RollerContour, contour)
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
+        made, lip = cast(RollerContour, contours[0]), lips[0]
         self._body_radius(min(lip.last_support, float(made.radii.min())), numbers)
-        outline = joined(lip.path, mirrored_back(lip, numbers), lip.path.mirrored(), closed=True)
+        outline = joined(lip.path, back_of(lips, numbers), lip.path.mirrored(), closed=True)
         holes = []
         if self.hub_bore is not None:
             holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore)))

@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ...foundation.errors import ValueRangeError
+from ...foundation.errors import InfeasibleError, ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity
 from ...model import FlatModel
+from ..curves.beside import SpringChoice, choose_spring
 from ..curves.compliance import OddSpring, SpringSymmetry
 from ..curves.motor_and_gear import motor_and_gear
 from ..curves.numbers import in_si
+from ..curves.target import TabulatedTorque
 from ..curves.task import read_task, walking_task
-from ..curves.task_curve import LeastEnergy, TaskCurve, TaskGoal, TaskProblem, curve_for_task
+from ..curves.task_curve import LeastEnergy, TaskGoal, TaskProblem
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +35,12 @@ class TaskTarget:
         Another gear ratio than the declared one, a pure number.
     goal
         What is made small over the task: ``LeastEnergy`` or ``LeastPeakPower``.
+    gear_ratios
+        Instead of one: the least and the greatest, of which the best is found together with the spring.
     symmetry
-        ``OddSpring``, ``OneSidedSpring`` or ``TwoBranchSpring``.
+        ``OddSpring``, ``OneSidedSpring`` or ``TwoBranchSpring``; of a spring in series.
+    place
+        ``"series"``, or ``"beside"`` for one from joint to frame that acts beyond an angle, in one direction.
 
     Raises
     ------
@@ -49,8 +55,17 @@ class TaskTarget:
     gear_ratio: Quantity | float | None = None
     goal: TaskGoal = field(default_factory=LeastEnergy)
     symmetry: SpringSymmetry = field(default_factory=OddSpring)
+    gear_ratios: tuple[Quantity | float, ...] = ()
+    place: str = "series"
 
     def __post_init__(self) -> None:
+        if self.place not in _PLACES:
+            raise unknown_name("task: place", self.place, _PLACES)
+        if self.gear_ratios and (len(self.gear_ratios) != 2 or self.gear_ratio is not None):
+            raise ValueRangeError(
+                "task: gear_ratios", "is the least and the greatest, and stands instead of gear_ratio",
+                next_step="write gear_ratios = [20.0, 120.0]",
+            )  # fmt: skip
         if bool(self.file) == bool(self.joint):
             raise ValueRangeError(
                 "task", "needs a file or a joint, and not both",
@@ -58,8 +73,8 @@ class TaskTarget:
             )  # fmt: skip
         in_si("scale", self.scale, "1", minimum=1e-6, maximum=1e3)
 
-    def curve(self, model: FlatModel, folder: Path) -> TaskCurve:
-        """Return the curve for the motor of a model.
+    def choice(self, model: FlatModel, folder: Path) -> SpringChoice:
+        """Return what springs in each place do for the motor of a model.
 
         Parameters
         ----------
@@ -88,5 +103,32 @@ class TaskTarget:
         drive = motor_and_gear(model)
         if self.gear_ratio is not None:
             drive = drive.geared(in_si("gear_ratio", self.gear_ratio, "1", minimum=1e-3, maximum=1e4))
-        problem = TaskProblem(goal=self.goal, symmetry=self.symmetry)
-        return curve_for_task(task.scaled(in_si("scale", self.scale, "1")), drive, problem)
+        ratios = (self.gear_ratios[0], self.gear_ratios[1]) if self.gear_ratios else None
+        problem = TaskProblem(goal=self.goal, symmetry=self.symmetry, gear_ratios=ratios)
+        return choose_spring(task.scaled(in_si("scale", self.scale, "1")), drive, problem)
+
+    def target(self, choice: SpringChoice) -> TabulatedTorque:
+        """Return the curve of the spring in the place that is asked for.
+
+        Parameters
+        ----------
+        choice
+            Of this task.
+
+        Raises
+        ------
+        InfeasibleError
+            If no spring in that place keeps the limits, or one beside the drive would not help.
+        """
+        if self.place == "series" and choice.series:
+            return choice.series.target
+        if self.place == "beside" and choice.beside and choice.beside.sides:
+            return choice.beside.sides[0].target
+        raise InfeasibleError(
+            f"task: a spring with place = '{self.place}'",
+            "keeps no limit or does not help",
+            next_step=f"take the other place, or another motor or gear ratio. {choice.reason}",
+        )
+
+
+_PLACES = ("series", "beside")

@@ -21,6 +21,7 @@ from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwo
 from ..drawing.machined_roller import MachinedRollerCam
 from ..drawing.making import Mounting
 from ..optimisation.result import CamDesign
+from ..optimisation.sides import SidesDesign
 from ..statics.declared_cam import declared_cam
 from .job_file import DesignJob, built
 
@@ -181,6 +182,42 @@ def write_part(
         If the part cannot be made of the contour.
     """
     return _written_part(design, machined.part(design.contour), folder, pictures)
+
+
+def write_sides(
+    design: SidesDesign, folder: Path | str, *, machined: MachinedCam | None = None
+) -> tuple[Path, ...]:
+    """Write a cam whose sides were designed: its deck, and where both sides meet their targets the part.
+
+    Parameters
+    ----------
+    design
+        Of both sides.
+    folder
+        Is made where it does not exist.
+    machined
+        Sizes of the part; the usual ones, with the declared cable, if it is left out.
+
+    Returns
+    -------
+    tuple of Path
+        ``model.toml``, then the drawings, with the centre line of the back in ``cam_back.csv``.
+
+    Raises
+    ------
+    NlsError
+        If a file cannot be written or the part cannot be made.
+    """
+    folder = Path(folder)
+    make_folder(folder)
+    write_deck(design.actuator, folder / "model.toml")
+    if not design.met:
+        return (folder / "model.toml",)
+    front, back = design.front.contour, design.back.contour
+    part = (machined or machined_cam(design.front)).part(front, back=back)
+    note = f"front {design.front.fingerprint}, back {design.back.fingerprint}"
+    files = write_drawings(folder, front, machined=part, note=note)
+    return (folder / "model.toml", *files, *write_drawings(folder, back, name="cam_back", formats=("csv",)))
 
 
 def _written_part(

@@ -135,9 +135,14 @@ class SolvedSearch:
     @cached_property
     def check(self) -> TorqueCheck:
         """Its torque against the target."""
-        cam = self.search.problem.law.cam.name
-        spring = next(each.name for each in self.model.springs for inside in each.cams if inside.name == cam)
-        return torque_check(self.model, target=self.search.problem.design.target, spring=spring)
+        cam = self.search.problem.law.cam
+        spring = next(s.name for s in self.model.springs for each in s.cams if each.name == cam.name)
+        # A spring that is turned on its shaft engages at the angle at which its cam is at zero.
+        rest = self.model.evaluate([0.0] * len(self.model.states), [0.0] * len(self.model.inputs))
+        engaged = -rest[cam.angle]
+        return torque_check(
+            self.model, target=self.search.problem.design.target, spring=spring, engaged=engaged
+        )
 
 
 def narrowed(solved: SolvedSearch) -> SolvedSearch:
@@ -378,12 +383,16 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
 _ANGLES = 801
 
 
-def torque_check(model: FlatModel, *, target: Target, spring: str | None = None) -> TorqueCheck:
+def torque_check(
+    model: FlatModel, *, target: Target, spring: str | None = None, engaged: float = 0.0
+) -> TorqueCheck:
     """Return the equilibrium torque of a model against a target.
 
-    ``spring``: path of the spring; decided from the structure if it is left out.
+    ``spring``: path of the spring; decided from the structure if it is left out. ``engaged``: angle in rad at
+    which its target begins.
     """
     angles = np.linspace(0.0, target.last_angle, _ANGLES)
-    torque = torque_function(model, spring)(angles.reshape(1, -1), model.start(model.parameters))
+    at = (engaged + angles).reshape(1, -1)
+    torque = torque_function(model, spring)(at, model.start(model.parameters))
     values = np.array(torque, dtype=float).ravel()
     return TorqueCheck(angles, values, target.torque(angles), target.weight(angles))

@@ -13,6 +13,7 @@ from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from ...components.transmission.cam import Cam, TwoSidedCam
 from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
+from ...components.transmission.lopsided_cam import LopsidedCam
 from ...components.transmission.roller_cam import RollerCam
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ArrangementError, ValueRangeError
@@ -291,6 +292,11 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
         return _Anchored(part)
     if isinstance(part, RollerCam):
         return _Roller(part)
+    if isinstance(part, LopsidedCam):
+        raise ArrangementError(
+            "a LopsidedCam", "has two contours, and a target is for one",
+            next_step="design both with design_sides(actuator, targets=(front, back), ...)",
+        )  # fmt: skip
     raise ArrangementError(
         f"a {type(part).__name__}", "has no contour",
         next_step="give its spring a TwoSidedCam, OneSidedCam, AnchoredCam or RollerCam",

@@ -257,12 +257,16 @@ def _at_rest(
     symbols = model.symbols()
     names = [v.name for v in model.signals]
     movable = ca.vertcat(symbols.state, symbols.input)
-    handle, slope = handle_of(symbols.signal[names.index(motion)], movable, motion)
+    turning = symbols.signal[names.index(motion)]
+    handle, slope = handle_of(turning, movable, motion)
     inner = [i for i, v in enumerate(model.states) if v.name in states]
     angle = ca.SX.sym("angle")
     others = ca.vertcat(*[movable[i] for i in range(movable.shape[0]) if i not in (handle, *inner)])
     both = ca.vertcat(symbols.signal, symbols.derivative)
-    old, new = ca.vertcat(others, movable[handle]), ca.vertcat(ca.SX.zeros(others.shape), angle / slope)
+    # A spring that sits turned on its shaft is at zero where that is not.
+    begin = ca.substitute(turning, movable, ca.SX.zeros(movable.shape))
+    at = (angle - begin) / slope
+    old, new = ca.vertcat(others, movable[handle]), ca.vertcat(ca.SX.zeros(others.shape), at)
     both = ca.substitute(both, old, new)
     at_rest = ca.vertcat(*[symbols.state[i] for i in inner])
     rates = ca.vertcat(*[both[len(names) + i] for i in inner])
@@ -402,7 +406,8 @@ def _moved(
             f"'{names[handle]}'", "turns the cam, but belongs to no body with a speed",
             next_step="tie the spring between bodies",
         )  # fmt: skip
-    values = {names[handle]: _ANGLE / slope, body.rate: speed / slope}
+    begin = ca.substitute(angle, movable, ca.SX.zeros(movable.shape))
+    values = {names[handle]: (_ANGLE - begin) / slope, body.rate: speed / slope}
     others = [i for i, name in enumerate(names) if name not in cam.states]
     old = ca.vertcat(*[movable[i] for i in others])
     new = ca.vertcat(*[values.get(names[i], ca.SX(0)) for i in others])

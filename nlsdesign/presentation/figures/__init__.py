@@ -18,6 +18,7 @@ from .design_figures import (
     curve_of_task,
     motor_over_task,
     pareto_front,
+    springs_for_task,
     tolerance_bars,
     torque_band,
 )
@@ -63,6 +64,7 @@ __all__ = [
     "over_time",
     "pareto_front",
     "ranked_intervals",
+    "springs_for_task",
     "stability_over_angle",
     "tolerance_bars",
     "torque_against_measured",

@@ -9,7 +9,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...design import CamDesign, Contour, LimitState, MotorCycle, ParetoFront, TaskCurve, ToleranceResult
+from ...design import (
+    CamDesign,
+    Contour,
+    LimitState,
+    MotorCycle,
+    ParetoFront,
+    SpringChoice,
+    TaskCurve,
+    ToleranceResult,
+)
 from ...design.statics.contour import turn
 from ...design.statics.roller_contour import RollerContour
 from ...foundation.arrays import Array
@@ -24,6 +33,7 @@ from .style import (
     DASHES,
     GREEN,
     GRID,
+    HOLDS,
     INK,
     LIMIT,
     MUTED,
@@ -395,6 +405,45 @@ def curve_of_task(curve: TaskCurve) -> Figure:
         f"Torque of the spring over its deflection up to {np.degrees(curve.target.last_angle):.1f}° and "
         f"{curve.target.largest:.3g} N·m; beside it: {beside}.",
     )
+
+
+@styled
+def springs_for_task(choice: SpringChoice) -> Figure:
+    """Draw what springs in each place leave of a task: torques over the angle of the joint, and the goal.
+
+    Parameters
+    ----------
+    choice
+        For a task.
+    """
+    figure, (loops, bars) = panels(2, height=5.8)
+    beside = choice.both_ways or choice.beside
+    rigid = choice.none.cycle
+    motors = [(rigid.torque, INK, DASHES[2], "of the joint")]
+    if beside and beside.sides:
+        angle = np.linspace(np.min(rigid.angle), np.max(rigid.angle), 400)
+        spring = np.sum([side.torque(angle) for side in beside.sides], axis=0)
+        loops.plot(np.degrees(angle), spring, color=AFTER.light, label="spring beside the drive")
+        motors.append((beside.best.cycle.torque, BEFORE, DASHES[1], "left for the drive"))
+    for torque, tone, dash, label in motors:
+        closed = np.append(rigid.angle, rigid.angle[0]), np.append(torque, torque[0])
+        loops.plot(
+            np.degrees(closed[0]), closed[1], color=tone.light, linestyle=dash, label=label, linewidth=1.2
+        )
+    loops.axhline(0.0, color=MUTED.light, linewidth=0.8)
+    title = "Torque over the angle of the joint"
+    loops.set(title=title, xlabel="angle of the joint in degrees", ylabel="torque in N·m")
+    legend(loops)
+    names, paid = [*choice.motors], [choice.paid(motor) for motor in choice.motors.values()]
+    unit, what = ("W", "peak power") if choice.goal.power else ("J", "loss in the motor per period")
+    places = np.arange(len(names))
+    hatches = ["" if name == choice.best else "///" for name in names]
+    tones = [HOLDS.light if name == choice.best else MUTED.light for name in names]
+    bars.barh(places, paid, color=tones, hatch=hatches, edgecolor="white", height=0.6)
+    bars.set_yticks(places, names)
+    bars.invert_yaxis()
+    bars.set(title=f"Best: {choice.best}", xlabel=f"{what} in {unit}")
+    return described(figure, f"Springs for a task. {choice.reason}")
 
 
 @styled

@@ -174,7 +174,7 @@ def test_a_dry_run_of_a_design_lists_what_it_is_asked_for(run: Run, tmp_path: Pa
     whole = listed(*curve)
     assert "tolerance.svg" in whole
     assert listed(*curve, "--draws", "0") == whole - {"tolerance.svg"}
-    assert listed(*task) == whole | {"task_curve.svg", "task_motor.svg"}
+    assert listed(*task) == whole | {"task_curve.svg", "task_motor.svg", "task_springs.svg"}
     with keeping(tmp_path / "o"):
         write_text(tmp_path / "o" / "tolerance.svg", "of an earlier design, which the next one removes")
     assert listed(*curve, "--draws", "0") == whole
