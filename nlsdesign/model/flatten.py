@@ -20,7 +20,7 @@ from ..components.mechanics.bodies import Body, Motion
 from ..components.sensing.sensors import Sensor
 from ..foundation.errors import ArrangementError, UnitError, nearest, unknown_name
 from ..foundation.quantity import typeset_unit
-from ..foundation.symbolic import Expression, depends
+from ..foundation.symbolic import Expression, depends, remembered
 from .equation_builder import EquationBuilder, PartScope
 from .flat import INTERFACE, FlatModel, Switching, Variable
 from .gear_train import balance_train, train_motions, trains
@@ -60,6 +60,15 @@ def flatten(
     >>> [v.name for v in flatten(swing).states]
     ['wheel.angle', 'wheel.speed']
     """
+    chosen, given = (names if names is None else tuple(names) for names in (inputs, outputs))
+    return _flattened(assembly, chosen, given)
+
+
+@remembered(32)
+def _flattened(
+    assembly: Assembly, inputs: tuple[str, ...] | None, outputs: tuple[str, ...] | None
+) -> FlatModel:
+    """Return the flat model; nothing in it can change, and a command asks for that of its deck many times."""
     builder = EquationBuilder(assembly)
     _write_mechanics(assembly, builder)
     _write_sensors(assembly, builder)

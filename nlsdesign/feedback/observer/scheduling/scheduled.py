@@ -23,11 +23,11 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.quantity import typeset_unit
-from ....foundation.symbolic import Expression
+from ....foundation.symbolic import Expression, remembered
 from ....model import FlatModel, Table, Variable
 from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
-from .angle_form import Minimal, StateForm
+from .angle_form import AngleScheduledPlant, Minimal, StateForm
 from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
 from .step import CascadeGain, FittedGain, GainRule, ObserverStep, speed_change
 from .table import Compact, Draft, FineEntries, Grid, TableTorqueError
@@ -151,9 +151,20 @@ def design_observer_with_details(
             f"is in {typeset_unit(model.variable(measured).unit)}; an observer is scheduled over an angle",
             next_step="export the plant alone, or observe a machine whose motor turns",
         )
-    rule, over = gain or CascadeGain(), grid or whole_contour(model)
+    return _designed(
+        model, estimate, measured, sample_time, gain or CascadeGain(), form or Minimal(),
+        grid or whole_contour(model),
+    )  # fmt: skip
+
+
+@remembered(16)
+def _designed(
+    model: FlatModel, estimate: str, measured: str, sample_time: float, rule: GainRule | FittedGain,
+    form: StateForm, over: Grid,
+) -> ObserverDesign:  # fmt: skip
+    """Return the design; nothing in it can change, and a command asks for that of its deck several times."""
     reference = np.linspace(over.lower, over.upper, 65)
-    plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)
+    plant = _plant(form, model, estimate, measured, (over.lower, over.upper))
     fitted = rule.fitted(plant, sample_time, reference) if isinstance(rule, FittedGain) else rule
     step = ObserverStep(plant, fitted, sample_time, reference)
     observed = tuple(body for body in model.bodies if body.motion == measured)
@@ -164,6 +175,14 @@ def design_observer_with_details(
 
     design = written(over.compact(step.entries, Draft(plant, written)))
     return replace(design, model=design.model.with_values(design.start(0.0)))
+
+
+@remembered(8)
+def _plant(
+    form: StateForm, model: FlatModel, estimate: str, angle: str, ends: tuple[float, float]
+) -> AngleScheduledPlant:
+    """Return the plant of a form; observers of one model with other gains are designed on the same."""
+    return form.plant(model, estimate=estimate, angle=angle, angles=np.linspace(*ends, 65))
 
 
 def check_sampling(model: FlatModel, sample_time: float) -> None:
@@ -215,7 +234,7 @@ class ObserverVariables:
 
     def estimate(self) -> Variable:
         """Return what is wanted."""
-        v, size = self.plant.estimate, float(np.max(np.abs(self.step.scales()["estimate"])))
+        v, size = self.plant.estimate, float(np.max(np.abs(self.step.scales["estimate"])))
         return Variable(v.name, v.unit, f"estimate of {v.name}", nominal=size)
 
     def estimates(self) -> list[Variable]:

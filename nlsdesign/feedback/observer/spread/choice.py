@@ -14,6 +14,7 @@ import numpy as np
 
 from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError, unknown_name
 from ....foundation.quantity import typeset_unit
+from ....foundation.symbolic import remembered
 from ....foundation.written_numbers import prefixed
 from ....model import FlatModel
 from ....model.roles import measured_motion, series_spring, spring_torque
@@ -103,11 +104,20 @@ def choose_observer(
         If a table does not keep its error bound.
     """
     check_sampling(model, sample_time)
-    settings = settings or AdaptiveSettings()
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
-    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
+    names = spring_torque(model, estimate), measured_motion(model, measured)
+    return _chosen(model, cascade, *names, settings, grid)
+
+
+@remembered(8)
+def _chosen(
+    model: FlatModel, cascade: ObserverDesign, estimate: str, measured: str,
+    settings: AdaptiveSettings | None, grid: Grid | None,
+) -> ObserverOfChoice:  # fmt: skip
+    """Return the cascade or the corrected one; a command asks for that of its deck several times."""
+    settings = settings or AdaptiveSettings()
     unit = typeset_unit(model.variable(estimate).unit)
     try:
         learning = corrected(
