@@ -261,6 +261,7 @@ def test_other_names_are_the_same_controller(scheme: Scheme) -> None:
     )
 
 
+@pytest.mark.long_cases("austin2015_figure_consistent")
 @pytest.mark.parametrize("deck", [DECK, "one_sided_cable_drive"])
 def test_c_gives_the_same_numbers(deck: str, tmp_path) -> None:
     velocity = VelocityLoop(disturbance=DisturbanceObserver())
