@@ -133,13 +133,14 @@ class ElasticLaw:
 
     def _evaluated(self, extension: ArrayLike, which: int) -> Array:
         given = np.asarray(extension, dtype=float)
-        values = self._with_numbers(given.reshape(1, -1))[which]
+        values = self._with_numbers[which](given.reshape(1, -1))
         return np.array(values, dtype=float).reshape(given.shape)
 
     @cached_property
-    def _with_numbers(self) -> ca.Function:
+    def _with_numbers(self) -> list[ca.Function]:
         symbol = ca.SX.sym("extension")
-        return ca.Function("law", [symbol], self.function.call([symbol, ca.SX(self.numbers)])[:2])
+        results = self.function.call([symbol, ca.SX(self.numbers)])[:2]
+        return [ca.Function("law", [symbol], [result]) for result in results]
 
 
 def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
