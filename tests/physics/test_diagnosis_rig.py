@@ -85,6 +85,7 @@ def test_nothing_is_invented_on_a_clean_set(tmp_path: Path, only: Sequence[str])
     found = diagnose(*rig_set(tmp_path, "wrist", {}, 78, only=only))
     assert found.verdict == "none"
     assert found.effects == ()
+    assert found.where == (), "a number inside its declared range is not called wrong"
     assert 0.7 < found.held_out_ratio < 1.2
 
 
