@@ -60,13 +60,14 @@ def flatten(
     >>> [v.name for v in flatten(swing).states]
     ['wheel.angle', 'wheel.speed']
     """
-    chosen, given = (names if names is None else tuple(names) for names in (inputs, outputs))
-    return _flattened(assembly, chosen, given)
+    # One name, none, or several, which may be a list.
+    given = (names if isinstance(names, str) else names and tuple(names) for names in (inputs, outputs))
+    return _flattened(assembly, *given)
 
 
 @remembered(32)
 def _flattened(
-    assembly: Assembly, inputs: tuple[str, ...] | None, outputs: tuple[str, ...] | None
+    assembly: Assembly, inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> FlatModel:
     """Return the flat model; nothing in it can change, and a command asks for that of its deck many times."""
     builder = EquationBuilder(assembly)
