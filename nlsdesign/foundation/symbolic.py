@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache, wraps
-from typing import ParamSpec, TypeAlias, TypeVar
+from typing import ParamSpec, TypeAlias, TypeVar, cast
 
 import casadi as ca
 import numpy as np
@@ -192,7 +192,7 @@ def remembered(count: int) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Mark a function whose results cannot change: the last of them are handed out again."""
 
     def around(function: Callable[P, T]) -> Callable[P, T]:
-        last: Callable[P, T] = lru_cache(maxsize=count)(function)
+        last = cast(Callable[P, T], lru_cache(maxsize=count)(function))
 
         @wraps(function)
         def call(*arguments: P.args, **named: P.kwargs) -> T:

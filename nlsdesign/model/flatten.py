@@ -66,9 +66,7 @@ def flatten(
 
 
 @remembered(32)
-def _flattened(
-    assembly: Assembly, inputs: Sequence[str] | None, outputs: Sequence[str] | None
-) -> FlatModel:
+def _flattened(assembly: Assembly, inputs: Sequence[str] | None, outputs: Sequence[str] | None) -> FlatModel:
     """Return the flat model; nothing in it can change, and a command asks for that of its deck many times."""
     builder = EquationBuilder(assembly)
     _write_mechanics(assembly, builder)
