@@ -15,7 +15,7 @@ from ...components.assembly.named_parts import Assembly
 from ...components.core.element import Element
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ConvergenceError
-from ...foundation.symbolic import Expression, depends
+from ...foundation.symbolic import Expression, depends, remembered
 from ...model import FlatModel, Variable
 from ...model.flat import Symbols
 from ...model.graph import applied, as_results, fold, read_graph
@@ -143,6 +143,7 @@ class ElasticLaw:
         return [ca.Function("law", [symbol], [result]) for result in results]
 
 
+@remembered(16)
 def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
     """Return the equilibrium law of the element behind a cam.
 

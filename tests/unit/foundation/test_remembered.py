@@ -69,3 +69,5 @@ def test_an_observer_is_designed_once_for_its_model_gain_and_grid() -> None:
     assert one is again
     assert one.model.sample_time == 1e-3
     assert other.model.sample_time == 2e-3
+    assert nls.torque_controller(plant) is nls.torque_controller(plant)
+    assert nls.torque_controller(plant, sample_time=2e-3).sample_time == 2e-3
