@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache, wraps
-from typing import ParamSpec, TypeAlias, TypeVar, cast
+from typing import ParamSpec, TypeAlias, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -192,15 +192,20 @@ def remembered(count: int) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Mark a function whose results cannot change: the last of them are handed out again."""
 
     def around(function: Callable[P, T]) -> Callable[P, T]:
-        last = cast(Callable[P, T], lru_cache(maxsize=count)(function))
+        last: Callable[..., T] = lru_cache(maxsize=count)(function)
 
         @wraps(function)
         def call(*arguments: P.args, **named: P.kwargs) -> T:
+            # A list counts as it is now.
+            given = [
+                tuple(each) if isinstance(each, list) else each for each in (*arguments, *named.values())
+            ]
             try:
-                hash((*arguments, *named.values()))
-            except TypeError:  # a list or a dictionary, which may change
+                hash(tuple(given))
+            except TypeError:  # a dictionary, an array
                 return function(*arguments, **named)
-            return last(*arguments, **named)
+            count = len(arguments)
+            return last(*given[:count], **dict(zip(named, given[count:], strict=True)))
 
         return call
 

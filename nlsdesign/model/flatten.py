@@ -30,6 +30,7 @@ from .stiction import Laws, natural_modes, switch_laws, switching
 from .structure import Owners, moving_bodies, springs_of
 
 
+@remembered(32)
 def flatten(
     assembly: Assembly, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
 ) -> FlatModel:
@@ -60,14 +61,6 @@ def flatten(
     >>> [v.name for v in flatten(swing).states]
     ['wheel.angle', 'wheel.speed']
     """
-    # One name, none, or several, which may be a list.
-    given = (names if isinstance(names, str) else names and tuple(names) for names in (inputs, outputs))
-    return _flattened(assembly, *given)
-
-
-@remembered(32)
-def _flattened(assembly: Assembly, inputs: Sequence[str] | None, outputs: Sequence[str] | None) -> FlatModel:
-    """Return the flat model; nothing in it can change, and a command asks for that of its deck many times."""
     builder = EquationBuilder(assembly)
     _write_mechanics(assembly, builder)
     _write_sensors(assembly, builder)

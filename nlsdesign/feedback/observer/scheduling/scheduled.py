@@ -27,7 +27,7 @@ from ....foundation.symbolic import Expression, remembered
 from ....model import FlatModel, Table, Variable
 from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
-from .angle_form import AngleScheduledPlant, Minimal, StateForm
+from .angle_form import Minimal, StateForm, plant_over
 from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
 from .step import CascadeGain, FittedGain, GainRule, ObserverStep, speed_change
 from .table import Compact, Draft, FineEntries, Grid, TableTorqueError
@@ -108,6 +108,7 @@ def _written(design: ObserverDesign, compact: Compact) -> ObserverDesign:
     return ObserverDesign(model, design.step, compact)
 
 
+@remembered(16)
 def design_observer_with_details(
     model: FlatModel,
     *,
@@ -151,20 +152,9 @@ def design_observer_with_details(
             f"is in {typeset_unit(model.variable(measured).unit)}; an observer is scheduled over an angle",
             next_step="export the plant alone, or observe a machine whose motor turns",
         )
-    return _designed(
-        model, estimate, measured, sample_time, gain or CascadeGain(), form or Minimal(),
-        grid or whole_contour(model),
-    )  # fmt: skip
-
-
-@remembered(16)
-def _designed(
-    model: FlatModel, estimate: str, measured: str, sample_time: float, rule: GainRule | FittedGain,
-    form: StateForm, over: Grid,
-) -> ObserverDesign:  # fmt: skip
-    """Return the design; nothing in it can change, and a command asks for that of its deck several times."""
+    rule, over = gain or CascadeGain(), grid or whole_contour(model)
     reference = np.linspace(over.lower, over.upper, 65)
-    plant = _plant(form, model, estimate, measured, (over.lower, over.upper))
+    plant = plant_over(form or Minimal(), model, estimate, measured, (over.lower, over.upper))
     fitted = rule.fitted(plant, sample_time, reference) if isinstance(rule, FittedGain) else rule
     step = ObserverStep(plant, fitted, sample_time, reference)
     observed = tuple(body for body in model.bodies if body.motion == measured)
@@ -175,14 +165,6 @@ def _designed(
 
     design = written(over.compact(step.entries, Draft(plant, written)))
     return replace(design, model=design.model.with_values(design.start(0.0)))
-
-
-@remembered(8)
-def _plant(
-    form: StateForm, model: FlatModel, estimate: str, angle: str, ends: tuple[float, float]
-) -> AngleScheduledPlant:
-    """Return the plant of a form; observers of one model with other gains are designed on the same."""
-    return form.plant(model, estimate=estimate, angle=angle, angles=np.linspace(*ends, 65))
 
 
 def check_sampling(model: FlatModel, sample_time: float) -> None:

@@ -67,6 +67,7 @@ class ObserverOfChoice:
         return replace(model, description=f"{model.description}; {self.reason}")
 
 
+@remembered(8)
 def choose_observer(
     model: FlatModel,
     *,
@@ -104,20 +105,11 @@ def choose_observer(
         If a table does not keep its error bound.
     """
     check_sampling(model, sample_time)
+    settings = settings or AdaptiveSettings()
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
-    names = spring_torque(model, estimate), measured_motion(model, measured)
-    return _chosen(model, cascade, *names, settings, grid)
-
-
-@remembered(8)
-def _chosen(
-    model: FlatModel, cascade: ObserverDesign, estimate: str, measured: str,
-    settings: AdaptiveSettings | None, grid: Grid | None,
-) -> ObserverOfChoice:  # fmt: skip
-    """Return the cascade or the corrected one; a command asks for that of its deck several times."""
-    settings = settings or AdaptiveSettings()
+    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     unit = typeset_unit(model.variable(estimate).unit)
     try:
         learning = corrected(
