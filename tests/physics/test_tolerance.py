@@ -318,7 +318,7 @@ def own_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.long_cases("600-2000")
-@pytest.mark.parametrize(("count", "draws"), [(40, 200), (600, 2000)])
+@pytest.mark.parametrize(("count", "draws"), [(80, 300), (600, 2000)])
 def test_quantiles_agree_with_an_independent_monte_carlo(count: int, draws: int) -> None:
     result = tolerance_analysis(actuator(), target=TARGET, rules=RULES, draws=draws, seed=3)
     for own, quantiles in zip(own_errors(count), (result.quantiles, result.trims[0].quantiles), strict=True):

@@ -29,7 +29,7 @@ def watched(request, tmp_path_factory):
     return plan, build_watched(request.param, export_watch(plan, folder / "c", real="float")), folder
 
 
-@pytest.mark.parametrize("minutes", [10, pytest.param(30, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("minutes", [20, pytest.param(30, marks=pytest.mark.slow)])
 def test_time_without_a_change_is_quiet_and_reads_as_none(watched, minutes):
     plan, program, folder = watched
     seen = use(program, 31, 60.0 * minutes, record=folder / "kept.bin")
