@@ -80,8 +80,22 @@ fi
 rm -f "$stamp"
 
 say "installing the locked packages (once; $size) ..."
-# Not compiled here, one after the other: what is imported is compiled then, and most of it never is.
-"$venv/bin/python" -m pip install $quiet --no-compile --require-hashes --only-binary :all: -r "$lock" || {
+# Half of the list each at the same time, for most of it is unpacking; whatever one half needs stands in the other.
+# Not compiled here: what is imported is compiled then, and most of it never is.
+awk -v half="$venv/half" '/^[^ #]/ { odd = n++ % 2 } { print > (half (odd ? 1 : 0) ".txt") }' "$lock"
+install() {
+    "$venv/bin/python" -m pip install "$@" --no-compile --no-deps --require-hashes --only-binary :all:
+}
+install --quiet -r "$venv/half0.txt" &
+beside=$!
+trap 'kill "$beside" 2>/dev/null' INT TERM
+failed=''
+# shellcheck disable=SC2086
+install $quiet -r "$venv/half1.txt" || failed=1
+wait "$beside" || failed=1
+trap - INT TERM
+rm -f "$venv"/half?.txt
+[ -z "$failed" ] || {
     say "the locked packages could not be installed; the reason stands above. Is there a network, a proxy to set?"
     say "With a Python that is newer than the lock, try an older one:  make PYTHON=python3.13 ..."
     exit 2

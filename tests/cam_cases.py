@@ -43,7 +43,7 @@ TARGET = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0)
 
 KEEP = [MinimumRadiusOfCurvature(1e-3), MaximumCamRadius(20e-3), MaximumStrain(1.0)]
 
-ALONE = DesignSettings(starts=4, look_for_size_ranges=False, draws=0)
+ALONE = DesignSettings(starts=2, look_for_size_ranges=False, draws=0)
 """The contour and nothing else: no spring as made, no range of a size; a few starts find the same optimum."""
 
 

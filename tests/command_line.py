@@ -35,8 +35,9 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 @pytest.fixture
 def two_machines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Judge the margins of a written controller over the spread on two machines, where none is looked at."""
+    """Judge margins over the spread on two machines and kick four, where their numbers are not looked at."""
     monkeypatch.setattr(spread_margins, "DRAWS", 2)
+    monkeypatch.setattr(spread_margins, "KICKED", 4)
 
 
 def files_in(folder: Path) -> list[str]:

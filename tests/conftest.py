@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,18 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000, 20, 50)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def in_this_process() -> Iterator[None]:
+    """Work that is shared stays here unless a test says otherwise: pytest's own workers have the cores.
+
+    A process of pytest is large, so that a copy of it costs more than a short piece of work.
+    """
+    from nlsdesign.foundation.work_sharing import Processes, spread_over
+
+    with spread_over(Processes(1)):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.source import parse
+
 
 @dataclass(frozen=True)
 class Import:
@@ -70,7 +72,7 @@ def cycles(edges: Iterable[tuple[str, str]]) -> list[str]:
 def _imports_of(source: str, file: Path, known: dict[str, Path]) -> Iterator[Import]:
     package = source if file.name == "__init__.py" else source.rpartition(".")[0]
     functions = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-    waiting = deque([(ast.parse(file.read_text(encoding="utf-8"), filename=str(file)), False)])
+    waiting = deque([(parse(file), False)])
     while waiting:
         node, lazy = waiting.popleft()
         for target in _targets(node, package, known):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import bisect
 import builtins
+import functools
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -45,7 +46,18 @@ class Lines:
 
 
 def parse(file: Path) -> ast.Module:
+    """Parse a file, once for each of its versions; nobody changes a tree."""
+    return _parsed(file, file.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=600)
+def _parsed(file: Path, changed: int) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+
+
+def forget() -> None:
+    """Let go of the trees, which together take hundreds of megabytes."""
+    _parsed.cache_clear()
 
 
 def lines_of(file: Path, nodes: Iterable[ast.AST] | None = None) -> Lines:

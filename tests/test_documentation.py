@@ -26,6 +26,12 @@ MACHINE = re.compile(r"(?<![\w.~*-])/(?:" + "|".join(["work", "root"]) + r")/|\.
 SCRATCH = re.compile(r"(?<![\w.~*-])/" + r"tmp/")
 
 
+@pytest.fixture(autouse=True, scope="module")
+def trees() -> Iterator[None]:
+    yield
+    source.forget()
+
+
 def python_files(root: Path, *folders: str) -> list[Path]:
     found = [file for folder in folders for file in sorted((root / folder).rglob("*.py"))]
     assert len(found) >= len(folders), f"no Python files in {folders}"

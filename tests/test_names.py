@@ -6,7 +6,6 @@ Each rule runs once per room, so that a failure names the room that breaks it.
 from __future__ import annotations
 
 import ast
-import functools
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
@@ -16,6 +15,7 @@ import pytest
 
 from nlsdesign.foundation.errors import UnitError
 from nlsdesign.foundation.quantity import parse_unit
+from tests import source
 
 ROOMS = (
     *("foundation", "components", "model", "simulation", "design", "feedback", "bench", "export"),
@@ -77,9 +77,10 @@ def sources_of(root: Path, room: str) -> list[Path]:
     return files
 
 
-@functools.cache
-def parsed(file: Path) -> ast.Module:
-    return ast.parse(file.read_text("utf-8"))
+@pytest.fixture(autouse=True, scope="module")
+def trees() -> Iterator[None]:
+    yield
+    source.forget()
 
 
 def room_of(file: Path, root: Path) -> str:
@@ -110,7 +111,7 @@ def classes(files: list[Path], root: Path) -> dict[str, list[Path]]:
     """Files by the name of the public classes that they define."""
     places: dict[str, list[Path]] = defaultdict(list)
     for file in files:
-        for node in parsed(file).body:
+        for node in source.parse(file).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(file.relative_to(root))
     return places
@@ -176,7 +177,7 @@ def test_no_variable_is_named_in_dialect(root: Path, room: str) -> None:
     problems = {
         str(file.relative_to(root)): names
         for file in sources_of(root, room)
-        if (names := dialect(parsed(file)))
+        if (names := dialect(source.parse(file)))
     }
     assert not problems
 
@@ -198,7 +199,7 @@ def test_units_that_people_read_are_typeset(root: Path, room: str) -> None:
     problems = {
         str(file.relative_to(root)): texts
         for file in sources_of(root, room)
-        if (texts := units_in_ascii(parsed(file)))
+        if (texts := units_in_ascii(source.parse(file)))
     }
     assert not problems
 

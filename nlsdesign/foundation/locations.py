@@ -12,6 +12,7 @@ import importlib
 import importlib.util
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Final, Literal
@@ -73,6 +74,7 @@ def version(*, package: Path = _PACKAGE) -> str:
     return importlib.metadata.version("nlsdesign")
 
 
+@cache
 def _checkout_version(package: Path) -> str | None:
     """Return the version in the checkout's ``pyproject.toml``, ``None`` when there is no checkout."""
     try:

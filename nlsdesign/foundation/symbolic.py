@@ -1,15 +1,16 @@
 """Symbolic building blocks; every expression of the package is CasADi SX.
 
 Models are small scalar networks, for which SX gives flat C code, cheap exact derivatives and free
-substitution. This module adds what SX lacks: splines with symbolic coefficients, implicit scalar equations.
+substitution. This module adds what SX lacks: splines with symbolic coefficients, implicit scalar equations,
+and a memory for what was built from them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cache
-from typing import TypeAlias
+from functools import cache, lru_cache, wraps
+from typing import ParamSpec, TypeAlias, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -17,6 +18,8 @@ import numpy as np
 from .arrays import Mask
 
 Expression: TypeAlias = ca.SX
+P = ParamSpec("P")
+T = TypeVar("T")
 
 NEWTON_STEPS = 24
 """Number of iterations of an implicit scalar equation; the worst one halves the bracket."""
@@ -183,3 +186,27 @@ def solve_monotone(
 def _not_zero(slope: Expression) -> Expression:
     # Where g is flat, as between two slack cables, any point is a root and the step is zero.
     return ca.if_else(slope > 0, slope, 1)
+
+
+def remembered(count: int) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Mark a function whose results cannot change: the last of them are handed out again."""
+
+    def around(function: Callable[P, T]) -> Callable[P, T]:
+        last: Callable[..., T] = lru_cache(maxsize=count)(function)
+
+        @wraps(function)
+        def call(*arguments: P.args, **named: P.kwargs) -> T:
+            # A list counts as it is now.
+            given = [
+                tuple(each) if isinstance(each, list) else each for each in (*arguments, *named.values())
+            ]
+            try:
+                hash(tuple(given))
+            except TypeError:  # a dictionary, an array
+                return function(*arguments, **named)
+            count = len(arguments)
+            return last(*given[:count], **dict(zip(named, given[count:], strict=True)))
+
+        return call
+
+    return around

@@ -20,7 +20,7 @@ from ..components.mechanics.bodies import Body, Motion
 from ..components.sensing.sensors import Sensor
 from ..foundation.errors import ArrangementError, UnitError, nearest, unknown_name
 from ..foundation.quantity import typeset_unit
-from ..foundation.symbolic import Expression, depends
+from ..foundation.symbolic import Expression, depends, remembered
 from .equation_builder import EquationBuilder, PartScope
 from .flat import INTERFACE, FlatModel, Switching, Variable
 from .gear_train import balance_train, train_motions, trains
@@ -30,6 +30,7 @@ from .stiction import Laws, natural_modes, switch_laws, switching
 from .structure import Owners, moving_bodies, springs_of
 
 
+@remembered(32)
 def flatten(
     assembly: Assembly, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
 ) -> FlatModel:

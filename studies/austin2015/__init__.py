@@ -14,7 +14,7 @@ from nlsdesign.design import DesignSettings
 
 from .._published import declared_actuator
 from .design import design_spring
-from .diagnosis import RIVALS, diagnose_bench
+from .diagnosis import RIVALS, SLOWEST, diagnose_bench
 from .evaluation import evaluate_loop
 from .figures import compare_with_figures
 from .generated import Code, code_of_three_decks
@@ -41,7 +41,8 @@ def main(out: Path, fast: bool = False) -> Results:
     designed = work_up(cam.design.actuator, out / "designed.toml", out / "designed", steps=steps, fast=fast)
     both = {"published": published, "designed": designed}
     with steps.step("diagnosis of the bench records"):
-        verdict = diagnose_bench(actuator, out, steps, RIVALS if fast else None)
+        catalogue, without = (RIVALS, SLOWEST) if fast else (None, ())
+        verdict = diagnose_bench(actuator, out, steps, catalogue, without=without)
     with steps.step("the diagnosed actuator under code from three decks"):
         codes = {
             name: Code(each.model, each.observers.minimal.model, each.spread.chosen.model)

@@ -87,6 +87,7 @@ def stepped(
     return np.array(states).T
 
 
+@pytest.mark.long_cases("austin2015_as_printed")
 @pytest.mark.parametrize("name", CASES)
 def test_bench_with_a_sine_current(name: str) -> None:
     """Load side held, 4 A at 2 Hz: angle to 1e-7 and torque to 1e-7 of their largest values."""
@@ -115,6 +116,7 @@ def test_bench_with_a_sine_current(name: str) -> None:
     assert np.max(np.abs(x[1])) > math.radians(10)
 
 
+@pytest.mark.long_cases("austin2015_figure_consistent")
 @pytest.mark.parametrize("name", CASES)
 def test_spring_with_a_driven_motor(name: str) -> None:
     """The angle is given: one relaxing force is left, and the drivetrain does not matter."""

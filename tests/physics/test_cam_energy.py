@@ -25,6 +25,9 @@ LAWS: dict[str, Element] = {
 }
 
 
+@pytest.mark.long_cases(
+    "0.0005-linear", "0.0005-concave", "0.0005-convex", "0.004-linear", "0.004-concave", "0.004-piecewise"
+)
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("pretension", [0.5e-3, 4e-3])
 def test_extension_solves_the_balance_of_torques(name: str, pretension: float) -> None:
@@ -58,6 +61,7 @@ def test_linear_rubber_and_linear_target(pretension: float) -> None:
         assert profile.lever_arms == pytest.approx(np.sqrt(slope / (2 * stiffness)), rel=1e-9)
 
 
+@pytest.mark.long_cases("linear", "concave", "piecewise")
 @pytest.mark.parametrize("name", LAWS)
 def test_without_pretension_the_lever_arm_jumps_at_zero(name: str) -> None:
     """h(0+) = √(τ'(0)/(N·K₀)), here with the stiffness K₀ as a difference of forces."""
@@ -71,6 +75,7 @@ def test_without_pretension_the_lever_arm_jumps_at_zero(name: str) -> None:
     assert profile.lever_arms[1] == pytest.approx(profile.lever_arms[0], rel=1e-2)
 
 
+@pytest.mark.long_cases("linear", "convex", "piecewise")
 @pytest.mark.parametrize("name", LAWS)
 def test_with_pretension_the_lever_arm_starts_at_zero_with_a_slope(name: str) -> None:
     """τ'(0) = N·F₀·h'(0)."""

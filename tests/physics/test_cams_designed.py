@@ -6,6 +6,7 @@ cam through ``scipy.interpolate.BSpline``, the extension by quadrature, the law 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -56,7 +57,8 @@ def test_one_sided_cam_against_its_control_values() -> None:
     cam = OneSidedCam(lever_arm=(0.01,) * 12, last_angle=degrees(90.0))
     target = PowerTorque(coefficient=0.7, exponent=1.4, angle=degrees(80.0))
     keep = [MinimumRadiusOfCurvature(1e-3), MaximumCamRadius(20e-3), MaximumStrain(1.0)]
-    found = design_cam(with_cam(cam), target=target, free=PRETENSION, keep=keep, settings=ALONE)
+    settings = replace(ALONE, starts=4)  # two end at another optimum
+    found = design_cam(with_cam(cam), target=target, free=PRETENSION, keep=keep, settings=settings)
     assert found.met
     made = found.actuator["spring.cam"]
     assert isinstance(made, OneSidedCam)

@@ -91,6 +91,7 @@ def scores(found: Refit) -> dict[str, float]:
     return {n.name: (n.fitted - TRUE[n.name]) / n.standard_error for n in found.numbers}
 
 
+@pytest.mark.long_cases("500.0", "200.0")
 @pytest.mark.parametrize("rate", [1000.0, 500.0, 200.0, 100.0])
 def test_the_same_motion_gives_the_same_numbers_at_every_sampling_rate(rate: float) -> None:
     found = fitted(1, rate, 4096)
@@ -111,7 +112,7 @@ def coverage(seeds: range, counts: int) -> tuple[Array, Array]:
 @pytest.mark.long_cases("8192")
 @pytest.mark.parametrize("counts", [512, 8192])
 def test_intervals_hold_the_truth_at_coarse_and_at_fine_counts(counts: int) -> None:
-    held, mean = coverage(range(3, 7), counts)
+    held, mean = coverage(range(3, 5), counts)
     assert np.mean(held) > 0.8
     assert np.max(np.abs(mean)) < 1.5
 
@@ -168,7 +169,7 @@ def test_ten_samples_a_period_are_enough_for_an_inertia() -> None:
 
 def reversed_sharply(quantum: float) -> RecordSet:
     """A body that turns at a nearly even speed and reverses each second within a tenth of a second."""
-    count, half = np.arange(160_000), 0.05
+    count, half = np.arange(80_000), 0.05
     time, turn, since = FINE * count, (count + 5000) // 10_000, FINE * ((count + 5000) % 10_000 - 5000)
     edge = np.sin(0.5 * np.pi * np.clip(since / half, -1.0, 1.0))
     speed = edge * (1.0 - 2.0 * (turn % 2)) + 0.3 * np.sin(1.9 * time)

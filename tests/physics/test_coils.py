@@ -206,12 +206,14 @@ def test_limits_follow_from_what_a_coil_declares() -> None:
     assert stated == (MaximumTravel(0.04),)
 
 
+@pytest.mark.long_cases("length")
 @pytest.mark.parametrize(
     ("coil", "words"),
     [
         (replace(PULLED, **STATED), "nothing limits what the wire bears"),  # type: ignore[arg-type]
         (replace(PULLED, free_length=0.02), "long when they touch, more than 0.02 m"),
     ],
+    ids=["wire", "length"],
 )
 def test_a_design_says_what_is_not_known_or_does_not_fit(coil: Coil, words: str) -> None:
     assert [remark for remark in designed(coil).remarks if words in remark]
@@ -251,7 +253,7 @@ def test_the_smallest_coil_of_a_catalogue_that_holds_is_taken(tmp_path: Path) ->
         """,
         encoding="utf-8",
     )
-    settings = DesignSettings(draws=0, look_for_size_ranges=False, look_for_remedies=False, starts=2)
+    settings = DesignSettings(draws=0, look_for_size_ranges=False, look_for_remedies=False, starts=1)
     asked = read_job(job)
     assert isinstance(asked.target, Target)
     drive = nls.declare(nls.load_deck("coil_cable_drive"))

@@ -26,6 +26,7 @@ def linear_loop(stiffness: float, gains: TorqueGains, *, moved: bool) -> ClosedL
     )
 
 
+@pytest.mark.long_cases("20.0-8.0", "32.0-3.4")
 @pytest.mark.parametrize("stiffness", [3.4, 8.0])
 @pytest.mark.parametrize("proportional", [32.0, 20.0])
 def test_a_moved_load_feels_its_speed_over_the_gain(stiffness: float, proportional: float) -> None:

@@ -77,7 +77,7 @@ def test_an_exact_deck_costs_nothing_whatever_the_current_meter_does(
     course = bench[0]
     run = course.run(course.declared)
     noise = 0.5 * np.random.default_rng(7).standard_normal(len(run.current))
-    for current in (run.current, run.current + 0.2, run.current + noise):
+    for current in (run.current, run.current + 0.2 + noise):
         alone, corrected = errors(bench, Run(run.angle, current, run.torque))
         assert np.all(corrected <= np.maximum(1.5 * alone, 3e-3))
 

@@ -167,8 +167,10 @@ CASES = {
     "one branch-0.3",
     "one branch-4.0",
     "one-sided-0.3",
+    "one-sided-4.0",
     "one-sided, part-4.0",
     "part of the range-0.3",
+    "part of the range-4.0",
     "two branches-4.0",
 )
 @pytest.mark.parametrize("frequency", [0.3, 4.0])

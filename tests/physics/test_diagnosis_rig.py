@@ -6,6 +6,7 @@ threshold.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,9 @@ from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
-from tests.diagnosed import declared_rig, names, verdict_of
-from tests.rig import ACTUATORS, truth
+from tests.diagnosed import declared_rig, names, rig_set, verdict_of
+from tests.rig import ACTUATORS, THREE_RECORDS, truth
+from tests.rig.commands import RECORDS
 
 SINGLE = [
     ("arm", "coulomb_friction", "dry_friction.sliding_effort", "friction"),
@@ -78,10 +80,12 @@ def test_stiffening_rubber_is_not_taken_for_another_rig(tmp_path: Path) -> None:
     assert names(found) == ["strain_stiffening"]
 
 
-def test_nothing_is_invented_on_a_clean_set(tmp_path: Path) -> None:
-    found = verdict_of(tmp_path, "wrist", {}, 78)
+@pytest.mark.parametrize("only", [THREE_RECORDS, pytest.param(RECORDS, marks=pytest.mark.slow)], ids=len)
+def test_nothing_is_invented_on_a_clean_set(tmp_path: Path, only: Sequence[str]) -> None:
+    found = diagnose(*rig_set(tmp_path, "wrist", {}, 78, only=only))
     assert found.verdict == "none"
     assert found.effects == ()
+    assert found.where == (), "a number inside its declared range is not called wrong"
     assert 0.7 < found.held_out_ratio < 1.2
 
 

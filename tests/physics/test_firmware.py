@@ -19,8 +19,9 @@ def firmware(tmp_path_factory: pytest.TempPathFactory) -> Firmware:
     return made(CORTEX_M7, "double", tmp_path_factory.mktemp("firmware"))
 
 
-def test_firmware_and_fmu_give_the_same_bits_for_five_seconds(firmware, tmp_path):
-    run = run_both(firmware, CORTEX_M7, 5000, tmp_path)
+@pytest.mark.parametrize("samples", [1000, pytest.param(5000, marks=pytest.mark.slow)])
+def test_firmware_and_fmu_give_the_same_bits(firmware, tmp_path, samples):
+    run = run_both(firmware, CORTEX_M7, samples, tmp_path)
     assert run.differing == 0
     assert run.faults == 0
     # The loop was alive: torques of newton metres, followed to a tenth.
@@ -30,9 +31,12 @@ def test_firmware_and_fmu_give_the_same_bits_for_five_seconds(firmware, tmp_path
     assert 100 < run.clocks[0] <= run.clocks[1] < 5000
 
 
-def test_nothing_locks_when_interrupts_frames_and_supply_fail(firmware, tmp_path):
-    run = run_faults(firmware, CORTEX_M7, 2500, tmp_path, seed=3)
-    assert sum(run.given.values()) >= 4
+@pytest.mark.parametrize(
+    ("samples", "seed", "faults"), [(600, 3, 2), pytest.param(2500, 3, 4, marks=pytest.mark.slow)]
+)
+def test_nothing_locks_when_interrupts_frames_and_supply_fail(firmware, tmp_path, samples, seed, faults):
+    run = run_faults(firmware, CORTEX_M7, samples, tmp_path, seed=seed)
+    assert sum(run.given.values()) >= faults
     assert run.given["brown out"] > 0
     assert (run.processor_faults, run.restarts, run.lost, run.beyond, run.unflagged) == (0, 0, 0, 0, 0)
     assert run.worst < 0.04

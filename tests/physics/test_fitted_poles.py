@@ -32,7 +32,7 @@ SECONDS, COARSE = 1.5, ObserverChoice(sample_time=2e-3)
 @pytest.fixture(scope="module", autouse=True)
 def small_table() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fitted_poles, "GRID_POINTS", 41)
+        patch.setattr(fitted_poles, "GRID_POINTS", 21)
         yield
 
 
@@ -67,7 +67,10 @@ def recorded(tables: dict[str, np.ndarray], signals: Sequence[str] = tuple(SIGNA
 
 @pytest.fixture(scope="module")
 def fitted(model: FlatModel, bench: RecordSet) -> FittedPoles:
-    return fit_poles(model, bench, choice=COARSE)
+    """A few steps from each start, which is far enough."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fitted_poles, "_STEPS", 8)
+        return fit_poles(model, bench, choice=COARSE)
 
 
 def test_fitted_poles_err_less_than_the_gain_of_the_cascade(fitted: FittedPoles) -> None:
@@ -104,7 +107,7 @@ def test_the_error_printed_is_that_of_the_observer_that_is_written(
 
 def test_the_margin_is_that_of_the_error_between_the_points_too(fitted: FittedPoles) -> None:
     ends = fitted.design.compact.angles[[0, -1]]
-    angles = np.linspace(*ends, 40 * 25 + 1)
+    angles = np.linspace(*ends, 20 * 25 + 1)
     radius = np.abs(np.linalg.eigvals(error_matrices(fitted.design.model, angles))).max(axis=1)
     assert fitted.worst[1] == pytest.approx(radius.max(), abs=2e-3)
     assert fitted.worst[1] < 1.0

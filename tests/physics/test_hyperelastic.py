@@ -83,7 +83,7 @@ def test_at_small_strain_the_modulus_is_three_times_the_shear_modulus(name: str)
     assert (high - low) / 2e-5 == pytest.approx(MODULUS[name], rel=1e-7)
 
 
-@settings(max_examples=25)
+@settings(max_examples=settings.default.max_examples)
 @given(st.floats(-0.5, 4.0), st.floats(1e4, 1e7))
 def test_ogden_and_yeoh_contain_neo_hooke(strain: float, modulus: float) -> None:
     """One pair with the exponent 2, and a cubic without square and cube, are neo-Hooke: μ·(λ − λ⁻²)."""

@@ -112,6 +112,7 @@ def test_tables_with_and_without_their_slope() -> None:
     assert sloped == pytest.approx(frozen, rel=0.05)
 
 
+@pytest.mark.long_cases("20.0")
 @pytest.mark.parametrize("angle", [20.0, 35.0])
 def test_gain_margin_is_the_factor_that_makes_the_loop_unstable(angle: float) -> None:
     loop, at = loops(NLS, integral=0.0)[0], np.radians([angle])

@@ -91,10 +91,10 @@ def drag(live: LiveDesign, draw: np.random.Generator, size: float = 0.03) -> Liv
 
 
 def test_quick_answer_of_a_template_is_the_whole_design(template: LiveDesign) -> None:
-    require_same(template.answer, template.question, starts=2)
+    require_same(template.answer, template.question, starts=1)
     point = template.question.points[3]
     answer = template.apply(edit(move_point, 3, point.angle * 1.02, point.torque * 1.1))
-    require_same(answer, template.question, starts=2)
+    require_same(answer, template.question, starts=1)
 
 
 @pytest.mark.slow
@@ -148,7 +148,7 @@ def path(deck: str, drags: int) -> None:
 
 
 def test_a_path_of_drags_ends_where_a_fresh_session_begins() -> None:
-    path("cam-actuator", 8)
+    path("cam-actuator", 3)
 
 
 @pytest.mark.slow

@@ -112,7 +112,7 @@ def test_a_cable_on_the_machined_edge_gives_the_claimed_torque(name: str, tmp_pa
     text = file.read_text(encoding="utf-8")
     assert header_of(text)["$INSUNITS"].strip() == "4", "drawing units are not millimetres"
     anchor = 1e3 * contour.anchor_distance if math.isfinite(contour.anchor_distance) else FAR
-    angles = np.linspace(contour.angles[0], contour.angles[-1], 60)
+    angles = np.linspace(contour.angles[0], contour.angles[-1], 20)
     arms = 1e3 * np.interp(angles, contour.angles, contour.lever_arms)
     wound = 1e3 * np.interp(angles, contour.angles, contour.taken_lengths)
     claimed = force(wound) * arms
@@ -142,7 +142,7 @@ def test_the_arcs_keep_the_stated_distance_from_the_offset_of_the_integrated_cur
     place = np.array([7.0, 0.0]) + np.column_stack(
         [cumulative_simpson(rho * f, x=phi, initial=0.0) for f in (np.cos(phi), -np.sin(phi))]
     )
-    wanted = (place - 0.25 * np.column_stack([np.sin(phi), np.cos(phi)]))[::200]
+    wanted = (place - 0.25 * np.column_stack([np.sin(phi), np.cos(phi)]))[::1000]
     away = [np.min(np.hypot(*(drawn - point).T)) for point in wanted]
     # Drawn points are up to 0.5 µm apart, so the nearest of them may lie 0.25 µm further along.
     assert max(np.sqrt(np.maximum(np.square(away) - 0.25e-3**2, 0.0))) < 1.05 * stated
@@ -161,7 +161,7 @@ def test_the_lever_arm_is_the_change_of_the_string_s_length(name: str, tmp_path:
     anchor = 1e3 * contour.anchor_distance if math.isfinite(contour.anchor_distance) else 1e4
     string = strings(file.read_text(encoding="utf-8"))[0]
     step = 1e-3
-    for angle in np.linspace(contour.angles[0] + 0.02, contour.angles[-1] - 0.02, 9):
+    for angle in np.linspace(contour.angles[0] + 0.02, contour.angles[-1] - 0.02, 5):
         after, before = (string.pulled(angle + change, anchor)[0] for change in (step, -step))
         assert (after - before) / (2 * step) == pytest.approx(string.pulled(angle, anchor)[1], abs=2e-3)
 

@@ -128,7 +128,7 @@ def springpot(order: float, lower: float = 0.01, upper: float = 100.0) -> Spring
     return Springpot(modulus=1e6, reference=3.0, order=order, lower=lower, upper=upper)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @given(st.floats(0.02, 0.95), st.floats(-3.0, 0.0), st.floats(1.0, 4.0), st.floats(0.0, 1.0))
 def test_the_stated_error_bounds_the_error_inside_the_band(
     order: float, low: float, decades: float, place: float

@@ -94,7 +94,7 @@ def test_the_minimal_form_does_not_depend_on_the_state_that_carries_it(
     """Strain, relaxing force and total force: known functions of the angle apart, and integrated as such."""
     estimates = []
     for other in (model, ob.on_relaxing_force(model), replace_state(model, ob.STRAIN, ob.FORCE)):
-        observer = design_observer_with_details(other, grid=FixedGrid(-1.0, 1.0, points=1001)).model
+        observer = design_observer_with_details(other, grid=FixedGrid(-1.0, 1.0, points=501)).model
         estimates.append(observe(observer, moving)["spring.torque"])
     size = np.max(np.abs(moving["spring.torque"]))
     assert np.max(np.abs(estimates[1] - estimates[0])) < 1e-4 * size
@@ -194,6 +194,7 @@ def test_the_correction_reduces_what_the_rubber_model_has_wrong() -> None:
 # --- stability ------------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("minimal-31000.0", "published-411.0")
 @pytest.mark.parametrize("viscosity", [ob.PRINTED, ob.SLOW])
 @pytest.mark.parametrize("form", ["minimal", "published"])
 def test_the_cascade_is_proved_for_every_motion(viscosity: float, form: str) -> None:
@@ -266,6 +267,7 @@ def test_pole_placement_is_unstable_between_its_grid_points(points: int, first: 
     assert np.max(cascade.radius) < 0.95
 
 
+@pytest.mark.long_cases("austin2015_as_printed")
 @pytest.mark.parametrize("deck", ["austin2015_as_printed", "austin2015_figure_consistent"])
 def test_the_decks_have_an_observer_that_is_right(deck: str) -> None:
     model = flatten(declare(load_deck(deck)), outputs=["motor.angle", "spring.torque"])

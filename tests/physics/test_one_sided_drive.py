@@ -114,7 +114,7 @@ def test_the_drive_agrees_with_its_equations_typed_here() -> None:
 
 
 def test_work_put_in_by_the_winding_is_stored_or_lost() -> None:
-    times = np.linspace(0.0, 1.2, 12_001)
+    times = np.linspace(0.0, 1.2, 6_001)
     run = driven(times, tolerance=1e-8)
     motor, drum = run["motor.speed"], run["drum.speed"]
     strain = run["spring.cable.rope.rubber.strain"]

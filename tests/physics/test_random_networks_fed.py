@@ -64,7 +64,7 @@ def stiffness(linear: LinearModel, s: complex) -> complex:
 def test_rate_fed_networks_agree_with_complex_stiffness(batch: int) -> None:
     draw = random.Random(7000 + batch)
     asked = 0
-    for number in range(60):
+    for number in range(30):
         element, law = joined(draw, draw.randint(1, 4), linear_leaf)
         model = flatten(
             assembly("net", grip=Driven(domain=TRANSLATION), net=tie(element, "grip")), outputs=["net.force"]
@@ -74,7 +74,7 @@ def test_rate_fed_networks_agree_with_complex_stiffness(batch: int) -> None:
         for frequency in FREQUENCIES:
             s = 2j * np.pi * frequency
             assert abs(stiffness(linear, s) - law(s)) <= 1e-8 * abs(law(s)), (batch, number, frequency)
-    assert asked >= 20, "the element in question is really there"
+    assert asked >= 10, "the element in question is really there"
 
 
 def test_three_fed_solids_in_series_at_any_state() -> None:

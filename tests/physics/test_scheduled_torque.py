@@ -128,7 +128,7 @@ def margins(stiffness: float, floor: float) -> tuple[float, float]:
     return min(beyond), min(phase)
 
 
-@pytest.mark.long_cases("0.5", "3.4", "6.0")
+@pytest.mark.long_cases("0.5", "1.7", "3.4", "6.0")
 @pytest.mark.parametrize("stiffness", [0.05, 0.5, 1.7, 3.4, 6.0, 10.4])
 def test_the_defaults_leave_six_decibel_and_thirty_degrees_at_every_stiffness(stiffness: float) -> None:
     gain, phase = margins(stiffness, 1.0)
@@ -240,6 +240,7 @@ def test_friction_between_motor_and_torque_wants_less_bandwidth() -> None:
 # --- other names, other languages ------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("in_words", "against_the_order", "nested")
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_other_names_are_the_same_controller(scheme: Scheme) -> None:
     assembly_ = nls.declare(nls.load_deck(DECK))
@@ -260,6 +261,7 @@ def test_other_names_are_the_same_controller(scheme: Scheme) -> None:
     )
 
 
+@pytest.mark.long_cases("austin2015_figure_consistent")
 @pytest.mark.parametrize("deck", [DECK, "one_sided_cable_drive"])
 def test_c_gives_the_same_numbers(deck: str, tmp_path) -> None:
     velocity = VelocityLoop(disturbance=DisturbanceObserver())

@@ -47,7 +47,7 @@ def common(inverses: list, whole: float, most: float) -> float:
 @pytest.mark.parametrize("count", [3, 4, 6])
 def test_hardening_springs_share_by_the_common_force(count: int) -> None:
     draw = np.random.default_rng(count)
-    for _ in range(6):
+    for _ in range(3):
         stiffness, hardening = 10 ** draw.uniform(-1, 3, count), 10 ** draw.uniform(-2, 5, count)
         members = {
             f"e{i}": Hardening(stiffness=k, hardening=h)
@@ -71,7 +71,7 @@ def test_hardening_springs_share_by_the_common_force(count: int) -> None:
 def test_pieces_of_rubber_with_knots_share_by_the_common_force() -> None:
     """Piecewise linear laws, where Newton's method alone may run to and fro between two pieces."""
     draw = np.random.default_rng(7)
-    for _ in range(8):
+    for _ in range(3):
         lengths, moduli = 10 ** draw.uniform(-2, -1, 4), 10 ** draw.uniform(4, 7, (4, 4))
         laws = [StrainStiffening(modulus=tuple(row), knots=tuple(KNOTS)) for row in moduli]
         members = {

@@ -119,6 +119,7 @@ class Bound:
         return np.concatenate(parts) if parts else np.zeros(len(w))
 
 
+@pytest.mark.long_cases("observer")
 @pytest.mark.parametrize("which", ["observer", "both"])
 def test_single_precision_keeps_a_derived_bound(which: str, tmp_path: Path) -> None:
     model = machine(which)
@@ -126,7 +127,7 @@ def test_single_precision_keeps_a_derived_bound(which: str, tmp_path: Path) -> N
     run, bound = GuardedModel(model), Bound(model)
     parameters, draw = model.start(model.parameters), np.random.default_rng(5)
     seen, allowed = [], []
-    for k in range(600):
+    for k in range(300):
         reading = float(np.float32(0.5 * math.sin(0.01 * k) + 1e-3 * draw.normal()))
         other = float(np.float32(math.sin(0.007 * k) + (2.0 if which == "observer" else 0.5)))
         before = run.state.copy()

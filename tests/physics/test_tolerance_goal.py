@@ -82,7 +82,9 @@ def drawn_quantile(
     return float(np.sqrt(np.quantile(squares, goal.share)))
 
 
-@pytest.mark.long_cases("trimmed-0.5", "trimmed-0.9", "trimmed-0.99", "as built-0.9", "as built-0.95")
+@pytest.mark.long_cases(
+    "trimmed-0.5", "trimmed-0.9", "trimmed-0.99", "as built-0.5", "as built-0.9", "as built-0.95"
+)
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])
 @pytest.mark.parametrize("trims", [None, ()], ids=["trimmed", "as built"])
 def test_the_quantile_is_that_of_draws(share: float, trims: tuple[str, ...] | None) -> None:

@@ -35,6 +35,7 @@ from tests.rig.bench import SPOT_PLACE
 RECORDS = ("sine_45deg_0.5Hz", "sine_25deg_2.0Hz", "sine_15deg_5.0Hz", "multisine")
 HELD_OUT = "sine_25deg_2.0Hz"
 SEED = 41
+CASES = [("arm", "rubbing_spot", "motor"), ("wrist", "strain_stiffening", "spring")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +71,7 @@ def case(actuator: str, effect: str) -> Case:
 
 
 @pytest.mark.long_cases("wrist-strain_stiffening-spring")
-@pytest.mark.parametrize(
-    ("actuator", "effect", "block"),
-    [("arm", "rubbing_spot", "motor"), ("wrist", "strain_stiffening", "spring")],
-)
+@pytest.mark.parametrize(("actuator", "effect", "block"), CASES)
 def test_the_gap_closes_on_a_record_that_was_held_out(actuator: str, effect: str, block: str) -> None:
     made = case(actuator, effect)
     candidate = made.part(block)
@@ -148,9 +146,13 @@ def test_its_deck_is_read_by_every_command(tmp_path: Path) -> None:
     assert np.ptp(plain["motor.angle"]) > 0.01
 
 
-def test_it_is_a_candidate_like_others_but_not_of_the_catalogue() -> None:
-    made = case("wrist", "strain_stiffening")
-    candidate = made.part("spring")
+@pytest.mark.long_cases("wrist-strain_stiffening-spring")
+@pytest.mark.parametrize(("actuator", "effect", "block"), CASES)
+def test_it_is_a_candidate_like_others_but_not_of_the_catalogue(
+    actuator: str, effect: str, block: str
+) -> None:
+    made = case(actuator, effect)
+    candidate = made.part(block)
     assert candidate is not None
     assert candidate.effect == EFFECT
     assert EFFECT not in {row.__name__ for row in ALL}

@@ -29,11 +29,12 @@ def watched(request, tmp_path_factory):
     return plan, build_watched(request.param, export_watch(plan, folder / "c", real="float")), folder
 
 
-def test_half_an_hour_without_a_change_is_quiet_and_reads_as_none(watched):
+@pytest.mark.parametrize("minutes", [20, pytest.param(30, marks=pytest.mark.slow)])
+def test_time_without_a_change_is_quiet_and_reads_as_none(watched, minutes):
     plan, program, folder = watched
-    seen = use(program, 31, 1800.0, record=folder / "kept.bin")
+    seen = use(program, 31, 60.0 * minutes, record=folder / "kept.bin")
     assert math.isinf(seen.first)
-    assert seen.judged == 179
+    assert seen.judged == 6 * minutes - 1
     assert seen.usable > 0.99
     assert read_watch(read_watch_record(folder / "kept.bin", plan), plan).verdict == "none"
 

@@ -11,6 +11,7 @@ import pytest
 from nlsdesign.cli.studies import claims, not_as_claimed, run_study
 from nlsdesign.components import flat_relaxation, loss_of, material
 from studies import alternative_rubber
+from studies.alternative_rubber import merits
 from studies.alternative_rubber.bench import Bench, Measured, Rubber, Run
 from studies.alternative_rubber.candidates import BRANCHES, TARGET, Candidate, candidates, designed
 from studies.alternative_rubber.merits import METRICS, Merits, bandwidths, largest_gains
@@ -25,8 +26,11 @@ NAME = "alternative_rubber"
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, float]]:
+    """A quarter of the gains between quiet and limit cycle: the onset scatters by half a per cent."""
     out = tmp_path_factory.mktemp(NAME)
-    return out, dict(alternative_rubber.main(out, fast=True).numbers)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(merits, "LADDER", 33)
+        return out, dict(alternative_rubber.main(out, fast=True).numbers)
 
 
 def test_the_study_keeps_its_claims(results: tuple[Path, dict[str, float]]) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -46,7 +49,52 @@ def test_some_documents_show_code() -> None:
     assert len(SHOWING) > 5
 
 
+def names_read(text: str) -> Iterator[tuple[str, ...]]:
+    """Yield each chain of attributes in a text, ``nls.observer.CascadeGain`` as three names."""
+    for node in ast.walk(ast.parse(text)):
+        chain: list[str] = []
+        while isinstance(node, ast.Attribute):
+            chain.insert(0, node.attr)
+            node = node.value
+        if chain and isinstance(node, ast.Name):
+            yield (node.id, *chain)
+
+
+def missing_names(text: str, names: dict[str, Any]) -> list[str]:
+    """Execute the imports of a block of Python; return what it reads of a module that is not there."""
+    tree = ast.parse(text)
+    tree.body = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    exec(compile(tree, "imports", "exec", dont_inherit=True), names)
+    lacking = []
+    for first, *rest in names_read(text):
+        value = names.get(first)
+        for name in rest:
+            if not isinstance(value, ModuleType):
+                break
+            if not hasattr(value, name):
+                lacking.append(".".join((first, *rest)))
+                break
+            value = getattr(value, name)
+    return lacking
+
+
+# Some documents run in the quick run; that what the others import is there, this tells of all.
+@pytest.mark.parametrize("document", SHOWING)
+def test_what_the_documents_name_exists(document: str) -> None:
+    names: dict[str, Any] = {}
+    for text in PYTHON.findall((DOCS / document).read_text(encoding="utf-8")):
+        assert missing_names(text, names) == []
+
+
+def test_a_name_that_does_not_exist_is_noticed() -> None:
+    assert missing_names("import math\nx = math.pi + math.tau.real\n", {}) == []
+    assert missing_names("import math\nprint(math.pie)\n", {}) == ["math.pie"]
+    with pytest.raises(ImportError):
+        missing_names("from math import pie\n", {})
+
+
 @pytest.mark.long_cases(
+    "asked_elsewhere.md",
     "certificates.md",
     "how_to/both_strokes_and_losses.md",
     "how_to/calibrate_on_the_bench.md",

@@ -127,8 +127,12 @@ def _work(law: ElasticLaw, start: Array, end: Array) -> Array:
 def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Array, Array]:
     longest = 1e-3
     while longest < _LONGEST:
-        grid = longest * np.linspace(0.0, 1.0, _CELLS + 1) ** 2
-        gains = _work(law, pretension + grid[:-1], pretension + grid[1:])
+        # A few cells tell that a length is far too short.
+        for cells in (_CELLS // 20, _CELLS):
+            grid = longest * np.linspace(0.0, 1.0, cells + 1) ** 2
+            gains = _work(law, pretension + grid[:-1], pretension + grid[1:])
+            if np.sum(gains) < 0.9 * needed:
+                break
         if not np.all(gains > 0.0):
             break
         stored = np.concatenate([[0.0], np.cumsum(gains)])

@@ -15,7 +15,7 @@ from ...components.assembly.named_parts import Assembly
 from ...components.core.element import Element
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ConvergenceError
-from ...foundation.symbolic import Expression, depends
+from ...foundation.symbolic import Expression, depends, remembered
 from ...model import FlatModel, Variable
 from ...model.flat import Symbols
 from ...model.graph import applied, as_results, fold, read_graph
@@ -133,15 +133,17 @@ class ElasticLaw:
 
     def _evaluated(self, extension: ArrayLike, which: int) -> Array:
         given = np.asarray(extension, dtype=float)
-        values = self._with_numbers(given.reshape(1, -1))[which]
+        values = self._with_numbers[which](given.reshape(1, -1))
         return np.array(values, dtype=float).reshape(given.shape)
 
     @cached_property
-    def _with_numbers(self) -> ca.Function:
+    def _with_numbers(self) -> list[ca.Function]:
         symbol = ca.SX.sym("extension")
-        return ca.Function("law", [symbol], self.function.call([symbol, ca.SX(self.numbers)])[:2])
+        results = self.function.call([symbol, ca.SX(self.numbers)])[:2]
+        return [ca.Function("law", [symbol], [result]) for result in results]
 
 
+@remembered(16)
 def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
     """Return the equilibrium law of the element behind a cam.
 

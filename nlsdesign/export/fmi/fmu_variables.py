@@ -18,6 +18,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
+from ...foundation.symbolic import remembered
 from ...model.flat import FlatModel, Switch, Variable
 from ..c.guarded_step import FIRST_INDEX_BIT, STATUS_BITS
 from .expression_walk import EVERYTHING, ranges
@@ -120,6 +121,7 @@ class FmuLayout:
         return tuple(each for each in self.reals if each.causality == "output")
 
 
+@remembered(8)
 def layout(model: FlatModel) -> FmuLayout:
     """Return the variables of the FMU of a model."""
     continuous = model.sample_time is None

@@ -148,6 +148,7 @@ print("numpy" in sys.modules, *[os.environ.get(name) for name in {THREADS!r}])
     assert done.stdout.split()[-5:] == ["False", *used], done.stderr
 
 
+@pytest.mark.long_cases("cam-actuator")
 @pytest.mark.parametrize("deck", ["cam-actuator", "test_rig"])
 def test_the_live_page_answers_before_any_numerical_library_is_loaded(loaded: Loaded, deck: str) -> None:
     ended = """

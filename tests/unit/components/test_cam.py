@@ -47,7 +47,7 @@ def random_cam(seed: int, *, count: int = 14, changeover: float = 1e-3) -> TwoSi
 # --- the spline under the cam ---------------------------------------------------------------------
 
 
-@settings(max_examples=40)
+@settings(max_examples=settings.default.max_examples)
 @given(st.integers(5, 45), st.integers(0, 10**6), st.floats(0.0, 1.0))
 def test_spline_and_its_integral_against_scipy(count: int, seed: int, share: float) -> None:
     lower, step = -0.3, 0.07

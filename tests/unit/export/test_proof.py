@@ -13,9 +13,9 @@ import nlsdesign as nls
 from nlsdesign.export import CSource, export_c
 from nlsdesign.export.compilation.proof import missing_prover, prove_step, with_numbers_admitted
 from nlsdesign.foundation.errors import ExportError
-from tests.command_line import Run, run
+from tests.command_line import Run, run, two_machines
 
-__all__ = ["run"]
+__all__ = ["run", "two_machines"]
 
 needs_prover = pytest.mark.skipif(bool(missing_prover()), reason=missing_prover())
 
@@ -115,6 +115,7 @@ def test_what_a_comparison_implies_stands_behind_it() -> None:
     assert "admit !\\is_NaN((double)a.very.long.name)" in with_numbers_admitted(wrapped)
 
 
+@pytest.mark.usefixtures("two_machines")
 def test_the_command_writes_the_library_and_says_what_a_proof_needs(
     run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -115,7 +115,7 @@ def test_any_number_comes_back_bit_for_bit(value: float, unit: str, spread: floa
     assert round_trip(made) == made
 
 
-@settings(max_examples=100)
+@settings(max_examples=settings.default.max_examples)
 @given(
     st.lists(st.floats(min_value=-0.04, max_value=0.9), min_size=5, max_size=12),
     st.sampled_from(["mm", "cm", "µm", "m"]),

@@ -48,7 +48,7 @@ def drawn(name: str) -> figures.Figure:
 # --- every figure ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::8]))
+@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::15]))
 def test_a_figure_is_drawn_the_same_whatever_the_user_has_set(name: str) -> None:
     first = svg_text(drawn(name))
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 20.0, "axes.facecolor": "red"}):
@@ -75,7 +75,7 @@ def test_a_figure_has_words_labels_and_units(name: str) -> None:
 
 
 # Of each kind, for most other tests leave the figures of their pages blank: tests/undrawn.py.
-@pytest.mark.parametrize("name", samples.FIGURES)
+@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::3]))
 def test_an_inline_figure_fits_into_any_page(name: str) -> None:
     figure = drawn(name)
     root = ET.fromstring(figures.inline_svg(figure, "k7"))

@@ -105,7 +105,7 @@ def clean_swing() -> np.ndarray:
 ADDED = [name for name in (*EFFECTS, *LATER_EFFECTS, *OUTSIDE_ANY_CATALOGUE) if name != "none"]
 
 
-@pytest.mark.parametrize("effect", quick_only(ADDED, ADDED[::8]))
+@pytest.mark.parametrize("effect", quick_only(ADDED, ADDED[::16]))
 def test_every_effect_shows_above_the_noise(clean_swing: np.ndarray, effect: str) -> None:
     wrist = ACTUATORS["wrist"]
     wrong = make_records(wrist, {effect: 1.0}, 9, noise=False, only=[WIDEST])[WIDEST]

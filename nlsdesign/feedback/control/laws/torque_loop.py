@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from ....foundation.errors import ArrangementError, ValueRangeError
+from ....foundation.symbolic import remembered
 from ....model import FlatModel, Variable
 from ....model.roles import series_spring, with_declared_reading
 from .command_limits import with_command_limits
@@ -99,6 +100,7 @@ The paper prints no gains. On the deck of its nonlinear spring these have a gain
 :func:`~nlsdesign.feedback.control.evaluate_loop` finds."""
 
 
+@remembered(16)
 def torque_controller(
     plant: FlatModel,
     *,

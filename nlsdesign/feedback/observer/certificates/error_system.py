@@ -21,7 +21,7 @@ from ....foundation.errors import ArrangementError, ConvergenceError
 from ....model import FlatModel
 from ....model.paper_form import GEOMETRIC, paper_form
 from ....model.transform import named, with_outputs, without_idle_states
-from ..scheduling.angle_form import AngleScheduledPlant, Minimal, PaperForm
+from ..scheduling.angle_form import AngleScheduledPlant, Minimal, PaperForm, plant_over
 from .exact import Matrix, corners
 from .intervals import Bounds, enclose
 from .polytope import SPEED_LIMIT, scaling
@@ -81,8 +81,7 @@ def error_system(
     angles: tuple[float, float],
 ) -> ErrorSystem:
     """Return the error of an observer in continuous time, with verified ranges of its entries."""
-    reference = np.linspace(*angles, 65)
-    plant = form.plant(model, estimate=estimate, angle=measured, angles=reference)
+    plant = plant_over(form, model, estimate, measured, angles)
     theta, speed, slopes = _slopes(model, form, plant)
     n, (_, fast) = len(plant.names), plant.moving
     over_speed = np.zeros((n, n), dtype=bool)

@@ -23,6 +23,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError, unknown_name
+from ....foundation.symbolic import remembered
 from ....model import FlatModel, Variable
 from ....model.paper_form import GEOMETRIC, PaperFormNames, paper_form
 from ....model.transform import with_outputs, without_idle_states
@@ -441,3 +442,11 @@ def finished(
         rest=form.rest, driven=driven, rows=rows, friction=friction, sizes=sizes, rate_bandwidth=bandwidth,
         affine_error=deviation,
     )  # fmt: skip
+
+
+@remembered(8)
+def plant_over(
+    form: StateForm, model: FlatModel, estimate: str, angle: str, ends: tuple[float, float]
+) -> AngleScheduledPlant:
+    """Return the plant of a form between two angles; observers with other gains are designed on the same."""
+    return form.plant(model, estimate=estimate, angle=angle, angles=np.linspace(*ends, 65))

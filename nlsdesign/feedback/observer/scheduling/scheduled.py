@@ -23,11 +23,11 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.quantity import typeset_unit
-from ....foundation.symbolic import Expression
+from ....foundation.symbolic import Expression, remembered
 from ....model import FlatModel, Table, Variable
 from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
-from .angle_form import Minimal, StateForm
+from .angle_form import Minimal, StateForm, plant_over
 from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
 from .step import CascadeGain, FittedGain, GainRule, ObserverStep, speed_change
 from .table import Compact, Draft, FineEntries, Grid, TableTorqueError
@@ -108,6 +108,7 @@ def _written(design: ObserverDesign, compact: Compact) -> ObserverDesign:
     return ObserverDesign(model, design.step, compact)
 
 
+@remembered(16)
 def design_observer_with_details(
     model: FlatModel,
     *,
@@ -153,7 +154,7 @@ def design_observer_with_details(
         )
     rule, over = gain or CascadeGain(), grid or whole_contour(model)
     reference = np.linspace(over.lower, over.upper, 65)
-    plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)
+    plant = plant_over(form or Minimal(), model, estimate, measured, (over.lower, over.upper))
     fitted = rule.fitted(plant, sample_time, reference) if isinstance(rule, FittedGain) else rule
     step = ObserverStep(plant, fitted, sample_time, reference)
     observed = tuple(body for body in model.bodies if body.motion == measured)
@@ -215,7 +216,7 @@ class ObserverVariables:
 
     def estimate(self) -> Variable:
         """Return what is wanted."""
-        v, size = self.plant.estimate, float(np.max(np.abs(self.step.scales()["estimate"])))
+        v, size = self.plant.estimate, float(np.max(np.abs(self.step.scales["estimate"])))
         return Variable(v.name, v.unit, f"estimate of {v.name}", nominal=size)
 
     def estimates(self) -> list[Variable]:

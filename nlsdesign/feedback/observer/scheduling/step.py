@@ -459,6 +459,7 @@ class ObserverStep:
             "measured": np.ones(1),
         }
 
+    @cached_property
     def scales(self) -> dict[str, Array]:
         """Return the typical size of each sum: of what it adds in one sample, not of what it carries."""
         m, factor, sizes = self.matrices(self.reference), self.factors(), self.plant.sizes
@@ -520,7 +521,7 @@ class ObserverStep:
 
     @cached_property
     def _weights(self) -> dict[str, Array]:
-        factors, scales = self.factors(), self.scales()
+        factors, scales = self.factors(), self.scales
         # A sum that adds nothing has no size of its own.
         return {
             kind: factors[kind][None, :] / np.where(scales[kind] > 0.0, scales[kind], 1.0)[:, None]

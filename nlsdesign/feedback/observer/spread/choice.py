@@ -14,6 +14,7 @@ import numpy as np
 
 from ....foundation.errors import ArrangementError, ConvergenceError, ValueRangeError, unknown_name
 from ....foundation.quantity import typeset_unit
+from ....foundation.symbolic import remembered
 from ....foundation.written_numbers import prefixed
 from ....model import FlatModel
 from ....model.roles import measured_motion, series_spring, spring_torque
@@ -72,6 +73,7 @@ class ObserverOfChoice:
         return replace(model, description=f"{model.description}; {self.reason}")
 
 
+@remembered(8)
 def choose_observer(
     model: FlatModel,
     *,

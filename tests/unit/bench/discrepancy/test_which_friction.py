@@ -64,12 +64,19 @@ def test_coulomb_and_load_friction_on_a_weight_of_one_sign_are_one_class_with_fr
         assert each.probability <= 0.5
 
 
+EVEN = Machine(weight=3.0, middle=1.4, friction=lambda rate, angle, load: 0.25)
+
+
+# That of friction everywhere and of a place the former is named: the sharp friction above.
+@pytest.mark.slow
 def test_even_friction_is_no_spot(tmp_path: Path) -> None:
     """A spot wider than the motion is friction everywhere."""
-    machine = Machine(weight=3.0, middle=1.4, friction=lambda rate, angle, load: 0.25)
-    found = named(machine, tmp_path)
+    found = named(EVEN, tmp_path)
     assert [each.name for each in found.effects] == ["coulomb_friction"]
-    tried = nls.effects.position_dependent_friction(made(machine, tmp_path / "again", records=1)[0])
+
+
+def test_a_spot_says_that_friction_everywhere_is_simpler(tmp_path: Path) -> None:
+    tried = nls.effects.position_dependent_friction(made(EVEN, tmp_path, records=1)[0])
     spot = next(c for c in tried if any(u.name.endswith(".width") for u in c.unknowns))
     assert spot.simpler == ("coulomb_friction",)
 

@@ -45,6 +45,8 @@ def test_a_single_wrong_number_is_named_with_its_value(tmp_path: Path, factor: f
     assert values[MODULUS] == pytest.approx(true, rel=0.1)
 
 
+# That no number of a clean machine is called wrong: test_diagnosis_rig.py.
+@pytest.mark.slow
 def test_a_number_inside_its_declared_range_is_not_called_wrong(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, 1.03, {})
     assert found.verdict == "none"

@@ -186,7 +186,7 @@ def test_a_stretchy_cable_answers_like_the_implicit_equation_solved_by_bisection
     fine = np.linspace(0.0, TIME[-1], (len(TIME) - 1) * parts + 1)
     for count, whole in enumerate(RADIUS * angle_of(fine)[1:], start=1):
         low, high = -0.02, whole + 0.02
-        for _ in range(50):
+        for _ in range(32):
             y = 0.5 * (low + high)
             strain = y / LENGTH
             force = AREA * (

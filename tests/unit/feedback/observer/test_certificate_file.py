@@ -65,7 +65,7 @@ def test_another_deck_and_another_c_file_fail(folder: Path, run: Run, tmp_path: 
     assert [c["name"] for c in json.loads(out)["checks"] if c["holds"] is False] == ["C code"]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @given(data=st.data())
 def test_any_touched_digit_fails(
     folder: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
@@ -129,7 +129,7 @@ def test_a_decay_out_of_reach_writes_nothing(run: Run, tmp_path: Path) -> None:
 # --- the arithmetic that decides --------------------------------------------------------------------
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @given(
     low=st.tuples(*[st.floats(-3.0, 3.0)] * 2), width=st.tuples(*[st.floats(0.0, 1.0)] * 2),
     share=st.tuples(*[st.floats(0.0, 1.0)] * 2),
@@ -182,7 +182,7 @@ def test_a_bound_goes_outward_to_the_next_number() -> None:
     assert (undefined.lower[0, 0], undefined.upper[0, 0]) == (-np.inf, np.inf)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2, deadline=None)
 @given(seed=st.integers(0, 10**6), shift=st.floats(-1.0, 1.0))
 def test_definiteness_is_that_of_the_eigenvalues(seed: int, shift: float) -> None:
     half = np.random.default_rng(seed).normal(size=(4, 4))

@@ -71,7 +71,7 @@ def test_typical_sizes_of_the_sums_are_what_they_add_in_one_sample(step: Observe
     fraction = (1.0 - np.exp(-DECAY * TIME)) / (DECAY * TIME)
     largest_drive = 400.0 * (1.0 - fraction) / DECAY  # 400·∫e^(−100(T−s))·s/T ds, the end of a ramp
     expected = [largest_drive, TIME * SPEED, TIME * 50.0 * SPEED]
-    scales = step.scales()
+    scales = step.scales
     for kind in ("next", "prior", "correction"):
         assert scales[kind] == pytest.approx(expected)
     assert scales["estimate"] == pytest.approx([3.0 * STRAIN])
