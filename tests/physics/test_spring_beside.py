@@ -228,7 +228,7 @@ def test_both_sides_of_a_cam_meet_their_own_curve_on_one_element(turned: bool) -
 
 
 def test_what_cannot_be_designed_on_both_sides_says_so() -> None:
-    with pytest.raises(ArrangementError, match=r"OneSidedCam.*no contour for each side.*LopsidedCam"):
+    with pytest.raises(ArrangementError, match=r"OneSidedCam: has no contour for each side.*LopsidedCam"):
         design_sides(beside(), targets=SIDES, settings=QUICK)
     with pytest.raises(ArrangementError, match=r"two contours.*design_sides"):
         design_cam(knee(), target=SIDES[0], settings=QUICK)

@@ -45,11 +45,11 @@ class LopsidedCam(Cam):
         "m", "control values of the lever arm over negative angles", minimum=-0.05, maximum=1.0, row=True
     )
     back_last_angle: Quantity = parameter("rad", "size of the angle at its end", minimum=0.01, maximum=6.3)
-    changeover: Quantity = parameter(
-        "rad", "angle over which the cable changes sides", minimum=1e-6, maximum=0.5, default=1e-3
-    )
     anchor_distance: Quantity = parameter(
         "m", "distance from the centre to the fixed end of the cable", minimum=1e-3, maximum=1e9, default=1e6
+    )
+    changeover: Quantity = parameter(
+        "rad", "angle over which the cable changes sides", minimum=1e-6, maximum=0.5, default=1e-3
     )
 
     def __post_init__(self) -> None:

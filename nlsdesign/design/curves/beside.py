@@ -250,9 +250,9 @@ class SpringChoice:
         paid = {name: self.paid(motor) for name, motor in motors.items()}
         others = []
         for name, value in paid.items():
-            share, word = 100.0 * (1.0 - paid[best] / value), "less" if paid[best] < value else "more"
+            share, how = 100.0 * (1.0 - paid[best] / value), "less" if paid[best] < value else "more"
             if name != best:
-                others.append(f"{abs(share):.0f} % {word} than {name} ({value:.3g} {unit})")
+                others.append(f"{abs(share):.0f} % {how} than {name} ({value:.3g} {unit})")
         most = motors[best].peaks
         taken = []
         for spring, does in (

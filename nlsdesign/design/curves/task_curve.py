@@ -366,8 +366,8 @@ def _rigid_ratio(goal: TaskGoal, program: TaskProgram, ratios: tuple[float, floa
         drive = program.drive.geared(float(np.exp(log_ratio)))
         return goal.of(beside_cycle(cycle, drive, np.zeros_like(cycle.time)))
 
-    found = minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options={"xatol": 1e-6})
-    return float(np.exp(found.x))
+    least = minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options={"xatol": 1e-6})
+    return float(np.exp(least.x))
 
 
 def rigid_motor(problem: TaskProblem, task: Task | MixedTask, drive: MotorAndGear) -> MotorCycle:

@@ -167,13 +167,13 @@ class SeriesProgram(TaskProgram):
         cycle, drive = self.cycle, self.drive
         deflection, slope, bend = self.spline.matrices(cycle.torque)
         speed = slope * cycle.torque_rate[:, None]
-        bent = slope * cycle.torque_acceleration[:, None] + bend * cycle.torque_rate[:, None] ** 2
+        inertial = slope * cycle.torque_acceleration[:, None] + bend * cycle.torque_rate[:, None] ** 2
         inertia, behind, damping = (
             plain(each) for each in (drive.inertia, drive.output_inertia, drive.damping)
         )
         rows = (
-            (behind * bent, cycle.torque + behind * cycle.acceleration),
-            (inertia * bent + damping * speed, inertia * cycle.acceleration + damping * cycle.speed),
+            (behind * inertial, cycle.torque + behind * cycle.acceleration),
+            (inertia * inertial + damping * speed, inertia * cycle.acceleration + damping * cycle.speed),
             (speed, cycle.speed),
             (deflection, np.zeros_like(cycle.time)),
         )

@@ -35,17 +35,19 @@ class TaskTarget:
         Another gear ratio than the declared one, a pure number.
     goal
         What is made small over the task: ``LeastEnergy`` or ``LeastPeakPower``.
-    gear_ratios
-        Instead of one: the least and the greatest, of which the best is found together with the spring.
     symmetry
         ``OddSpring``, ``OneSidedSpring`` or ``TwoBranchSpring``; of a spring in series.
+    gear_ratios
+        Instead of one: the least and the greatest, of which the best is found together with the spring.
     place
         ``"series"``, or ``"beside"`` for one from joint to frame that acts beyond an angle, in one direction.
 
     Raises
     ------
+    UnknownNameError
+        If there is no such place.
     ValueRangeError
-        If neither a file nor a joint is given, or both are.
+        If the range of the gear ratio is none, or neither a file nor a joint is given, or both are.
     """
 
     file: str = ""

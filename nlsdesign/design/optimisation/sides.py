@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...components.assembly.named_parts import Assembly
-from ...components.transmission.cam import TwoSidedCam
-from ...components.transmission.lopsided_cam import LopsidedCam
-from ...foundation.errors import ArrangementError, InfeasibleError, NlsError
+from ...foundation.errors import InfeasibleError, NlsError
 from ...model import flatten
 from ...model.origin import derived
 from ...model.roles import series_cam
 from ..curves.target import Target
+from ..statics.declared_cam import both_sides, one_side
 from ..statics.equilibrium import with_smooth_cables
 from .goals import Goal
 from .limits import Limit
@@ -85,34 +84,28 @@ def design_sides(
     """
     names = series_cam(flatten(with_smooth_cables(actuator)), spring)
     cam = actuator[names.name]
-    if not isinstance(cam, LopsidedCam):
-        raise ArrangementError(
-            f"'{names.name}', a {type(cam).__name__}", "has no contour for each side",
-            next_step="declare it as a LopsidedCam, or design one curve with design_cam",
-        )  # fmt: skip
     work = [float(target.energy(target.last_angle)) for target in targets]
     designs: list[SidesDesign] = []
     errors: list[NlsError] = []
     for first in sorted((0, 1), key=lambda side: -work[side]):
         sides: dict[int, CamDesign] = {}
-        machine, released = actuator.with_part(names.name, cam.side(back=bool(first))), free
+        machine, released = actuator.with_part(names.name, one_side(cam, back=bool(first))), free
         try:
             for side in (first, 1 - first):
                 sides[side] = design_cam(
                     machine, target=targets[side], free=released, keep=keep, spring=spring, goals=goals,
                     settings=settings,
                 )  # fmt: skip
-                # The other side on what this one chose.
-                machine, released, other = sides[side].actuator, [names.contour], cam.side(back=side == 0)
-                made = machine[names.name]
-                assert isinstance(made, TwoSidedCam)
-                made = replace(made, lever_arm=other.lever_arm, last_angle=other.last_angle)
-                machine = machine.with_part(names.name, made)
+                # The other side, on what this one chose.
+                machine, released = sides[side].actuator, [names.contour]
+                other = one_side(cam, back=side == 0, like=machine[names.name])
+                machine = machine.with_part(names.name, other)
         except InfeasibleError as error:
             errors.append(error.at(_NAMES[1 - first if sides else first]))
             continue
         both = sides[0], sides[1]
-        parts = sides[first].actuator.with_part(names.name, two_contours(cam, names.name, both)).parts
+        made = both_sides(cam, *(side.actuator[names.name] for side in both))
+        parts = sides[first].actuator.with_part(names.name, made).parts
         joined = derived(replace(actuator, parts=parts), actuator, "designed")
         designs.append(SidesDesign(joined, *both, _NAMES[first]))
         if designs[-1].met:
@@ -123,14 +116,3 @@ def design_sides(
 
 
 _NAMES = ("front", "back")
-
-
-def two_contours(cam: LopsidedCam, path: str, sides: tuple[CamDesign, CamDesign]) -> LopsidedCam:
-    """Return both designed contours in one cam, with what the sides share."""
-    front, back = (side.actuator[path] for side in sides)
-    assert isinstance(front, TwoSidedCam)
-    assert isinstance(back, TwoSidedCam)
-    return replace(
-        cam, lever_arm=front.lever_arm, last_angle=front.last_angle, back_lever_arm=back.lever_arm,
-        back_last_angle=back.last_angle, elements=front.elements, anchor_distance=front.anchor_distance,
-    )  # fmt: skip

@@ -303,6 +303,29 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
     )  # fmt: skip
 
 
+def one_side(part: Any, *, back: bool, like: Any = None) -> Cam:
+    """Return the cam with two equal sides that is a side of one whose sides differ.
+
+    ``like``: the other side as it was designed, whose anchor and elements it shares.
+    """
+    if not isinstance(part, LopsidedCam):
+        raise ArrangementError(
+            f"a {type(part).__name__}", "has no contour for each side",
+            next_step="declare it as a LopsidedCam, or design one curve with design_cam",
+        )  # fmt: skip
+    side = part.side(back=back)
+    return side if like is None else replace(like, lever_arm=side.lever_arm, last_angle=side.last_angle)
+
+
+def both_sides(part: Any, front: Any, back: Any) -> Cam:
+    """Return a cam whose sides differ with the contours of two that were designed, and what these share."""
+    made: Cam = replace(
+        part, lever_arm=front.lever_arm, last_angle=front.last_angle, back_lever_arm=back.lever_arm,
+        back_last_angle=back.last_angle, elements=front.elements, anchor_distance=front.anchor_distance,
+    )  # fmt: skip
+    return made
+
+
 def one_sided(part: Any, last_angle: float) -> OneSidedCam:
     """Return a one-sided cam up to an angle in rad, with the elements and the cable of another."""
     arms, end = Quantity((0.01,) * 8, "m"), Quantity(last_angle, "rad")
