@@ -29,7 +29,8 @@ WINDOW, EVERY = 1.0, 4
 """s of a window, and how many windows there are for each one that is used: all of them take minutes."""
 ITERATIONS = 5
 LEVER = 0.05  # m, of the weight
-LATEST = 0.05  # s, the largest delay
+LATEST = 0.05  # s, the largest delay of a reading
+DELAYS = (0.003, 0.006, 0.012, 0.024)  # s, of the current
 
 
 Takes = Callable[[Any, float], None]
@@ -51,7 +52,10 @@ class Entry:
     start, bounds
         In sizes.
     reading
-        ``delay`` or ``bias`` of the readings that ``takes`` leaves alone.
+        ``delay`` or ``bias`` where it changes readings; ``late`` where the current acts later by the size. That
+        is not fitted, since a window begins in a state that knows of no earlier current.
+    of
+        Sensors whose readings it changes.
     """
 
     name: str
@@ -78,7 +82,9 @@ def answer(folder: Path) -> dict[str, Any]:
     left, rows = fit.left(taken)
     whole = criterion(left, rows, 0)
     while len(taken) < MOST:
-        tried = [(fit.left([*taken, entry])[0], entry) for entry in fit.entries if entry not in taken]
+        named = {(entry.name, entry.part) for entry in taken}
+        others = [entry for entry in fit.entries if (entry.name, entry.part) not in named]
+        tried = [(fit.left([*taken, entry])[0], entry) for entry in others]
         best, entry = min(tried, key=lambda row: row[0])
         if criterion(best, rows, len(taken) + 1) >= whole or best > (1.0 - GAIN) * left:
             break
@@ -97,7 +103,8 @@ class _Fit:
 
     def left(self, more: list[Entry]) -> tuple[float, int]:
         """Return the sum of squares that a fit leaves in as many rows as are independent, and how many."""
-        entries = [*self.declared, *more]
+        entries = [*self.declared, *(entry for entry in more if entry.reading != "late")]
+        late = sum(entry.size for entry in more if entry.reading == "late")
         spec = mujoco.MjSpec.from_string(_model(self.deck, self.step))
         params, transform = sysid.ParameterDict(), sysid.SignalTransform(normalize=False)
         for number, entry in enumerate(entries):
@@ -109,7 +116,7 @@ class _Fit:
             if entry.reading:
                 getattr(transform, entry.reading)(entry.of, parameter)
         residual = sysid.build_residual_fn(
-            models_sequences=[self._sequences(spec)], modify_residual=transform.apply, n_threads=1
+            models_sequences=[self._sequences(spec, late)], modify_residual=transform.apply, n_threads=1
         )
         with contextlib.redirect_stdout(io.StringIO()):
             _, result = sysid.optimize(params, residual, verbose=False, max_iters=ITERATIONS)
@@ -117,7 +124,7 @@ class _Fit:
         rows = round(len(rest) * min(2.0 * RESOLVED * self.step, 1.0))
         return float(rest @ rest) * rows / len(rest), rows
 
-    def _sequences(self, spec: Any) -> Any:
+    def _sequences(self, spec: Any, late: float) -> Any:
         model = spec.compile()
         two = self.deck.load is not None
         names, states, controls, readings = [], [], [], []
@@ -129,7 +136,7 @@ class _Fit:
             shown = np.column_stack([m.place[cut], m.load_place[cut]][: 1 + two])
             names.append(f"w{number}")
             states.append(sysid.create_initial_state(model, np.array(place), np.array(speed)))
-            controls.append(sysid.TimeSeries(time, m.current[cut][:, None]))
+            controls.append(sysid.TimeSeries(time, m.delayed(m.current, late)[cut][:, None]))
             readings.append(sysid.TimeSeries.from_names(time, shown, model))
         return sysid.ModelSequences("machine", spec, names, states, controls, readings)
 
@@ -227,7 +234,7 @@ def _candidates(deck: Deck, motions: list[Motion]) -> list[Entry]:
         Entry("coulomb_friction", motor, effort, _joint("motor", "frictionloss")),
         Entry("quadratic_drag", motor, drag / fastest, _joint("motor", "damping", 1)),
         Entry("current_sensor_bias", motor, effort, _bias, bounds=either),
-        Entry("drive_delay", motor, LATEST, reading="delay", bounds=(0.0, 1.0)),
+        *(Entry("drive_delay", motor, late, reading="late") for late in DELAYS),
     ]
     if not deck.has["damping"]:
         made.append(Entry("viscous_friction", motor, drag, _joint("motor", "damping")))

@@ -95,9 +95,13 @@ def test_right_is_the_hidden_name_at_its_body_and_no_other(tmp_path: Path) -> No
     assert scored({"a": clean}, {}, tmp_path) == [False], "a case without an answer counts as failed"
 
 
-def test_a_bias_may_be_called_a_constant_force(tmp_path: Path) -> None:
-    bias = label("screw_carriage", "current_sensor_bias")
-    assert scored({"a": bias}, {"a": {"effects": [{"name": "constant_force"}]}}, tmp_path) == [True]
+@pytest.mark.parametrize(
+    ("hidden", "named"),
+    [("current_sensor_bias", "constant_force"), ("constant_force", "current_sensor_bias")],
+)
+def test_a_bias_and_a_constant_force_are_equal_laws(hidden: str, named: str, tmp_path: Path) -> None:
+    answer = {"effects": [{"name": named, "part": "motor"}]}
+    assert scored({"a": label("screw_carriage", hidden)}, {"a": answer}, tmp_path) == [True]
 
 
 def test_probabilities_and_intervals_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
