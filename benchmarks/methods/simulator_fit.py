@@ -52,8 +52,8 @@ class Entry:
     start, bounds
         In sizes.
     reading
-        ``delay`` or ``bias`` where it changes readings; ``late`` where the current acts later by the size. That
-        is not fitted, since a window begins in a state that knows of no earlier current.
+        ``delay`` or ``bias`` where it changes readings; ``late`` where the current acts later by the size.
+        That is not fitted, since a window begins in a state that knows of no earlier current.
     of
         Sensors whose readings it changes.
     """
@@ -76,8 +76,7 @@ def answer(folder: Path) -> dict[str, Any]:
     folder
         Of the case.
     """
-    balance = Balance(folder)
-    fit = _Fit(balance.deck, balance.motions)
+    fit = _Fit(Balance(folder))
     taken: list[Entry] = []
     left, rows = fit.left(taken)
     whole = criterion(left, rows, 0)
@@ -95,10 +94,11 @@ def answer(folder: Path) -> dict[str, Any]:
 class _Fit:
     """Fits of one case."""
 
-    def __init__(self, deck: Deck, motions: list[Motion]) -> None:
-        self.deck, self.step = deck, motions[0].step
-        self.declared = _declared_entries(deck, motions)
-        self.entries = _candidates(deck, motions)
+    def __init__(self, balance: Balance) -> None:
+        self.deck, motions = balance.deck, balance.motions
+        self.step = motions[0].step
+        self.declared = _declared_entries(self.deck, motions)
+        self.entries = _candidates(self.deck, motions)
         self.windows = [w for motion in motions for w in _windows(motion)][::EVERY]
 
     def left(self, more: list[Entry]) -> tuple[float, int]:

@@ -26,13 +26,9 @@ NOT_PRINTED = (
 
 
 def write_page(
-    out: Path,
-    felt: FeltTorque,
-    followed: FollowedTorque,
-    *,
-    law: ScheduledLaw,
+    out: Path, felt: FeltTorque, followed: FollowedTorque, *, law: ScheduledLaw,
     statements: tuple[Statement, ...],
-) -> None:
+) -> None:  # fmt: skip
     """Write figures and report."""
     shown = figure_sections(felt, followed)
     nls.figures.write_figures(out, {name: section.figure for name, section in shown.items()})
@@ -61,12 +57,9 @@ def write_page(
 def figure_sections(felt: FeltTorque, followed: FollowedTorque) -> dict[str, FigureSection]:
     """Return Figs 8, 9 and 10 beside the published points, by the name of their file."""
     return {
-        "fig08": FigureSection(
-            "Fig. 8", _torque(NONLINEAR), caption="Torque at rest; marks are the published points."
-        ),
-        "fig08_soft": FigureSection(
-            "Fig. 8, soft spring", _torque(SOFT), caption="A line of 1.7 N·m/rad."
-        ),
+        "fig08": FigureSection("Fig. 8", _torque(NONLINEAR),
+                               caption="Torque at rest; marks are the published points."),
+        "fig08_soft": FigureSection("Fig. 8, soft spring", _torque(SOFT), caption="A line of 1.7 N·m/rad."),
         "fig09": FigureSection(
             "Fig. 9", _felt(felt),
             caption="Lines are simulated, marks published; a cross at the lower edge is a loop that does not "
