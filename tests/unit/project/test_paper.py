@@ -100,3 +100,17 @@ def test_numbers_in_it_are_claimed_by_a_study_or_stand_in_the_counts(root: Path,
     loops = claimed["austin2015_closed_loop"]
     worst = max(loops[f"fig9_to_2_Hz_{spring}_percent"]["value"] for spring in ("nonlinear", "soft", "stiff"))
     assert f"within {math.ceil(worst)} % up to 2 Hz" in text
+    counted = (root / "docs" / "others_methods.md").read_text("utf-8").splitlines()
+    totals = {
+        line.split("|")[1].strip(): sum(map(int, re.findall(r"(\d+)/\d+ \(", line.partition(" of 48 ")[0])))
+        for line in counted
+        if line.startswith("| ") and " of 48 |" in line
+    }
+    for name, said in (
+        ("nlsdesign", "the diagnosis has {} right"),
+        ("CMA-ES", "CMA-ES fits of each candidate have {} right"),
+        ("least squares", "least squares {}"),
+        ("sparse regression", "sparse regression {}"),
+    ):
+        total = next(value for method, value in totals.items() if method.startswith(name))
+        assert said.format(total) in " ".join(text.split()), name
