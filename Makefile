@@ -23,7 +23,7 @@ export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets proofs firmware wheels docs gallery environment lock clean distclean
+.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets proofs firmware wheels docs paper gallery environment lock clean distclean
 
 help:
 	@echo 'make study      a small study, then that of the published actuator; the report goes to $(OUT)/report.html'
@@ -35,6 +35,7 @@ help:
 	@echo 'make lint       style and types only'
 	@echo 'make bench      the benchmarks: ratios against named peers, docs/benchmarks.md'
 	@echo 'make docs       the documentation site, into out/docs; warnings and dead links are errors'
+	@echo 'make paper      the claimed figures of the paper of 2015, and our own paper with its pictures: out/paper'
 	@echo 'make gallery    run all studies and keep some of their figures for the site (minutes)'
 	@echo 'make masters    our FMUs in foreign masters: docs/fmi_masters.md'
 	@echo 'make targets    generated C on processors of controllers in an emulator: docs/targets.md'
@@ -85,6 +86,9 @@ bench: environment
 
 docs: environment
 	$(BIN)/python -m docs.site out/docs --jobs $(WORKERS)
+
+paper: environment
+	$(BIN)/python -m docs.site.paper out/paper
 
 gallery: environment
 	$(BIN)/python -m docs.site.collect

@@ -43,6 +43,7 @@ ACCEPTED: Mapping[str, frozenset[str]] = {
     "winding_heat": frozenset({"winding_heat", "torque_constant_drift"}),
     "sensor_lowpass": frozenset({"force_sensor_delay"}),
     "constant_torque": frozenset({"constant_torque", "constant_force", "current_sensor_bias"}),
+    "constant_force": frozenset({"constant_torque", "constant_force", "current_sensor_bias"}),
     "current_sensor_bias": frozenset({"current_sensor_bias", "constant_torque", "constant_force"}),
     "joint_coulomb_friction": frozenset({"coulomb_friction@load"}),
     "gravity_load": frozenset({"gravity_load@load"}),

@@ -27,6 +27,9 @@ _LINK = re.compile(r"(?<!!)\[(?P<text>[^\]\n]+)\]\((?P<address>[^)\s]+)\)")
 _FENCE = re.compile(r"^(?P<mark>```+|~~~+)(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=mark)[ \t]*$", re.M | re.S)
 _OWN = "site"
 """Folder of ``docs`` that holds this program and the pages that only the site has."""
+_SENT = "paper"
+"""Folder of ``docs`` whose text is sent to a journal: it is no page of the site."""
+_APART = (_OWN, _SENT)
 
 Pages = dict[str, str]
 """Text of pages by path below the staged folder."""
@@ -48,7 +51,7 @@ def stage(root: Path, folder: Path) -> set[str]:
         _write(folder / name, text)
     for path in sorted((root / "docs").rglob("*")):
         name = path.relative_to(root / "docs")
-        if path.is_file() and path.suffix not in {".md", ".py", ".pyc"} and name.parts[0] != _OWN:
+        if path.is_file() and path.suffix not in {".md", ".py", ".pyc"} and name.parts[0] not in _APART:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, folder / name)
     for make in (commands, parts, materials, catalogue, bibliography, api, gallery):
@@ -60,7 +63,7 @@ def stage(root: Path, folder: Path) -> set[str]:
 def _written(root: Path) -> list[str]:
     docs = root / "docs"
     names = (path.relative_to(docs) for path in sorted(docs.rglob("*.md")))
-    return [name.as_posix() for name in names if name.parts[0] != _OWN]
+    return [name.as_posix() for name in names if name.parts[0] not in _APART]
 
 
 def _named(name: str) -> str:
@@ -128,7 +131,7 @@ class Page:
             self.root / "README.md": docs / "index.md",
             self.root / "CHANGELOG.md": docs / "changelog.md",
         }
-        if target in known or target.is_relative_to(docs):
+        if target in known or (target.is_relative_to(docs) and not target.is_relative_to(docs / _SENT)):
             shown = _named(os.path.relpath(known.get(target, target), self.place.parent))
             return f"[{link['text']}]({shown}{'#' * bool(fragment)}{fragment})"
         if not target.is_file():

@@ -33,6 +33,7 @@ from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 
 from .._designed import drawing_section
 from .evaluation_report import evaluation_sections
+from .figures import FigureComparison
 from .generated_report import generated_sections
 from .loop_report import loop_sections
 from .observer_report import observer_sections
@@ -71,7 +72,7 @@ def write_page(results: Results, out: Path) -> None:
         *evaluation_sections(results),
         *diagnosis_sections(results),
         *generated_sections(results.generated),
-        *figure_sections(results),
+        *figure_sections(results.figures),
         *actuator_sections(results),
         *file_sections(results, out),
         title="A cam-rubber actuator, from deck to report",
@@ -213,9 +214,9 @@ def chapter_of_design(results: Results) -> list[Section]:
     return [head, moved, torque, made, drawing_section(cam), more]
 
 
-def figure_sections(results: Results) -> list[Section]:
+def figure_sections(figures: FigureComparison) -> list[Section]:
     """Show the model against the figures of the paper."""
-    figures, static = results.figures, results.figures.static
+    static = figures.static
     model, hooke = figures.agreement, figures.hooke_agreement
     order = np.argsort(static.angle)
     angle = static.angle[order]
@@ -236,13 +237,12 @@ def figure_sections(results: Results) -> list[Section]:
             caption="Points: measured. Lines: model with all relaxation at rest, and the best linear spring.",
             assumed="The cam follows from this figure by energy: this checks the chain, not the law.",
         ),
-        FoldedSection("More on model and measurement", more_on_figures(results)),
+        FoldedSection("More on model and measurement", more_on_figures(figures)),
     ]
 
 
-def more_on_figures(results: Results) -> tuple[Section, ...]:
+def more_on_figures(figures: FigureComparison) -> tuple[Section, ...]:
     """Show hysteresis, the metrics of the paper, and one element of rubber."""
-    figures = results.figures
     model, hooke = figures.agreement, figures.hooke_agreement
     loops = {name: (loop.measured, loop.simulated) for name, loop in figures.loops.items()}
     rows = [

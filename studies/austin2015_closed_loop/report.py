@@ -26,17 +26,12 @@ NOT_PRINTED = (
 
 
 def write_page(
-    out: Path,
-    felt: FeltTorque,
-    followed: FollowedTorque,
-    *,
-    law: ScheduledLaw,
+    out: Path, felt: FeltTorque, followed: FollowedTorque, *, law: ScheduledLaw,
     statements: tuple[Statement, ...],
-) -> None:
+) -> None:  # fmt: skip
     """Write figures and report."""
-    pictures = {"fig08": _torque(NONLINEAR), "fig08_soft": _torque(SOFT), "fig09": _felt(felt)}
-    pictures |= {f"fig10_{a}": _followed(followed, a) for a in AMPLITUDES}
-    nls.figures.write_figures(out, pictures)
+    shown = figure_sections(felt, followed)
+    nls.figures.write_figures(out, {name: section.figure for name, section in shown.items()})
     sections: list[Section] = [
         TableSection(
             "What becomes of each statement",
@@ -44,18 +39,7 @@ def write_page(
             tuple((s.stated, s.outcome, s.why) for s in statements),
             caption="Statements of the paper and of design notes, each run as a loop.",
         ),
-        FigureSection("Fig. 8", pictures["fig08"], caption="Torque at rest; marks are the published points."),
-        FigureSection("Fig. 8, soft spring", pictures["fig08_soft"], caption="A line of 1.7 N·m/rad."),
-        FigureSection(
-            "Fig. 9", pictures["fig09"],
-            caption="Lines are simulated, marks published; a cross at the lower edge is a loop that does not "
-            "settle. Left Kp 64, Ki 110 (linear), Kp 135, Ki 100 (nonlinear), ±20°. Right Kp 32, Ki 50 and "
-            "Kp 70, Ki 100, ±10°, the torque 8 ms late.",
-            means="To 2 Hz all is gain and amplitude. Above, a late torque lifts the linear springs to their "
-            "points; the rise of the nonlinear one beyond 6 Hz is not reproduced.",
-            assumed=NOT_PRINTED,
-        ),
-        *(_section(pictures[f"fig10_{a}"], a) for a in AMPLITUDES),
+        *shown.values(),
         _deviations(followed),
         _law(law),
     ]  # fmt: skip
@@ -68,6 +52,25 @@ def write_page(
         ]  # fmt: skip
     sections.append(_points(followed))
     write_report(out / "report.html", *sections, title="Torque loop of the published actuator")
+
+
+def figure_sections(felt: FeltTorque, followed: FollowedTorque) -> dict[str, FigureSection]:
+    """Return Figs 8, 9 and 10 beside the published points, by the name of their file."""
+    return {
+        "fig08": FigureSection("Fig. 8", _torque(NONLINEAR),
+                               caption="Torque at rest; marks are the published points."),
+        "fig08_soft": FigureSection("Fig. 8, soft spring", _torque(SOFT), caption="A line of 1.7 N·m/rad."),
+        "fig09": FigureSection(
+            "Fig. 9", _felt(felt),
+            caption="Lines are simulated, marks published; a cross at the lower edge is a loop that does not "
+            "settle. Left Kp 64, Ki 110 (linear), Kp 135, Ki 100 (nonlinear), ±20°. Right Kp 32, Ki 50 and "
+            "Kp 70, Ki 100, ±10°, the torque 8 ms late.",
+            means="To 2 Hz all is gain and amplitude. Above, a late torque lifts the linear springs to their "
+            "points; the rise of the nonlinear one beyond 6 Hz is not reproduced.",
+            assumed=NOT_PRINTED,
+        ),
+        **{f"fig10_{a}": _section(_followed(followed, a), a) for a in AMPLITUDES},
+    }  # fmt: skip
 
 
 def _torque(spring: str) -> Figure:

@@ -180,6 +180,14 @@ def test_links_out_of_the_pages_lead_to_listings(root: Path) -> None:
     assert text.count("<svg") == sum(max(1, chart.count("subgraph")) for chart in charts) > 1
 
 
+def test_what_is_sent_to_a_journal_is_no_page_but_can_be_linked_to(root: Path) -> None:
+    linked: set[str] = set()
+    text = stage._text(root, root / "docs" / "testing.md", linked)
+    assert "docs/paper/paper.md" in linked
+    assert "listings/docs/paper/paper.md.html" in text
+    assert not [name for name in stage._written(root) if name.startswith("paper/")]
+
+
 def test_a_bad_site_is_noticed(tmp_path: Path) -> None:
     (tmp_path / "a.html").write_text(
         '<a href="b.html">b</a><a href="#there">t</a><p id="there"></p><a href="#gone">g</a>'
