@@ -108,6 +108,7 @@ _PARTS: tuple[Part, ...] = (
     ),
     Through(cam=Pulley(radius=0.01), behind=("rubber", SPRING)),
     TorqueRipple(sine=0.01, cosine=0.005, order=28.0),
+    TorqueRipple(sine=2.0, cosine=1.0, order=300.0, domain=TRANSLATION),
     Dashpot(damping=1e-3, domain=ROTATION),
     HOUSING,
     Turned(members=(("cam", HOUSING),), offset=0.02),

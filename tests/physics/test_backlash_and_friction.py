@@ -204,6 +204,31 @@ def test_ripple_does_no_work_over_a_turn() -> None:
     assert np.max(torques) == pytest.approx(math.hypot(0.01, 0.005), rel=1e-3)
 
 
+def test_ripple_along_a_line_repeats_with_its_pitch() -> None:
+    """Magnets with a pitch of 24 mm: F = A·cos(2πx/24 mm − φ), and a carriage swings about its rest."""
+    pitch, size, phase = 0.024, 3.0, 0.7
+    ripple = TorqueRipple(
+        sine=size * math.sin(phase),
+        cosine=size * math.cos(phase),
+        order=2 * math.pi / pitch,
+        domain=TRANSLATION,
+    )
+    made = assembly("line", carriage=Mass(mass=2.0), cogging=tie(ripple, "carriage"))
+    model = flatten(made)
+    assert model.variable("cogging.order").unit == "rad/m"
+    places = np.linspace(0.0, 2 * pitch, 41)
+    forces = [model.evaluate([x, 0.0], [0.0])["cogging.force"] for x in places]
+    assert forces == pytest.approx(size * np.cos(2 * math.pi * places / pitch - phase), abs=1e-12)
+    # A quarter of a period before its crest the force against the motion rises: there the carriage rests.
+    rest = pitch * (phase - math.pi / 2) / (2 * math.pi)
+    period = 2 * math.pi * math.sqrt(2.0 / (size * 2 * math.pi / pitch))
+    run = simulate(
+        model, np.linspace(0.0, period, 201), start={"carriage.position": rest + 1e-6}, tolerance=1e-13
+    )
+    assert run["carriage.position"][100] - rest == pytest.approx(-1e-6, rel=1e-3)
+    assert run["carriage.position"][-1] - rest == pytest.approx(1e-6, rel=1e-3)
+
+
 @given(st.floats(-0.5, 0.5), st.sampled_from([-2.0, 2.0]))
 def test_load_friction_takes_its_share_of_the_load_and_only_takes(angle: float, speed: float) -> None:
     found = torque(

@@ -47,10 +47,13 @@ class Domain:
         --------
         >>> ROTATION.unit("{effort}*s/{motion}"), TRANSLATION.unit("{effort}*s/{motion}")
         ('N*m*s/rad', 'N*s/m')
+        >>> ROTATION.unit("rad/{motion}"), TRANSLATION.unit("rad/{motion}")
+        ('1', 'rad/m')
         """
-        return template.format(
+        written = template.format(
             motion=self.motion_unit, rate=self.rate_unit, effort=self.effort_unit, inertia=self.inertia_unit
         )
+        return written.replace("rad/rad", "1")
 
 
 MATERIAL = Domain("material", "strain", "1", "strain_rate", "1/s", "stress", "Pa", "kg/m")

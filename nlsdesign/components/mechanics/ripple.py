@@ -1,4 +1,4 @@
-"""Torque that repeats over the angle."""
+"""Torque that repeats over the angle, or force that repeats over the way."""
 
 from __future__ import annotations
 
@@ -9,27 +9,30 @@ import casadi as ca
 
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
-from ..core.domain import ROTATION, Domain
+from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
-from ..core.part_numbers import parameter
+from ..core.part_numbers import one_of, parameter
 from ..core.springs import Elastic
 
 
 @dataclass(frozen=True, kw_only=True)
 class TorqueRipple(Elastic):
-    """Cogging and torque ripple, T = a·sin(nθ) + b·cos(nθ), locked to the angle.
+    """Cogging and torque ripple, T = a·sin(nθ) + b·cos(nθ), locked to the angle, or to the place on a line.
 
     The order n is the number of periods per turn. It comes from the poles of the motor times
-    the gear ratio, or from the teeth of a gear. Source: Hanselman 2003.
+    the gear ratio, or from the teeth of a gear; along a line it is 2π over the pitch of the magnets, or over
+    the lead of a screw. Source: Hanselman 2003.
     """
 
-    domain: ClassVar[Domain] = ROTATION
     picture: ClassVar[str] = "box"
     phenomena: ClassVar[frozenset[str]] = frozenset({"ripple"})
 
-    sine: Quantity = parameter("N*m", "amplitude of the part in sin(nθ)", minimum=-1e6, maximum=1e6)
-    cosine: Quantity = parameter("N*m", "amplitude of the part in cos(nθ)", minimum=-1e6, maximum=1e6)
-    order: Quantity = parameter("1", "periods per turn", minimum=0.1, maximum=1e5)
+    domain: Domain = one_of(ROTATION, TRANSLATION)
+    sine: Quantity = parameter("{effort}", "amplitude of the part in sin(nθ)", minimum=-1e6, maximum=1e6)
+    cosine: Quantity = parameter("{effort}", "amplitude of the part in cos(nθ)", minimum=-1e6, maximum=1e6)
+    order: Quantity = parameter(
+        "rad/{motion}", "periods per turn, or 2π per period of a line", minimum=0.1, maximum=1e5
+    )
 
     @property
     def restores(self) -> bool:

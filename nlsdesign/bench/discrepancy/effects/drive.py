@@ -27,7 +27,7 @@ _FALLS_AT = (0.2, 1.5)
 """Where a drive may lose effort, in largest commands: short motions command several times what others do."""
 
 
-def _drives(assembly: Assembly) -> list[str]:
+def drives(assembly: Assembly) -> list[str]:
     """Return the bodies that are driven by a command.
 
     A command that is no effort, a chain, or a sensor of the command tells a drive; where nothing tells one,
@@ -50,9 +50,7 @@ def _without(*kinds: type[DrivePart]) -> Places:
 
     def places(assembly: Assembly) -> list[str]:
         return [
-            n
-            for n in _drives(assembly)
-            if not any(isinstance(p, kinds) for _, p in _drive(assembly, n).chain)
+            n for n in drives(assembly) if not any(isinstance(p, kinds) for _, p in _drive(assembly, n).chain)
         ]
 
     return places

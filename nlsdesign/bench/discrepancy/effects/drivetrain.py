@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ....components import (
@@ -29,6 +29,7 @@ from ....components.mechanics.bodies import Free
 from ....foundation.quantity import Quantity
 from ....foundation.spread import RelativeSpread
 from ..fitting import Continuation, Strategy
+from .drive import drives
 from .effect import SOURCE, Edit, Effect, Form, Unknown, free_name, number, wrapped
 from .friction import tied
 from .places import (
@@ -50,6 +51,9 @@ _ORDERS = (*range(1, 37), *range(38, 121, 2))
 """Periods per turn where fits begin; a start between two of them is reached from either."""
 _OF_A_MOTOR = (1, 2, 6, 7, 12, 14, 21, 24, 28, 42)
 """Periods per turn of a motor: of its pole pairs, slots and what they have in common."""
+_PHASES = tuple(2.0 * k for k in range(1, 61))
+"""Radians of a ripple at the furthest place of a line where fits begin: from the nearest start at most 1 rad
+is missing anywhere. The shortest period is a nineteenth of the furthest place."""
 _SHARPER = 0.04
 """Share of the usual rounding of a contact that a dead zone has: encoders on both sides would see more."""
 _SHARE_BEHIND = 0.35
@@ -65,17 +69,34 @@ _CATCHING = (5.0, 12.0, 28.0)
 
 
 def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
-    law = TorqueRipple(sine=number(0.0, "N*m"), cosine=number(0.0, "N*m"), order=number(1.0, "1"))
-    edited, part = tied(assembly, "ripple", body, law)
-    torque = efforts_on(body)
     shafts = (turns for turns in turns_per_turn(assembly, body) if turns != 1.0)
     orders = sorted({float(n) for n in _ORDERS} | {turns * n for turns in shafts for n in _OF_A_MOTOR})
+    yield _rippling(assembly, body, orders, max(150.0, 1.2 * orders[-1]))
+
+
+def _driven_along_a_line(assembly: Assembly) -> list[str]:
+    """Return the sliding bodies that a drive moves: what else slides has no magnets and no lead."""
+    return [body for body in drives(assembly) if body in sliding_bodies(assembly)]
+
+
+def _ripple_of_a_line(assembly: Assembly, body: str) -> Iterator[Edit]:
+    place, _ = assembly[body].motion_names  # type: ignore[attr-defined]
+    yield _rippling(assembly, body, _PHASES, 1.2 * _PHASES[-1], f"1 / {body}.{place}")
+
+
+def _rippling(assembly: Assembly, body: str, orders: Sequence[float], most: float, of: str = "") -> Edit:
+    """Return the edit that ties a ripple to a body; fits begin at some orders, perhaps counted in a size."""
+    kind = domain_of(assembly, body)
+    none, turn = number(0.0, kind.effort_unit), number(1.0, f"rad/{kind.motion_unit}")
+    law = TorqueRipple(sine=none, cosine=none, order=turn, domain=kind)
+    edited, part = tied(assembly, "ripple", body, law)
+    effort = efforts_on(body)
     unknowns = (
-        Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, torque),
-        Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, torque),
-        Unknown(f"{part}.order", tuple(orders), 0.5 * orders[0], max(150.0, 1.2 * orders[-1]), null=None),
+        Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, effort),
+        Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, effort),
+        Unknown(f"{part}.order", tuple(orders), 0.5 * orders[0], most, of, null=None),
     )
-    yield Edit(edited, unknowns)
+    return Edit(edited, unknowns)
 
 
 def _drivers(assembly: Assembly, name: str) -> list[str]:
@@ -303,6 +324,12 @@ torque_ripple = Effect(
             turning_bodies,
             _ripple,
             "a torque that repeats over the angle, the same forward and backward, at any speed",
+            "Hanselman 2003",
+        ),
+        Form(
+            _driven_along_a_line,
+            _ripple_of_a_line,
+            "a force that repeats over the way, the same forward and backward, at any speed",
             "Hanselman 2003",
         ),
     ),

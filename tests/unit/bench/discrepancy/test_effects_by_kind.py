@@ -30,7 +30,7 @@ TABLE = """
     quadratic_drag              x  x  x  x  x  x  x  x
     position_dependent_friction x  x  x  x  x  x  x  .
     asymmetric_friction         .  .  .  .  .  .  .  .
-    torque_ripple               x  x  x  x  x  o  x  .
+    torque_ripple               x  x  x  x  x  x  x  .
     backlash                    x  x  x  x  x  x  x  .
     drivetrain_resonance        x  x  x  x  x  x  x  .
     spring_damping              .  x  .  .  x  .  x  .
@@ -64,7 +64,7 @@ TABLE = """
     permanent_set               x  .  .  .  .  .  x  x
     self_heating                x  x  .  .  x  .  x  x
 """
-"""``x`` is offered, ``.`` has nothing there to sit on, ``o`` is wanted and not offered yet.
+"""``x`` is offered, ``.`` has nothing there to sit on.
 
 On machines whose parts are all declared: an effect that a deck leaves out is asked of the deck without it,
 ``viscous_friction`` of one without a dashpot, ``spring_damping`` of one without a damper beside its spring.
@@ -75,10 +75,6 @@ WHERE = {
     "load_dependent_friction": {"elastic_joint": ("spring", "arm"), "geared_joint": ("arm",)},
 }
 """Roles of the parts at which an effect must be offered, where there are several."""
-WANTED = {
-    "torque_ripple": "ripple is locked to the angle of a turning body: a screw's carriage moves in metres",
-}
-"""Why an effect that can be on a machine is not offered there yet."""
 ROWS = {row[0]: row[1:] for line in TABLE.strip().splitlines() if (row := line.split())}
 
 LEFT_OUT = frozenset({"viscous_friction", "spring_damping", "gravity_load"})
@@ -106,26 +102,11 @@ def offered(effect: str, kind: str) -> list[str]:
 @pytest.mark.parametrize("effect", ROWS)
 def test_an_effect_is_offered_where_it_can_be(effect: str) -> None:
     for kind, cell in zip(COLUMNS, ROWS[effect], strict=True):
-        if cell == "o":
-            continue
         places = offered(effect, kind)
         assert bool(places) == (cell == "x"), (effect, kind, places)
         roles = names_of(kind, 0) if kind != "cam" else {}
         for role in WHERE.get(effect, {}).get(kind, ()):
             assert roles[role] in {place.partition(".")[0] for place in places}, (effect, kind, role)
-
-
-@pytest.mark.parametrize(
-    ("effect", "kind"),
-    [
-        pytest.param(effect, kind, marks=pytest.mark.xfail(reason=WANTED[effect], strict=True))
-        for effect, row in ROWS.items()
-        for kind, cell in zip(COLUMNS, row, strict=True)
-        if cell == "o"
-    ],
-)
-def test_an_effect_that_is_wanted_is_offered(effect: str, kind: str) -> None:
-    assert offered(effect, kind)
 
 
 def test_the_table_has_every_effect_and_every_kind() -> None:
