@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ FINDING = 1
 """Exit status where something changed or may have."""
 
 
-_OF_A_STEP = ("examples", "package", "prove", "with_block")
+_OF_A_STEP = ("kind", "flash", "table_error", "examples", "package", "prove", "with_block")
 
 
 def export_monitor(
@@ -30,7 +30,7 @@ def export_monitor(
     from ..model import flatten
     from ..regeneration import watch_plan
 
-    given = [f"--{name.removeprefix('with_')}" for name in _OF_A_STEP if chosen[name]]
+    given = [f"--{name.removeprefix('with_').replace('_', '-')}" for name in _OF_A_STEP if chosen.get(name)]
     if given:
         raise click.BadParameter(
             f"{given[0]} is of an observer or controller; leave it out for --what {WATCH}"
@@ -38,6 +38,7 @@ def export_monitor(
     plan = watch_plan(flatten(smoothed(machine_of(deck_name))), sample_time)
     source = export_watch(plan, out, real=real)
     words = [f"{block.name}: {', '.join(block.changes)}" for block in plan.blocks]
+    words += _left_out(plan.unseen)
     show_written(
         as_json,
         (f"monitor of {plan.model.name.removesuffix('_residuals')}", *words),
@@ -76,7 +77,13 @@ def read_evidence(file: Path, deck_name: str, sample_time: float, as_json: bool)
     plan = watch_plan(flatten(smoothed(machine_of(deck_name))), sample_time)
     verdict = read_watch(read_watch_record(file, plan), plan)
     if as_json:
-        show_json({"file": file, **asdict(verdict), "named": [change.name for change in verdict.named]})
+        named = [change.name for change in verdict.named]
+        show_json({"file": file, **asdict(verdict), "named": named, "not_watched": plan.unseen})
     else:
-        show_lines(verdict.words())
-    return 0 if verdict.verdict == "none" else FINDING
+        show_lines((*verdict.words(), *_left_out(plan.unseen)))
+    return 0 if verdict.verdict == "none" and not verdict.is_of_before else FINDING
+
+
+def _left_out(names: Sequence[str]) -> list[str]:
+    """Return in words what a monitor does not watch."""
+    return [f"not watched, because these readings do not show it: {', '.join(names)}"] if names else []

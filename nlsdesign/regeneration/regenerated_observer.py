@@ -41,6 +41,9 @@ from .watched_records import ObserverChoice, WatchedRecord
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
+TIE = 0.01
+"""Share by which an observer of the declared model must err less to stay: within it both are equally good, and the
+better model's is generated."""
 _POINTS = 257
 """Grid points of the observers of the draws, whose tables need no finer error bound than the spread."""
 _SEED = 0
@@ -326,11 +329,12 @@ def _generated(
     best = min(range(len(named)), key=lambda k: errors[k][1])
     replaced = min(range(len(named)), key=lambda k: errors[k][0])
     roles = ", ".join(sorted({run.record.role.replace("_", " ") for run in deciding}))
-    if errors[replaced][0] < errors[best][1]:
+    share = 1.0 - errors[replaced][0] / max(errors[best][1], 1e-300)
+    if share > TIE:
         name = named[replaced][0]
         return named[replaced][1], (
             f"{name} of the declared model, which is not replaced: on the records that decide ({roles}) it "
-            "errs less than those of the better model"
+            f"errs by {100.0 * share:.2g} % less than those of the better model"
         )
     name, _, design = named[best]
     if len(named) == 1:

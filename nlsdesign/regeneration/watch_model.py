@@ -400,7 +400,12 @@ def watch_plan(model: FlatModel, sample_time: float = 1e-3) -> WatchPlan:
         share = 1.0 if "delay" in kinds else NOTICED_SHARES["stiffness"]
         load = LOAD * share * _largest_drive(model)
         watched.append(WatchedBlock(block.name, rows.names, noticed, units, least, load))
-    return WatchPlan(_residual_model(model, watched, told, filters, sample_time), tuple(watched), settling)
+    lasts = {v.name: v.name.partition("[")[0].rpartition(".")[2] for v in model.parameters}
+    known = [f"{n.partition('.')[0]}.{NOTICED[last][0]}" for n, last in lasts.items() if last in NOTICED]
+    shown = {name for block in watched for name in block.changes}
+    unseen = tuple(name for name in dict.fromkeys(known) if name not in shown)
+    residuals = _residual_model(model, watched, told, filters, sample_time)
+    return WatchPlan(residuals, tuple(watched), settling, unseen=unseen)
 
 
 def _residual_model(

@@ -34,6 +34,12 @@ MOST = 0.99
 NOTHING, ONE, TWO, OTHER = 0.35, 0.5, 0.1, 0.05
 """Probability before anything was seen: nothing changed, one number, two, something else."""
 OTHERS = ("something else",)
+LEAST_SHARE, LARGEST_SHARE = -0.9, 2.0
+"""Shares between which a number can have changed: beyond, a reading has another sign, unit or scale."""
+CERTAIN = 0.5
+"""Largest standard error of a change that is named, as a share of it."""
+TOO_LITTLE = 2
+"""Bit of the monitor's word: of late there was too little to judge by."""
 TORQUE_CONSTANT = "motor.torque_constant"
 EFFECTS = {
     "friction": "coulomb_friction",
@@ -72,6 +78,11 @@ class WatchedChange:
     probability: float
     aliases: tuple[str, ...] = ()
 
+    @property
+    def is_implausible(self) -> bool:
+        """Whether no number of a machine changes so."""
+        return not self.unit and not LEAST_SHARE <= self.size <= LARGEST_SHARE
+
     def words(self) -> str:
         """Return it as a sentence."""
         many = (1e3, "ms") if self.unit else (100.0, "%")
@@ -89,20 +100,23 @@ class WatchVerdict:
     Parameters
     ----------
     verdict
-        ``none``, ``named``, ``undecidable`` (several causes would do), ``unknown`` (none does), or
-        ``too_little``.
+        ``none``, ``named``, ``undecidable`` (several causes would do), ``unknown`` (none does),
+        ``implausible`` (what the numbers would have to be, none is), or ``too_little``.
     changes
         All numbers that may have changed, the likeliest first.
     probability
         Of the verdict.
     means
         How many means of residuals stand behind it.
+    is_of_before
+        Whether the monitor saw too little when it last judged: what is said is of the time before.
     """
 
     verdict: str
     changes: tuple[WatchedChange, ...]
     probability: float
     means: float
+    is_of_before: bool = False
 
     @property
     def named(self) -> tuple[WatchedChange, ...]:
@@ -115,7 +129,13 @@ class WatchVerdict:
         """Return what it says in sentences."""
         named = self.named
         lines = [HEADLINES[self.verdict].format(n=len(named), p=self.probability, means=self.means)]
-        shown = named or [c for c in self.changes if c.probability > 1.0 - SURE and self.verdict != "none"]
+        shown = named
+        if self.verdict not in ("none", "implausible"):
+            shown = named or tuple(c for c in self.changes if c.probability > 1.0 - SURE)
+        if self.is_of_before:
+            lines.append(
+                "That is of the time before: the last look saw too little, or readings that it refused."
+            )
         return [*lines, *(f"  {change.words()}" for change in shown)]
 
 
@@ -124,6 +144,8 @@ HEADLINES = {
     "named": "The machine has changed, from {means:.0f} means:",
     "undecidable": "Something has changed, or may have, and these sums do not tell what:",
     "unknown": "Something has changed that is no number watched: record some motions and diagnose them.",
+    "implausible": "Something has changed, and no number of a machine changes so much: check sign, unit and "
+    "scale of each reading, and whether samples are lost or come twice.",
     "too_little": "Too little motion was seen, {means:.0f} means: let the machine be used for some minutes.",
 }
 """What a verdict says in one line."""
@@ -184,7 +206,12 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
         ]
     else:
         verdict = "undecidable"
-    return WatchVerdict(verdict, tuple(changes), min(chance, MOST), means)
+    if verdict == "named" and any(c.error > CERTAIN * abs(c.size) for c in likely):
+        verdict, chance = "undecidable", chances[best]
+    if verdict != "none" and any(c.is_implausible for c in likely):
+        verdict = "implausible"
+    old = bool(int(record["word"]) & TOO_LITTLE)
+    return WatchVerdict(verdict, tuple(changes), min(chance, MOST), means, old)
 
 
 def _estimated(bins: Any, plan: WatchPlan) -> tuple[float, Array, Array]:

@@ -96,6 +96,8 @@ class WatchPlan:
         Time between two judgements, s.
     least
         Means of late that a judgement needs.
+    unseen
+        Numbers of the machine that its readings do not show, so that they are not watched.
     """
 
     model: FlatModel
@@ -103,6 +105,7 @@ class WatchPlan:
     settling: float
     between: float = PERIOD
     least: float = LEAST
+    unseen: tuple[str, ...] = ()
 
     @property
     def most(self) -> int:

@@ -154,6 +154,42 @@ def test_the_word_names_the_changes_in_the_order_of_its_bits(joint, tmp_path):
     assert ("0.002 s") in {size for _, _, size in bits}
 
 
+def evidence(plan, changes, word=0):
+    """Sums of 2,000 means of a machine whose numbers have changed, in changes to be noticed, by name."""
+    (block,), record, draw = plan.blocks, WatchTwin(plan).record, np.random.default_rng(3)
+    told = draw.normal(size=(2000, len(block.changes)))
+    left = told @ [changes.get(name, 0.0) for name in block.changes] + draw.normal(size=2000)
+    rows = np.zeros((2000, plan.most + 1))
+    rows[:, : len(block.changes)], rows[:, -1] = told, left
+    record["word"], record["bins"][0][0]["count"] = word, 2000.0
+    record["bins"][0][0]["products"] = (rows.T @ rows)[np.tril_indices(plan.most + 1)]
+    return record
+
+
+def test_what_no_number_does_is_no_name(published):
+    (friction,) = [n for n in published.blocks[0].changes if n.endswith(".friction")]
+    verdict = read_watch(evidence(published, {friction: 2.0}), published)
+    assert [c.name for c in verdict.named] == [friction]
+    assert verdict.named[0].size == pytest.approx(0.2, rel=0.1)
+    for wrong in ({"motor.inertia": 300.0}, {"motor.inertia": -25.0, friction: 40.0}):
+        verdict = read_watch(evidence(published, wrong), published)
+        assert (verdict.verdict, verdict.named) == ("implausible", ())
+        assert "check sign, unit and scale" in "".join(verdict.words())
+
+
+def test_evidence_of_before_is_said_to_be(published):
+    fresh, old = (read_watch(evidence(published, {}, word), published) for word in (0, 2))
+    assert (fresh.verdict, fresh.is_of_before) == ("none", False)
+    assert (old.verdict, old.is_of_before) == ("none", True)
+    assert "of the time before" in "".join(old.words())
+    assert "of the time before" not in "".join(fresh.words())
+
+
+def test_what_is_not_watched_is_known(published):
+    assert published.unseen == ()
+    assert plan_of("test_rig", 1e-3).unseen == ("spring.stiffness",)
+
+
 @pytest.fixture
 def kept(published, tmp_path):
     """A record of the published machine as a file, sealed as the C seals it."""

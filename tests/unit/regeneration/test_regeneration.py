@@ -162,6 +162,17 @@ def test_an_observer_that_would_be_worse_replaces_nothing() -> None:
     assert found.observer.origin == declared.origin or "declared" in found.chosen
 
 
+@pytest.mark.usefixtures("observer_alone")
+def test_of_two_that_are_equally_good_the_better_models_is_generated() -> None:
+    """The records are of a third machine, from which both are as far to a millionth."""
+    records = with_records(("fit", TRUE), ("selection", TRUE), ("held_out", TRUE))
+    declared, better = flatten(machine(DECLARED)), flatten(machine(DECLARED + 1e-6 * (DECLARED - TRUE)))
+    found = regenerate(declared, better, records, choice=CHOICE)
+    before, after = found.nominal
+    assert before < after < 1.001 * before
+    assert "not replaced" not in found.chosen
+
+
 def test_observer_and_plant_are_written(
     result: Regeneration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
