@@ -42,8 +42,8 @@ from .watched_records import ObserverChoice, WatchedRecord
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
 TIE = 0.01
-"""Share by which an observer of the declared model must err less to stay: within it both are equally good, and the
-better model's is generated."""
+"""Share by which an observer of the declared model must err less to stay: within it both are equally good, so
+that of the better model is generated."""
 _POINTS = 257
 """Grid points of the observers of the draws, whose tables need no finer error bound than the spread."""
 _SEED = 0

@@ -345,7 +345,7 @@ def _verdict(
         gaps_of(base, better, every),
         worst,
         _runners_up(outcome, steps),
-        derived(sourced(better), case.actuator, "diagnosed"),
+        derived(sourced(better, narrowed=complete), case.actuator, "diagnosed"),
         sourced(base),
         course_of(base, better, every, worst),
         tuple(text for fit in known for text in fit.unidentified()),

@@ -12,8 +12,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ....components.assembly.named_parts import Assembly
 from ....foundation.errors import MeasurementError
+from ....foundation.quantity import Quantity
+from ....foundation.spread import NormalSpread
 from ....model import FlatModel, flatten
 from ....model.origin import derived
 from ....model.readings import reading_of
@@ -28,6 +32,7 @@ from ...identification.residuals import rmse
 from ...identification.simulation_error import Shots, Weights
 from ...identification.windowed_simulation import Wiring
 from ..block_prediction import shown_values
+from ..effects.effect import SOURCE
 from ..screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from ..screening.wrong_numbers import out_of_reach
 from ..selection.comparison import Comparison
@@ -281,14 +286,31 @@ def refit_of_run(result: Refit, records: RecordSet, *, folder: str, day: str) ->
     return replace(result, actuator=with_records_named(result.actuator, folder, names, day=day))
 
 
-def sourced(hypothesis: Hypothesis) -> Assembly:
-    """Return the fitted assembly, its fitted numbers marked with where they come from."""
+def sourced(hypothesis: Hypothesis, *, narrowed: bool = False) -> Assembly:
+    """Return the fitted assembly, its fitted numbers marked with where they come from.
+
+    A number that an effect has brought has its standard error as its spread. ``narrowed``: whether declared
+    numbers have only the share of their spread that the records have left, of a row the largest; not where
+    something is missing from the model, for a wrong number would be stated as well known. That two numbers
+    are known together, such as a ratio, is not in it.
+    """
     fitted = hypothesis.fitted
     known, declared = fitted.quantities(), hypothesis.assembly.quantities()
-    rows = {name.partition("[")[0] for name in hypothesis.values}
-    return fitted.with_values(
-        {
-            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {declared[n].source}")
-            for n in rows
-        }
-    )
+    shares, errors = dict[str, float](), dict[str, float]()
+    for fit in hypothesis.fits.values():
+        for p, variance in zip(fit.parameters, np.diag(fit.covariance), strict=True):
+            name = p.name.partition("[")[0]
+            share = math.sqrt(variance) / p.sigma if math.isfinite(p.sigma) else 0.0
+            shares[name] = max(shares.get(name, 0.0), share)
+            errors[name] = fit.standard_error(p.name)
+    new = {u.name.partition("[")[0] for u in hypothesis.unknowns}
+    written = dict[str, Quantity]()
+    for name in {name.partition("[")[0] for name in hypothesis.values}:
+        now, source = known[name], SOURCE if name in new else f"{SOURCE}; declared: {declared[name].source}"
+        now = now.with_value(now.value, source)
+        if name in new and errors.get(name, 0.0) > 0.0 and isinstance(now.value, float):
+            now = now.with_spread(NormalSpread(errors[name]))
+        elif narrowed and now.spread and shares.get(name, 1.0) < 1.0:
+            now = now.with_spread(now.spread.narrowed(shares[name]))
+        written[name] = now
+    return fitted.with_values(written)

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+import pytest
+
+from nlsdesign.bench.discrepancy.effects.effect import Candidate, Unknown
 from nlsdesign.bench.discrepancy.reporting.fitted_numbers import with_records_named
-from nlsdesign.components import Inertia, assembly
+from nlsdesign.bench.discrepancy.reporting.refit import sourced
+from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.bench.identification.least_squares import Fit
+from nlsdesign.bench.identification.parameters import Parameter, declared_parameter
+from nlsdesign.components import CoulombFriction, Inertia, assembly, tie
 from nlsdesign.foundation.quantity import quantity
+from nlsdesign.foundation.spread import NormalSpread, RelativeSpread
+from nlsdesign.model import flatten
 
 
 def body(source: str) -> object:
@@ -34,3 +46,30 @@ def test_what_no_fit_has_marked_is_left_alone() -> None:
     earlier = "fitted to bench records a in bench/march, 2026-03-02; declared: data sheet"
     assert source_of("data sheet", ["b"]) == "data sheet"
     assert source_of(earlier, ["b"]) == earlier
+
+
+def test_a_number_is_as_known_as_the_records_leave_it_where_nothing_is_missing() -> None:
+    inertia = quantity(1e-3, "kg*m^2", source="data sheet", spread=0.1)
+    friction = CoulombFriction(sliding_effort=quantity(0.05, "N*m")).smooth()
+    made = assembly("arm", motor=Inertia(inertia=inertia), rubbing=tie(friction, "motor"))
+    variables = {v.name: v for v in flatten(made).parameters}
+    known = declared_parameter(variables["motor.inertia"], 1.1e-3)
+    new = Parameter("rubbing.sliding_effort", "N*m", 0.08, 0.08, math.inf, 1e-4, 2.0, "log", 1.0)
+    fit = Fit(
+        (known, new), {known.name: 1.1e-3, new.name: 0.08}, np.diag([(0.25 * known.sigma) ** 2, 0.01**2]),
+        0.0, {}, converged=True,
+    )  # fmt: skip
+    unknown = Unknown(new.name, (0.05,), 1e-4, 2.0)
+    candidate = Candidate("coulomb_friction", "motor", made, (unknown,), "signature", "source")
+    found = Hypothesis(made, (candidate,), dict(fit.values), {("motor",): fit})
+    narrow, wide = (sourced(found, narrowed=each).quantities() for each in (True, False))
+    # A quarter of the deviation of the logarithm, ln(1 + s).
+    spread = narrow["motor.inertia"].spread
+    assert isinstance(spread, RelativeSpread)
+    assert math.log1p(spread.relative) == pytest.approx(0.25 * math.log(1.1))
+    assert wide["motor.inertia"].spread == inertia.spread
+    assert "declared: data sheet" in narrow["motor.inertia"].source
+    for each in (narrow, wide):
+        number = each["rubbing.sliding_effort"]
+        assert number.spread == NormalSpread(fit.standard_error(new.name))
+        assert number.source == "fitted to bench records"
