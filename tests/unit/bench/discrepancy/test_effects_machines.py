@@ -59,7 +59,7 @@ def test_what_acts_on_a_carriage_and_what_is_wrong_with_its_drive() -> None:
     assert {effect.__name__ for effect in ALL if effect(drive())} & KNOWN == {
         "coulomb_friction", "stribeck_friction", "quadratic_drag", "position_dependent_friction",
         "constant_force", "drive_delay", "torque_constant_saturation", "command_compression",
-        "winding_heat", "torque_constant_drift", "backlash", "drivetrain_resonance",
+        "winding_heat", "torque_constant_drift", "backlash", "drivetrain_resonance", "torque_ripple",
     }  # fmt: skip
 
 
