@@ -74,7 +74,7 @@ def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
     yield _rippling(assembly, body, orders, max(150.0, 1.2 * orders[-1]))
 
 
-def _driven_along_a_line(assembly: Assembly) -> list[str]:
+def driven_along_a_line(assembly: Assembly) -> list[str]:
     """Return the sliding bodies that a drive moves: what else slides has no magnets and no lead."""
     return [body for body in drives(assembly) if body in sliding_bodies(assembly)]
 
@@ -327,7 +327,7 @@ torque_ripple = Effect(
             "Hanselman 2003",
         ),
         Form(
-            _driven_along_a_line,
+            driven_along_a_line,
             _ripple_of_a_line,
             "a force that repeats over the way, the same forward and backward, at any speed",
             "Hanselman 2003",
