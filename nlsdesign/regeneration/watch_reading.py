@@ -206,7 +206,7 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
         ]
     else:
         verdict = "undecidable"
-    if verdict == "named" and any(c.error > CERTAIN * abs(c.size) for c in likely):
+    if verdict == "named" and any(c.error > CERTAIN * abs(c.size) for c in likely if c.name in best):
         verdict, chance = "undecidable", chances[best]
     if verdict != "none" and any(c.is_implausible for c in likely):
         verdict = "implausible"

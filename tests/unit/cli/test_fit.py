@@ -80,6 +80,7 @@ def test_the_numbers_of_the_rig_come_back_with_an_honest_error(run: Run, bench: 
     assert {e["block"] for e in held} == {"spring", "motor"}
     for each in held:
         assert each["fitted"] < 1.2 * each["noise_floor"] < each["declared"]
+    assert not any("explain the records" in w for w in found["words"])
     # The noise of the force is far below what it measures.
     force = next(e for e in held if e["block"] == "spring")
     assert 0.0 < force["relative"] < 3.0
@@ -128,6 +129,7 @@ def test_a_number_at_the_end_of_its_range_is_not_passed_over(bench: Path) -> Non
     (number,) = [n for n in found.numbers if n.name == "motor.inertia"]
     assert number.strain == pytest.approx(-3.0, abs=0.01)
     assert any("motor.inertia stands at the end of its range, -3.0 standard" in w for w in found.words())
+    assert any(w.startswith("No numbers explain the records: motor is left at") for w in found.words())
 
 
 def test_a_deck_that_leaves_nothing_free_is_refused(bench: Path) -> None:

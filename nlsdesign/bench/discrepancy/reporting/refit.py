@@ -117,6 +117,8 @@ def _without_sensors(model: FlatModel, record: Record, wiring: Wiring) -> Record
     return replace(record, trace=replace(record.trace, signals=signals))
 
 
+_EXPLAINED = 2.0
+"""Times its noise beyond which a block is plainly not explained."""
 _FROM_SPREAD = 0.8
 """Share of the variance of a declared spread above which the records have added next to nothing."""
 
@@ -177,7 +179,14 @@ class Refit:
             for name, share in self._known_by_spread().items()
             if share > _FROM_SPREAD and name not in {n.name for n in self.numbers if n.at_end}
         ]
-        return (*[f"suspect: {f}" for f in self.findings], *stuck, *unknown, *more_excitation(self.fits))
+        left = [
+            f"No numbers explain the records: {e.block} is left at {e.fitted / e.noise_floor:.2g} times its "
+            "noise, and these stand for what is missing too; ask `nlsdesign diagnose` of the declared deck."
+            for e in self.errors()
+            if e.role == "fit" and e.fitted > _EXPLAINED * e.noise_floor > 0.0
+        ]
+        suspect = [f"suspect: {f}" for f in self.findings]
+        return (*suspect, *left, *stuck, *unknown, *more_excitation(self.fits))
 
     def _known_by_spread(self) -> dict[str, float]:
         """Return by name the share of what is known of a number that comes from its declared spread."""
