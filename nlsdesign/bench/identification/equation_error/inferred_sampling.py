@@ -11,6 +11,9 @@ that tells the shift. Whoever asks whether a machine lacks anything at all asks 
 blocks share are then held by what other blocks say of them. That answer is sharper, but true only if nothing
 is missing; so it counts only where the one with the terms, which is true in any case, allows it.
 
+A declared form says how a signal runs, not that nothing lags behind it: a current loop follows a command that
+is held within a part of a sample. Such a lag is inferred too.
+
 Channels of one recorder can also be shifted against each other by a part of a sample, as where they are
 sampled in turn. Up to half a sample of each of the two, such a shift is a number without a meaning of its
 own: it is inferred in the same way, and stated. A delay beyond that is left for effects to explain.
@@ -30,7 +33,7 @@ from ....foundation.errors import ConvergenceError
 from ..filters import derivative
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
-from ..records.sampling import AVERAGED, HELD, SAMPLED, Sampling, shifted
+from ..records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling, shifted
 from ..residuals import effective_size
 from .block import Block, BlockNoise
 from .block_response import DrivenBlock, free_in
@@ -46,6 +49,8 @@ _WEIGHINGS = 2
 _MOST = 1.1
 """Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
 little longer stands at the least one of its search, so no effect could be named for it."""
+_BESIDE = 0.6
+"""The same beside what is declared: it leaves half a sample to a loop below or to another clock."""
 
 
 Missing: TypeAlias = Callable[[Block, Record, float], Iterator[Array]]
@@ -58,15 +63,19 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     ``records``: inputs of which nothing is said have columns without a sampling. ``missing``: what the blocks
     may lack.
     """
+    inputs = {drive.signal for each in seen for drive in each.block.drives.values()} - {
+        drive.signal for each in seen for drive in each.block.drives.values() if drive.order > 0
+    }
     for column in records.columns:
-        if column.sampling is SAMPLED or (column.sampling and not column.declared):
-            continue
+        declared = column.sampling if column.declared and column.signal in inputs else None
+        if column.sampling and declared not in FORMS:
+            continue  # a motion, or what was inferred before
         likelihood = _asked(records, seen, column.signal, missing)
-        if column.sampling:
-            remark = likelihood.against(column.sampling) if likelihood else ""
-        else:
-            inferred, remark = likelihood.taken() if likelihood else (SAMPLED, "")
-            records = records.read_as({column.signal: inferred})
+        read: Sampling = declared or SAMPLED
+        remark = ""
+        if likelihood:
+            read, remark = likelihood.beside(declared) if declared else likelihood.taken()
+        records = records.read_as({column.signal: read})
         if remark:
             finding = Finding(f"column '{column.name}'", remark)
             records = replace(records, remarks=(*records.remarks, finding))
@@ -122,17 +131,19 @@ class _Likelihood(NamedTuple):
             f"{late} ({others}); to decide it, write between_samples in records.toml"
         )
 
-    def against(self, declared: Sampling) -> str:
-        """Return the remark that the records speak against what is declared; none where they do not."""
-        form = self.likeliest
-        if abs(self.shift) > _MOST or form.late == declared.late:
-            return ""
-        if 0.5 * ((declared.late - self.shift) / self.error) ** 2 < _NO_FORM:
-            return ""
-        return (
+    def beside(self, declared: Sampling) -> tuple[Sampling, str]:
+        """Return how a signal is read of which that is declared, and the remark where records add a shift."""
+        beyond = self.shift - declared.late
+        if abs(beyond) > _BESIDE or 0.5 * (beyond / self.error) ** 2 < _NO_FORM:
+            return declared, ""
+        likeliest = self.likeliest
+        other = f"; if {likeliest.name} is meant, write it there" if likeliest is not declared else ""
+        return shifted(self.shift), (
             f"is declared {declared.name}, but the records show that it acts {self.shift:.2f} ± "
-            f"{self.error:.2g} samples behind its stamps ({self.losses_of_others(form)}); it is read "
-            f"as declared: check between_samples in records.toml, {form.name} would fit"
+            f"{self.error:.2g} samples behind its stamps ({self.losses_of_others(likeliest)}), as with a "
+            f"current loop that lags or another clock; it is read {abs(beyond):.2g} of a sample "
+            f"{'later' if beyond > 0.0 else 'earlier'} than declared: check between_samples in "
+            f"records.toml{other}"
         )
 
     def allows(self, shift: float) -> bool:
