@@ -46,6 +46,8 @@ _NO_FORM = 10.0
 _LEAST = 0.05
 """Share of the noise that the numbers of a machine leave at least, where they do not make it vanish."""
 _WEIGHINGS = 2
+_EITHER_WAY = (0.5, -0.5)
+"""Samples by which a signal is read later and earlier, for the slope of the residuals with a shift."""
 _MOST = 1.1
 """Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
 little longer stands at the least one of its search, so no effect could be named for it."""
@@ -70,7 +72,7 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
         declared = column.sampling if column.declared and column.signal in inputs else None
         if column.sampling and declared not in FORMS:
             continue  # a motion, or what was inferred before
-        likelihood = _asked(records, seen, column.signal, missing)
+        likelihood = _asked(records, seen, column.signal, missing, declared)
         read: Sampling = declared or SAMPLED
         remark = ""
         if likelihood:
@@ -124,7 +126,7 @@ class _Likelihood(NamedTuple):
         form = self.likeliest
         words, others = f"is taken as {form.name}: it {form.words}", self.losses_of_others(form)
         if self.loss(form) >= _NO_FORM:
-            form = shifted(self.shift)
+            form = shifted(form, self.shift)
             words = f"is read {abs(form.late):.2g} of a sample {'earlier' if form.late > 0.0 else 'later'}"
         return form, (
             f"{words}; nothing says how it runs between its samples, and the records show that it acts "
@@ -138,13 +140,18 @@ class _Likelihood(NamedTuple):
             return declared, ""
         likeliest = self.likeliest
         other = f"; if {likeliest.name} is meant, write it there" if likeliest is not declared else ""
-        return shifted(self.shift), (
+        return shifted(declared, self.shift), (
             f"is declared {declared.name}, but the records show that it acts {self.shift:.2f} ± "
             f"{self.error:.2g} samples behind its stamps ({self.losses_of_others(likeliest)}), as with a "
             f"current loop that lags or another clock; it is read {abs(beyond):.2g} of a sample "
             f"{'later' if beyond > 0.0 else 'earlier'} than declared: check between_samples in "
             f"records.toml{other}"
         )
+
+    def moved(self, around: _Likelihood) -> _Likelihood:
+        """Return the same with a shift that was looked for again around this one."""
+        best = max(self.of_shift, around.of_shift)
+        return self._replace(of_shift=best, shift=self.shift + around.shift, error=around.error)
 
     def allows(self, shift: float) -> bool:
         """Tell whether a shift is not plainly less likely than the best."""
@@ -161,20 +168,36 @@ class _Likelihood(NamedTuple):
 
 
 def _asked(
-    records: RecordSet, seen: Sequence[BlockNoise], signal: str, missing: Missing
+    records: RecordSet,
+    seen: Sequence[BlockNoise],
+    signal: str,
+    missing: Missing,
+    declared: Sampling | None,
 ) -> _Likelihood | None:
     """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells.
 
-    Blocks that share numbers with these say what the numbers are.
+    Blocks that share numbers with these say what the numbers are. ``declared``: the form, where one is.
     """
     asked = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
     known, left = set[str](), [each for each in seen if all(each is not other for other in asked)]
     while known != (known := {name for each in asked for name in _free(each)}):
         asked += [each for each in left if known & set(_free(each))]
         left = [each for each in left if not known & set(_free(each))]
-    forms = [{signal: form} for form in _FORMS]
+    likelihood = _likelihood_of(_FORMS, asked, records, signal, missing)
+    if likelihood is None or likelihood.loss(form := likelihood.likeliest) < _NO_FORM:
+        return likelihood
+    # The residuals are no straight line over half a sample: a shift is looked for anew around itself.
+    around = [shifted(declared or form, likelihood.shift + by) for by in (0.0, *_EITHER_WAY)]
+    again = _likelihood_of(around, asked, records, signal, missing)
+    return again and likelihood.moved(again)
+
+
+def _likelihood_of(
+    forms: Sequence[Sampling], asked: Sequence[BlockNoise], records: RecordSet, signal: str, missing: Missing
+) -> _Likelihood | None:
+    """Return how likely three forms of a signal are, of which two are half a sample off the first."""
     try:
-        rows = [rows_of(each, records.deciding, forms, plain_terms) for each in asked]
+        rows = [rows_of(each, records.deciding, [{signal: f} for f in forms], plain_terms) for each in asked]
     except ConvergenceError:
         return None  # a fit tells that the declared numbers give no response
     plain = _likelihood(rows) if rows else None

@@ -2,9 +2,13 @@
 
 A digital controller holds its command until it computes the next one; an instrument shows the value at an
 instant; many drives log the mean over the period before. A residual is filtered over several samples, and so
-sees of a signal what a smooth one with the same effect has at the samples. Behind a hold of one period h,
-that is the signal half a sample later, times sin(x)/x with x = ωh/2; a mean over the period before the stamp
-is the opposite. Both are read with four samples, exact to the fourth order in ωh.
+sees of a signal what a smooth one with the same effect has at the samples.
+
+What is held, from wherever in a period, acts on a position that is sampled in the same period h. The second
+difference of the positions is h² times the mean of the acceleration under a triangle of two periods, whatever
+its course; a mean under that triangle of a smooth acceleration is it times (sin x/x)², x = ωh/2. So a held
+signal is read with its share of the triangle for each value, divided by (sin x/x)². A mean over the period
+before the stamp of a smooth signal is read divided by sin x/x. Both divisions are exact to the sixth order.
 
 Everything that reads a record between its samples asks here: blocks, fits over windows, simulations that a
 record drives.
@@ -12,7 +16,10 @@ record drives.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import factorial
 
 import numpy as np
 
@@ -20,6 +27,10 @@ from ....foundation.arrays import Array
 
 _REACH = 3
 """Samples to either side from which a signal is read between two of them."""
+_SQUARE = (1.0, 1.0 / 12.0, 1.0 / 240.0, 1.0 / 6048.0)
+"""Series of (x/sin x)², x = ω/2, in even powers of ω: coefficients of 1, ω², ω⁴, ω⁶."""
+_SINGLE = (1.0, 1.0 / 24.0, 7.0 / 5760.0, 31.0 / 967680.0)
+"""The same of x/sin x."""
 
 
 @dataclass(frozen=True)
@@ -89,39 +100,63 @@ def _later(values: Array, samples: int) -> Array:
     return result
 
 
+def _symmetric(places: Sequence[float], series: Sequence[float]) -> Array:
+    """Return weights at places and their mirror images, of which one is as many, by their response.
+
+    ``series``: coefficients of the even powers of ω in the sum of weights times cos(place·ω), as many as
+    places, the least first.
+    """
+    powers = [
+        [(-1) ** m * place ** (2 * m) / factorial(2 * m) for place in places] for m in range(len(series))
+    ]
+    return np.linalg.solve(np.array(powers), np.array(series))
+
+
+def _held(late: float) -> tuple[tuple[int, float], ...]:
+    """Return the taps of a signal of which each value acts from so many samples behind its stamp, for one."""
+
+    def below(x: float) -> float:
+        """Return the share of the triangle between −1 and 1 that lies below a place."""
+        x = min(max(x, -1.0), 1.0)
+        return 0.5 * (1.0 + x) ** 2 if x < 0.0 else 1.0 - 0.5 * (1.0 - x) ** 2
+
+    first, last = math.floor(-2.0 - late), math.ceil(1.0 - late)
+    shares = [below(own + 1.0 + late) - below(own + late) for own in range(first, last + 1)]
+    one_side = _symmetric(range(_REACH + 1), _SQUARE)
+    weights = np.convolve(shares, [*0.5 * one_side[:0:-1], one_side[0], *0.5 * one_side[1:]])
+    return tuple((first - _REACH + k, float(weight)) for k, weight in enumerate(weights) if weight)
+
+
+def _mean_before() -> tuple[tuple[int, float], ...]:
+    """Return the taps of a signal that is logged as its mean over the period before."""
+    later = _symmetric([k + 0.5 for k in range(_REACH + 1)], _SINGLE)
+    weights = [*0.5 * later[::-1], *0.5 * later]
+    return tuple((k - _REACH, float(weight)) for k, weight in enumerate(weights))
+
+
 SAMPLED = Sampling("sampled", "is what the signal was at its stamps")
-HELD = Sampling(
-    "held",
-    "holds each value from its stamp to the next",
-    ((-2, -1 / 24), (-1, 13 / 24), (0, 13 / 24), (1, -1 / 24)),
-    0.5,
-    0,
-)
+HELD = Sampling("held", "holds each value from its stamp to the next", _held(0.0), 0.5, 0)
 HELD_BEFORE = Sampling(
-    "held_before",
-    "holds each value from the stamp before to its own",
-    ((-1, -1 / 24), (0, 13 / 24), (1, 13 / 24), (2, -1 / 24)),
-    -0.5,
-    1,
+    "held_before", "holds each value from the stamp before to its own", _held(-1.0), -0.5, 1
 )
-AVERAGED = Sampling(
-    "averaged",
-    "is the mean over the period before each stamp",
-    ((-1, -1 / 12), (0, 7 / 12), (1, 7 / 12), (2, -1 / 12)),
-    -0.5,
-)
+AVERAGED = Sampling("averaged", "is the mean over the period before each stamp", _mean_before(), -0.5)
 FORMS = (SAMPLED, HELD, HELD_BEFORE, AVERAGED)
 
 
-def shifted(samples: float) -> Sampling:
-    """Return a signal that acts a part of a sample behind its stamps, read by a polynomial of sixth degree.
+def shifted(form: Sampling, samples: float) -> Sampling:
+    """Return a signal that runs as it does and acts so late in all; between samples by a polynomial.
 
-    ``samples``: about one at most, of either sign.
+    ``samples``: behind its stamps, about one beyond those of the form at most, of either sign.
     """
-    places = range(-_REACH, _REACH + 1)
+    words = f"acts {samples:.2g} samples behind its stamps"
+    if form.held_from is not None:
+        return Sampling(f"shifted {form.name}", words, _held(samples - HELD.late), samples)
+    places, beyond = range(-_REACH, _REACH + 1), samples - form.late
     # The weights of Lagrange: of the values at whole places in that of their polynomial in between.
-    taps = tuple(
-        (own, float(np.prod([(-samples - other) / (own - other) for other in places if other != own])))
+    between = [
+        float(np.prod([(-beyond - other) / (own - other) for other in places if other != own]))
         for own in places
-    )
-    return Sampling("shifted", f"acts {samples:.2g} samples behind its stamps", taps, samples)
+    ]
+    weights = np.convolve(form.weights, between)
+    taps = tuple((form.taps[0][0] - _REACH + k, float(weight)) for k, weight in enumerate(weights))
+    return Sampling(f"shifted {form.name}", words, taps, samples)

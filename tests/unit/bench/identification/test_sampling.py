@@ -19,7 +19,7 @@ from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.filters import derivative
 from nlsdesign.bench.identification.records.measurement import Record
-from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling
+from nlsdesign.bench.identification.records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling, shifted
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.changed_copies import smoothed
 from nlsdesign.components.assembly.deck_writer import declare
@@ -247,6 +247,40 @@ def test_a_held_current_that_acts_half_a_sample_late_is_read_so(tmp_path: Path) 
     told = forms(*bench(tmp_path, _JOINT, [joint(seed, late=11) for seed in range(4)]))
     assert told["ammeter"] is not None
     assert told["ammeter"].late == pytest.approx(1.05, abs=0.03)
+
+
+@pytest.mark.parametrize("declared", [None, "held"])
+def test_a_hold_behind_which_something_lags_is_read_as_late_as_it_is(
+    tmp_path: Path, declared: str | None
+) -> None:
+    """A current loop that lags by a quarter of a sample is no fault, also where the hold is declared."""
+    deck, records = bench(tmp_path, _JOINT, [joint(seed, late=5) for seed in range(4)], declared)
+    told = forms(deck, records)["ammeter"]
+    assert told is not None
+    assert told.late == pytest.approx(0.75, abs=0.02)
+
+
+def test_a_hold_declared_beside_a_lag_of_a_whole_sample_stays_declared(tmp_path: Path) -> None:
+    """That is a delay, which an effect has to explain."""
+    deck, records = bench(tmp_path, _JOINT, [joint(seed, late=20) for seed in range(4)], "held")
+    assert forms(deck, records)["ammeter"] is HELD
+
+
+@pytest.mark.parametrize("late", [-0.6, 0.0, 0.3, 0.9])
+def test_a_held_acceleration_is_read_as_sampled_positions_have_it(late: float) -> None:
+    """A double integrator, integrated exactly in twenty parts of each sample; the motion is slow to 3 %."""
+    draw = np.random.default_rng(1)
+    time = np.arange(400.0)
+    waves = [(draw.uniform(0.05, 1.2), draw.uniform(0.0, math.tau)) for _ in range(8)]
+    given = sum(np.sin(rate * time + phase) for rate, phase in waves)
+    fine = np.repeat(given, _FINE)
+    acts = np.roll(fine, round(late * _FINE))
+    speed = np.concatenate([[0.0], np.cumsum(acts)]) / _FINE
+    place = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / _FINE
+    wanted = derivative(place[::_FINE][:400], 1.0, order=2)
+    read = shifted(HELD, 0.5 + late).at_samples(given)
+    inside = slice(20, -20)
+    assert read[inside] == pytest.approx(wanted[inside], abs=2e-3 * float(np.max(np.abs(given))))
 
 
 @pytest.mark.parametrize("form", FORMS)
