@@ -31,6 +31,7 @@ import numpy as np
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
 from ..filters import derivative
+from ..records.mapping import Column
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..records.sampling import AVERAGED, FORMS, HELD, SAMPLED, Sampling, shifted
@@ -48,6 +49,8 @@ _LEAST = 0.05
 _WEIGHINGS = 2
 _EITHER_WAY = (0.5, -0.5)
 """Samples by which a signal is read later and earlier, for the slope of the residuals with a shift."""
+_SEARCHES = 2
+"""How often a shift of a motion is looked for around the last."""
 _MOST = 1.1
 """Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
 little longer stands at the least one of its search, so no effect could be named for it."""
@@ -60,28 +63,75 @@ Missing: TypeAlias = Callable[[Block, Record, float], Iterator[Array]]
 
 
 def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missing: Missing) -> RecordSet:
-    """Return the records in which every input runs between its samples as they tell best, with remarks.
+    """Return the records in which every channel runs between its samples as they tell best, with remarks.
 
-    ``records``: inputs of which nothing is said have columns without a sampling. ``missing``: what the blocks
-    may lack.
+    ``records``: inputs of which nothing is said have columns without a sampling. Of the motions of which
+    nothing is said the first is the clock of all others. ``missing``: what the blocks may lack.
     """
-    inputs = {drive.signal for each in seen for drive in each.block.drives.values()} - {
-        drive.signal for each in seen for drive in each.block.drives.values() if drive.order > 0
-    }
-    for column in records.columns:
-        declared = column.sampling if column.declared and column.signal in inputs else None
-        if column.sampling and declared not in FORMS:
-            continue  # a motion, or what was inferred before
+    drives = [drive for each in seen for drive in each.block.drives.values()]
+    motions = {drive.signal for drive in drives if drive.order > 0}
+    driving = {drive.signal for drive in drives} - motions
+    # What was inferred before is not asked again.
+    inputs = [
+        c for c in records.columns
+        if c.sampling is None or (c.signal in driving and c.declared and c.sampling in FORMS)
+    ]  # fmt: skip
+    others = [c for c in records.columns if c.signal in motions and not c.declared][1:]
+    others = [c for c in others if c.sampling is SAMPLED]
+    read, remarks = _told(records, inputs, seen, missing)
+    later, of_motions = _motions_told(read, others, seen, missing)
+    if of_motions:
+        unread = later.read_as({c.signal: c.sampling for c in inputs if c.sampling})
+        later, remarks = _told(unread, inputs, seen, missing)
+    return replace(later, remarks=(*records.remarks, *remarks, *of_motions))
+
+
+def _told(
+    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing
+) -> tuple[RecordSet, list[Finding]]:
+    """Return the records with some columns read as they tell best, one after the other, and the remarks."""
+    remarks = []
+    for column in columns:
+        declared = column.sampling
         likelihood = _asked(records, seen, column.signal, missing, declared)
-        read: Sampling = declared or SAMPLED
-        remark = ""
+        form, remark = declared or SAMPLED, ""
         if likelihood:
-            read, remark = likelihood.beside(declared) if declared else likelihood.taken()
-        records = records.read_as({column.signal: read})
+            form, remark = likelihood.beside(declared) if declared else likelihood.taken()
+        records = records.read_as({column.signal: form})
         if remark:
-            finding = Finding(f"column '{column.name}'", remark)
-            records = replace(records, remarks=(*records.remarks, finding))
-    return records
+            remarks.append(Finding(f"column '{column.name}'", remark))
+    return records, remarks
+
+
+def _motions_told(
+    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing
+) -> tuple[RecordSet, list[Finding]]:
+    """Return the records with some motions shifted against the first as they tell best, and the remarks.
+
+    Plain terms take all that tells it, so nothing is asked beside them.
+    """
+    remarks = []
+    for column in columns if missing is not plain_terms else ():
+        shift, error, asked = 0.0, math.inf, _asking(seen, column.signal)
+        for _ in range(_SEARCHES):
+            around = [shifted(SAMPLED, shift + by) for by in (0.0, *_EITHER_WAY)]
+            likelihood = _likelihood_of(around, asked, records, column.signal, missing)
+            if likelihood is None:
+                break
+            shift, error = shift + likelihood.shift, likelihood.error
+            if abs(shift) > _MOST:
+                break
+        if abs(shift) > _MOST or 0.5 * (shift / error) ** 2 < _NO_FORM:
+            continue
+        records = records.read_as({column.signal: shifted(SAMPLED, shift)})
+        way = "earlier" if shift > 0.0 else "later"
+        text = (
+            f"is read {abs(shift):.2f} ± {error:.2g} of a sample {way}, as where channels are sampled in "
+            "turn: so it fits the first motion that is measured; to forbid it, write between_samples = "
+            '"sampled" in records.toml'
+        )
+        remarks.append(Finding(f"column '{column.name}'", text))
+    return records, remarks
 
 
 class BlockRows(NamedTuple):
@@ -176,19 +226,23 @@ def _asked(
 ) -> _Likelihood | None:
     """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells.
 
-    Blocks that share numbers with these say what the numbers are. ``declared``: the form, where one is.
+    ``declared``: the form, where one is. An answer without plain terms counts if the one with them allows it.
     """
-    asked = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
-    known, left = set[str](), [each for each in seen if all(each is not other for other in asked)]
-    while known != (known := {name for each in asked for name in _free(each)}):
-        asked += [each for each in left if known & set(_free(each))]
-        left = [each for each in left if not known & set(_free(each))]
-    likelihood = _likelihood_of(_FORMS, asked, records, signal, missing)
+    asked = _asking(seen, signal)
+
+    def told(forms: Sequence[Sampling]) -> _Likelihood | None:
+        plain = _likelihood_of(forms, asked, records, signal, plain_terms)
+        if plain is None or missing is plain_terms:
+            return plain
+        sharper = _likelihood_of(forms, asked, records, signal, missing)
+        return sharper if sharper and plain.allows(sharper.shift) else plain
+
+    likelihood = told(_FORMS)
     if likelihood is None or likelihood.loss(form := likelihood.likeliest) < _NO_FORM:
         return likelihood
     # The residuals are no straight line over half a sample: a shift is looked for anew around itself.
     around = [shifted(declared or form, likelihood.shift + by) for by in (0.0, *_EITHER_WAY)]
-    again = _likelihood_of(around, asked, records, signal, missing)
+    again = told(around)
     return again and likelihood.moved(again)
 
 
@@ -196,18 +250,22 @@ def _likelihood_of(
     forms: Sequence[Sampling], asked: Sequence[BlockNoise], records: RecordSet, signal: str, missing: Missing
 ) -> _Likelihood | None:
     """Return how likely three forms of a signal are, of which two are half a sample off the first."""
+    ways = [{signal: form} for form in forms]
     try:
-        rows = [rows_of(each, records.deciding, [{signal: f} for f in forms], plain_terms) for each in asked]
+        rows = [rows_of(each, records.deciding, ways, missing) for each in asked]
     except ConvergenceError:
         return None  # a fit tells that the declared numbers give no response
-    plain = _likelihood(rows) if rows else None
-    if plain is None or missing is plain_terms:
-        return plain
-    others = zip(asked, rows, strict=True)
-    sharper = _likelihood(
-        [own._replace(own=terms_of(each, records.deciding, missing)) for each, own in others]
-    )
-    return sharper if sharper and plain.allows(sharper.shift) else plain
+    return _likelihood(rows) if rows else None
+
+
+def _asking(seen: Sequence[BlockNoise], signal: str) -> list[BlockNoise]:
+    """Return the blocks that a signal drives, and those that share numbers with these."""
+    asked = [each for each in seen if any(d.signal == signal for d in each.block.drives.values())]
+    known, left = set[str](), [each for each in seen if all(each is not other for other in asked)]
+    while known != (known := {name for each in asked for name in _free(each)}):
+        asked += [each for each in left if known & set(_free(each))]
+        left = [each for each in left if not known & set(_free(each))]
+    return asked
 
 
 def _free(seen: BlockNoise) -> tuple[str, ...]:
