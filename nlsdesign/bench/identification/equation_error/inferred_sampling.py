@@ -82,18 +82,27 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     later, of_motions = _motions_told(read, others, seen, missing)
     if of_motions:
         unread = later.read_as({c.signal: c.sampling for c in inputs if c.sampling})
-        later, remarks = _told(unread, inputs, seen, missing)
+        # As the motions were read as if nothing else were missing, plain terms have no say any more.
+        later, remarks = _told(unread, inputs, seen, missing, gated=False)
     return replace(later, remarks=(*records.remarks, *remarks, *of_motions))
 
 
 def _told(
-    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing
+    records: RecordSet,
+    columns: Sequence[Column],
+    seen: Sequence[BlockNoise],
+    missing: Missing,
+    *,
+    gated: bool = True,
 ) -> tuple[RecordSet, list[Finding]]:
-    """Return the records with some columns read as they tell best, one after the other, and the remarks."""
+    """Return the records with some columns read as they tell best, one after the other, and the remarks.
+
+    ``gated``: whether an answer without plain terms counts only if the one with them allows it.
+    """
     remarks = []
     for column in columns:
         declared = column.sampling
-        likelihood = _asked(records, seen, column.signal, missing, declared)
+        likelihood = _asked(records, seen, column.signal, missing, declared, gated=gated)
         form, remark = declared or SAMPLED, ""
         if likelihood:
             form, remark = likelihood.beside(declared) if declared else likelihood.taken()
@@ -223,14 +232,18 @@ def _asked(
     signal: str,
     missing: Missing,
     declared: Sampling | None,
+    *,
+    gated: bool,
 ) -> _Likelihood | None:
     """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells.
 
-    ``declared``: the form, where one is. An answer without plain terms counts if the one with them allows it.
+    ``declared``: the form, where one is.
     """
     asked = _asking(seen, signal)
 
     def told(forms: Sequence[Sampling]) -> _Likelihood | None:
+        if not gated:
+            return _likelihood_of(forms, asked, records, signal, missing)
         plain = _likelihood_of(forms, asked, records, signal, plain_terms)
         if plain is None or missing is plain_terms:
             return plain
