@@ -49,8 +49,8 @@ _LEAST = 0.05
 _WEIGHINGS = 2
 _EITHER_WAY = (0.5, -0.5)
 """Samples by which a signal is read later and earlier, for the slope of the residuals with a shift."""
-_SEARCHES = 2
-"""How often a shift of a motion is looked for around the last."""
+_NEARER = (0.5, 0.5, 0.1, 0.1, 0.1, 0.1)
+"""Samples to either side of the last shift of a motion, each time that it is looked for anew."""
 _MOST = 1.1
 """Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
 little longer stands at the least one of its search, so no effect could be named for it."""
@@ -79,12 +79,16 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     others = [c for c in records.columns if c.signal in motions and not c.declared][1:]
     others = [c for c in others if c.sampling is SAMPLED]
     read, remarks = _told(records, inputs, seen, missing)
-    later, of_motions = _motions_told(read, others, seen, missing)
-    if of_motions:
-        unread = later.read_as({c.signal: c.sampling for c in inputs if c.sampling})
+    of_motions: list[Finding] = []
+    # A motion and an input that are read falsely mislead each other: each is asked anew beside the other.
+    for by in _NEARER if missing is not plain_terms else ():
+        read, of_motions = _motions_told(read, others, seen, missing, by)
+        if not of_motions:
+            break
+        unread = read.read_as({c.signal: c.sampling for c in inputs if c.sampling})
         # As the motions were read as if nothing else were missing, plain terms have no say any more.
-        later, remarks = _told(unread, inputs, seen, missing, gated=False)
-    return replace(later, remarks=(*records.remarks, *remarks, *of_motions))
+        read, remarks = _told(unread, inputs, seen, missing, gated=False)
+    return replace(read, remarks=(*records.remarks, *remarks, *of_motions))
 
 
 def _told(
@@ -113,26 +117,26 @@ def _told(
 
 
 def _motions_told(
-    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing
+    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing, by: float
 ) -> tuple[RecordSet, list[Finding]]:
     """Return the records with some motions shifted against the first as they tell best, and the remarks.
 
-    Plain terms take all that tells it, so nothing is asked beside them.
+    ``by``: samples to either side of the last shift from which the slope of the residuals is taken.
     """
     remarks = []
-    for column in columns if missing is not plain_terms else ():
-        shift, error, asked = 0.0, math.inf, _asking(seen, column.signal)
-        for _ in range(_SEARCHES):
-            around = [shifted(SAMPLED, shift + by) for by in (0.0, *_EITHER_WAY)]
-            likelihood = _likelihood_of(around, asked, records, column.signal, missing)
-            if likelihood is None:
-                break
-            shift, error = shift + likelihood.shift, likelihood.error
-            if abs(shift) > _MOST:
-                break
-        if abs(shift) > _MOST or 0.5 * (shift / error) ** 2 < _NO_FORM:
+    for column in columns:
+        before = records.column(column.signal).sampling
+        shift = before.late if before else 0.0
+        around = [shifted(SAMPLED, shift + off) for off in (0.0, by, -by)]
+        likelihood = _likelihood_of(around, _asking(seen, column.signal), records, column.signal, missing)
+        if likelihood is None:
             continue
-        records = records.read_as({column.signal: shifted(SAMPLED, shift)})
+        # What was found is in units of what lies between the two sides.
+        shift, error = shift + 2.0 * by * likelihood.shift, 2.0 * by * likelihood.error
+        told = abs(shift) <= _MOST and 0.5 * (shift / error) ** 2 >= _NO_FORM
+        records = records.read_as({column.signal: shifted(SAMPLED, shift) if told else SAMPLED})
+        if not told:
+            continue
         way = "earlier" if shift > 0.0 else "later"
         text = (
             f"is read {abs(shift):.2f} ± {error:.2g} of a sample {way}, as where channels are sampled in "

@@ -6,11 +6,13 @@ The machines are simulated here in NumPy, with a digital controller that holds i
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 from scipy.linalg import expm
 
 from nlsdesign.bench.discrepancy import Verdict, diagnose
@@ -132,8 +134,11 @@ def joint(seed: int, *, rate: float = 500.0, missing: float = 0.0, late: int = 0
     return np.column_stack([table[:, 0], 2e-5 * np.round(table[:, 1] / 2e-5), table[:, 3]])
 
 
-def axis(seed: int) -> Array:
-    """Return time, both angles and held current of two masses, 250 Hz; the damping of the belt is 0.03."""
+def axis(seed: int, *, late: float = 0.0, count: float = 2e-5) -> Array:
+    """Return time, both angles and held current of two masses, 250 Hz; the damping of the belt is 0.03.
+
+    ``late``: samples by which the angle of the load is older than its stamp. ``count``: of encoders, rad.
+    """
     motor, load, stiffness, loss = 0.0085, 0.0145, 46.0, 0.03
     rates = np.zeros((5, 5))
     rates[0, 1] = rates[2, 3] = 1.0
@@ -147,7 +152,10 @@ def axis(seed: int) -> Array:
         return moved
 
     table = held(seed, step, rate=250.0, gains=(0.023 * 400.0 / 0.4, 0.023 * 32.0 / 0.4), size=1.5)
-    table[:, 1:3] = 2e-5 * np.round(table[:, 1:3] / 2e-5)
+    if late:
+        between = make_interp_spline(table[:, 0], table[:, 2], k=7)
+        table[:, 2] = between(np.maximum(table[:, 0] - late / 250.0, 0.0))
+    table[:, 1:3] = count * np.round(table[:, 1:3] / count)
     return table
 
 
@@ -264,6 +272,15 @@ def test_a_hold_declared_beside_a_lag_of_a_whole_sample_stays_declared(tmp_path:
     """That is a delay, which an effect has to explain."""
     deck, records = bench(tmp_path, _JOINT, [joint(seed, late=20) for seed in range(4)], "held")
     assert forms(deck, records)["ammeter"] is HELD
+
+
+def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path) -> None:
+    """The load's encoder is read 0.4 of a sample after the motor's; the machine lacks nothing."""
+    deck = _AXIS.replace("2e-5", "1e-4")
+    found = diagnose(*bench(tmp_path, deck, [axis(seed, late=0.4, count=1e-4) for seed in range(5)]))
+    assert found.verdict == "none"
+    remark = next(text for text in found.remarks if "load_encoder" in text)
+    assert re.search(r"0\.40 ± 0\.0\d* of a sample later", remark), remark
 
 
 @pytest.mark.parametrize("late", [-0.6, 0.0, 0.3, 0.9])
