@@ -53,8 +53,8 @@ OUT_OF_SIGHT = """(() => {
   });
   return [...beyond, ...lost].map((e) => `${e.tagName} ${e.className} ${(e.textContent || '').slice(0, 40)}`);
 })()"""
-"""What reaches beyond the screen and cannot be moved into sight by itself, and tables whose first column leaves the
-sight when they are moved, or leaves less than a third of it to the others."""
+"""What reaches beyond the screen and cannot be moved into sight, and tables whose first column leaves
+the sight when they are moved, or leaves less than a third of it to the others."""
 
 
 class NavigatedError(Exception):
