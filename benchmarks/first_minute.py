@@ -74,7 +74,12 @@ def main() -> None:
     tables = {"start-up": start_up(given.calls)}
     if given.install:
         rows = ["| installation | clock, s | disk without pip itself, MB |", "| --- | ---: | ---: |"]
-        tables["sizes"] = [*rows, installed("."), installed(".[export]"), installed("-r", "requirements/study.txt")]
+        tables["sizes"] = [
+            *rows,
+            installed("."),
+            installed(".[export]"),
+            installed("-r", "requirements/study.txt"),
+        ]
     PAGE.write_text(replaced(PAGE.read_text(encoding="utf8"), tables), encoding="utf8")
 
 
