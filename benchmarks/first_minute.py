@@ -48,17 +48,17 @@ def start_up(calls: int) -> list[str]:
     return rows
 
 
-def installed(extra: str) -> str:
+def installed(*words: str) -> str:
     """Return the row of an installation into an environment of its own: clock and disk."""
     with tempfile.TemporaryDirectory() as folder:
         begun = time.perf_counter()
         subprocess.run([sys.executable, "-m", "venv", folder], check=True)
         python = next(p for p in Path(folder).glob("*/python*") if p.stem == "python")
         empty = _size(Path(folder))
-        subprocess.run([python, "-m", "pip", "install", "--quiet", f".{extra}"], check=True, cwd=ROOT)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", *words], check=True, cwd=ROOT)
         seconds = time.perf_counter() - begun
         size = _size(Path(folder)) - empty
-    return f"| `pip install .{extra}` | {seconds:.0f} | {size / 1e6:.0f} |"
+    return f"| `pip install {' '.join(words)}` | {seconds:.0f} | {size / 1e6:.0f} |"
 
 
 def _size(folder: Path) -> int:
@@ -74,7 +74,12 @@ def main() -> None:
     tables = {"start-up": start_up(given.calls)}
     if given.install:
         rows = ["| installation | clock, s | disk without pip itself, MB |", "| --- | ---: | ---: |"]
-        tables["sizes"] = [*rows, installed(""), installed("[export]")]
+        tables["sizes"] = [
+            *rows,
+            installed("."),
+            installed(".[export]"),
+            installed("-r", "requirements/study.txt"),
+        ]
     PAGE.write_text(replaced(PAGE.read_text(encoding="utf8"), tables), encoding="utf8")
 
 

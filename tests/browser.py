@@ -31,6 +31,32 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
+OUT_OF_SIGHT = """(() => {
+  const width = screen.width, frames = new Set();
+  const beyond = [...document.querySelectorAll('body *')].filter((each) => {
+    const box = each.getBoundingClientRect();
+    if (box.right <= width + 1 || !box.height || each.closest('.skip, aside.toc-drawer')) return false;
+    for (let around = each.parentElement; around && around !== document.body; around = around.parentElement)
+      if (['auto', 'scroll', 'hidden'].includes(getComputedStyle(around).overflowX)) {
+        frames.add(around);
+        return false;
+      }
+    return true;
+  });
+  const lost = [...document.querySelectorAll('table')].filter((table) => {
+    const frame = [...frames].find((each) => each.contains(table)), first = table.querySelector('td, th');
+    if (!frame || !first) return false;
+    frame.scrollTo({ left: frame.scrollWidth, behavior: 'instant' });
+    const [outer, inner] = [frame, first].map((each) => each.getBoundingClientRect());
+    frame.scrollTo({ left: 0, behavior: 'instant' });
+    return inner.left < outer.left - 1 || inner.right > outer.right - 0.3 * outer.width;
+  });
+  return [...beyond, ...lost].map((e) => `${e.tagName} ${e.className} ${(e.textContent || '').slice(0, 40)}`);
+})()"""
+"""What reaches beyond the screen and cannot be moved into sight, and tables whose first column leaves
+the sight when they are moved, or leaves less than a third of it to the others."""
+
+
 class NavigatedError(Exception):
     """The page was left while it was asked."""
 

@@ -99,6 +99,7 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     if options["exports"]:
         with steps.step("export"):
             machine = export_machine(flatten(result.actuator), out, **_roles(options))
+        write_fit_report(page, result, facts=facts, files=(file, deck, *machine.files))
     if as_json:
         exported = {} if machine is None else machine.content()
         show_json({**result.to_dict(str(deck)), "report": page, **exported})
@@ -252,13 +253,14 @@ def _diagnosed(
     content = {**verdict.to_dict(str(out / "model.toml")), "warnings": range_findings(verdict, measured)}
     sentences: list[str] = [str(verdict)]
     models: dict[str, Any] = {}
+    regenerated = None
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
         with steps.step("observer"):
             better, choice = flatten(verdict.actuator), ObserverChoice(**roles)
             result = regenerate(plant, better, measured, fits=verdict.fits, choice=choice)
-            result, files = write_regeneration(result, out)
-            write_diagnosis_report(page, verdict, facts=facts, regenerated=(result, files))
+            result, files = regenerated = write_regeneration(result, out)
+            write_diagnosis_report(page, verdict, facts=facts, regenerated=regenerated)
         names = [str(path) for path in files]
         models = {"observer": result.observer}
         if result.controller:
@@ -268,6 +270,9 @@ def _diagnosed(
     if options["exports"]:
         with steps.step("export"):
             machine = export_machine(flatten(verdict.actuator), out, **models, **roles)
+            write_diagnosis_report(
+                page, verdict, facts=facts, regenerated=regenerated, exported=machine.files
+            )
         content |= machine.content()
         sentences += machine.findings()
     blocks, lacking = written_block(options["code"], verdict.actuator, out)

@@ -159,7 +159,10 @@ def _inertia(
     if at is None:
         raise click.UsageError(f"template {template.name} has no motor with a gear; leave --inertia out")
     ratio = numbers.get(at.ratio, template.deck.quantity(at.ratio))
-    given = _read(text, template.deck.quantity(at.name), GIVEN)
+    try:
+        given = _read(text, template.deck.quantity(at.name), GIVEN)
+    except NlsError as error:
+        raise error.at("--inertia") from None
     return template.carried(at, numbers) | {at.name: at.converted(given, at=place, ratio=ratio)}
 
 

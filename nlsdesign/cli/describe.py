@@ -62,10 +62,13 @@ def describe(folder: Path, deck_name: str, joint: str | None, out: Path, as_json
         show_json(content)
     else:
         _show(description)
+        beside = written and Path(out).resolve() == (Path(folder) / "records.toml").resolve()
         if written:
-            click.echo(f"written: {out}; put it beside the records as records.toml, or name it by --mapping")
+            step = "" if beside else "; put it beside the records as records.toml, or name it by --mapping"
+            click.echo(f"written: {out}{step}")
         if not description.problem:
-            words = ["fit", "--deck", deck_name, "--records", folder, "--mapping", out]
+            words = ["fit", "--deck", deck_name, "--records", folder]
+            words += [] if beside else ["--mapping", out]
             words += ["--joint", joint] if joint else []
             click.echo(f"next: {next_command(*words)}")
     if description.problem or description.undecided:

@@ -86,6 +86,10 @@ for command in (
 complete_names(program)
 
 
+RETIRED = {"adaptive": "corrected"}
+"""Names that options took once, and what has their place now."""
+
+
 def _with_nearest(error: click.ClickException) -> click.ClickException:
     """Return an error that names the nearest valid name, where an option takes one of some names."""
     if not isinstance(error, click.BadParameter) or error.param is None:
@@ -93,8 +97,9 @@ def _with_nearest(error: click.ClickException) -> click.ClickException:
     kind = error.param.type
     given = re.match(r"'(.*)' is not one of", error.message, re.DOTALL)
     if isinstance(kind, click.Choice) and given:
-        near = nearest(given[1], map(str, kind.choices))
-        words = error.message + (f" Did you mean '{near}'?" if near else "")
+        near = RETIRED.get(given[1]) or nearest(given[1], map(str, kind.choices))
+        help_line = f"{error.ctx.command_path} --help" if error.ctx else "--help"
+        words = f"{error.message} " + (f"Did you mean '{near}'?" if near else f"'{help_line}' explains each.")
         return click.BadParameter(words, error.ctx, error.param, error.param_hint)
     return error
 

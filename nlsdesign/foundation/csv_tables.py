@@ -146,7 +146,7 @@ class _Layout:
         with file.open(encoding=encoding, newline="") as stream:
             lines = list(itertools.islice(stream, _MOST_HEAD_LINES))
         comments = list(itertools.takewhile(_is_comment, lines))
-        at = len(comments)
+        at = len(comments) + titles_before(lines[len(comments) :])
         first = lines[at : at + _LOOKED_AT]
         if not first:
             return _Layout(file.name, encoding, ",", False, at, (), {}, False)
@@ -183,6 +183,19 @@ class _Layout:
                 if not _is_comment(line):
                     lines.append(number)
                     yield line.replace(",", ".") if self.decimal_comma and "." not in line else line
+
+
+def titles_before(lines: Sequence[str]) -> int:
+    """Return how many lines of words stand before the heads: they have other cells than the rows."""
+    for separator in _SEPARATORS:
+        cells = [line.strip().split(separator) for line in lines]
+        for row, numbers in enumerate(cells):
+            if len(numbers) > 1 and all(_is_number(cell.strip().replace(",", ".")) for cell in numbers):
+                first = row
+                while first and len(cells[first - 1]) == len(numbers):
+                    first -= 1
+                return first if first < row else 0
+    return 0
 
 
 def _is_comment(line: str) -> bool:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
-
-from rich.console import Console
-from rich.status import Status
+from typing import Protocol, TextIO
 
 
 class Progress(Protocol):
@@ -28,23 +26,28 @@ class Quiet:
 
 
 class Steps:
-    """Steps of a study: a spinner with the present step, and a line with its duration at the end.
+    """Steps of a study: one line with the present step, and one with its duration at the end.
 
     Parameters
     ----------
-    console
+    stream
         Where to print; standard error by default, so that standard output stays clean for ``--json``.
     """
 
-    def __init__(self, console: Console | None = None) -> None:
-        self._console = console or Console(file=sys.stderr, highlight=False)
-        self._status: Status | None = None
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream or sys.stderr
         self._label = ""
 
     def note(self, text: str) -> None:
         """Show the present activity within the step."""
-        if self._status is not None:
-            self._status.update(f"{self._label}: {text}")
+        self._show(f"{self._label}: {text}")
+
+    def _show(self, text: str) -> None:
+        """Write over the present line; the cursor waits at its end."""
+        if self._label and self._stream.isatty():
+            width = shutil.get_terminal_size().columns - 1
+            self._stream.write("\r" + " ".join(text.split())[:width].ljust(width))
+            self._stream.flush()
 
     @contextmanager
     def step(self, label: str) -> Iterator[None]:
@@ -57,13 +60,11 @@ class Steps:
         """
         begin = time.perf_counter()
         self._label = label
-        if not self._console.is_terminal:
+        self._show(label)
+        try:
             yield
-            return
-        with self._console.status(label) as status:
-            self._status = status
-            try:
-                yield
-            finally:
-                self._status = None
-        self._console.print(f"  {time.perf_counter() - begin:6.1f} s  {label}")
+        finally:
+            self._show("")
+            self._label = ""
+        if self._stream.isatty():
+            self._stream.write(f"\r  {time.perf_counter() - begin:6.1f} s  {label}\n")

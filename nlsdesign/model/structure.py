@@ -12,7 +12,7 @@ from ..components.assembly.named_parts import Assembly
 from ..components.core.element import MATERIAL, Domain, Element, Tie
 from ..components.core.part import Part, walk
 from ..components.core.part_numbers import templates
-from ..components.materials.specimen import Specimen, Strength
+from ..components.materials.specimen import Specimen, Strength, TensionSet
 from ..components.mechanics.bodies import Body, Free, GearedMotor, Inertia, Mass
 from ..components.mechanics.coils import INDEX, Coil, Winding
 from ..components.mechanics.motor import ElectricMotor
@@ -110,6 +110,7 @@ class SpecimenNames:
     force: str
     tensile_strength: str | None = None
     elongation_at_break: str | None = None
+    tension_set: str | None = None
 
 
 @dataclass(frozen=True)
@@ -402,7 +403,8 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
 
 def _single_numbers(parts: Mapping[str, Part]) -> Iterator[str]:
     for path, part in parts.items():
-        idle: Collection[str] = templates(type(part.strength)) if isinstance(part, Specimen) else ()
+        beside = (part.strength, part.lasting) if isinstance(part, Specimen) else ()
+        idle: Collection[str] = [name for reading in beside for name in templates(type(reading))]
         idle = part.of_no_law() if isinstance(part, Coil) else idle
         for field, given in part.parameters().items():
             if not isinstance(given.value, tuple) and field not in idle:
@@ -419,6 +421,7 @@ def _specimen(path: str, part: Specimen) -> SpecimenNames:
         force=f"{path}.{part.domain.effort}",
         tensile_strength=f"{path}.tensile_strength" if declared else None,
         elongation_at_break=f"{path}.elongation_at_break" if declared else None,
+        tension_set=f"{path}.tension_set" if isinstance(part.lasting, TensionSet) else None,
     )
 
 

@@ -48,7 +48,7 @@ from nlsdesign.components import (
     series,
     tie,
 )
-from nlsdesign.components.materials.specimen import Strength
+from nlsdesign.components.materials.specimen import Strength, TensionSet
 
 SPRING, STEEL, HOUSING = (
     Spring(stiffness=2500.0),
@@ -99,6 +99,7 @@ _PARTS: tuple[Part, ...] = (
         section=Strip(width=0.03, thickness=3.4e-3),
         rest_length=0.0125,
         strength=Strength(tensile_strength=5.17e6, elongation_at_break=5.0),
+        lasting=TensionSet(tension_set=0.05),
     ),
     SPRING,
     StrainStiffening(modulus=MODULI, knots=KNOTS),

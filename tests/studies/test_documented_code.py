@@ -123,6 +123,15 @@ def test_the_code_in_the_other_documents_runs(
     assert len(run_blocks(DOCS / document)) == shown
 
 
+def test_the_bench_of_the_page_on_records_stays_within_its_cam(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (names,) = run_blocks(DOCS / "how_to" / "records_from_a_bench.md")
+    end = names["rig"].quantities()["spring.cam.last_angle"].number
+    assert 0.8 * end < abs(names["run"]["motor.angle"]).max() < end
+
+
 def test_a_block_that_fails_is_noticed(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(

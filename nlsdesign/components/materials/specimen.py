@@ -78,12 +78,26 @@ class Strength(Reading):
     elongation_at_break: Quantity = parameter("1", "strain at break", minimum=0.01, maximum=20.0)
 
 
+@dataclass(frozen=True)
+class TensionSet(Reading):
+    """What is left of a strain that lasted; it does not enter the law. Source: ISO 2285.
+
+    Examples
+    --------
+    >>> TensionSet(tension_set=0.05).tension_set
+    0.05
+    """
+
+    tension_set: Quantity = parameter("1", "part of a lasting strain that stays", minimum=0.0, maximum=0.9)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Specimen(Combination):
     """A piece of material: ε = e/L₀, F = A₀·Σσ of the laws inside, which act in parallel.
 
     Nominal stress and nominal strain, as in the paper: A₀ and L₀ are those of the unstretched piece. The
-    section is an :class:`Area` or a :class:`Strip`; a :class:`Strength` may be declared, for limits.
+    section is an :class:`Area` or a :class:`Strip`; a :class:`Strength` may be declared, for limits, and a
+    :class:`TensionSet`, for tolerances.
     Source: Austin et al. 2015, eq. (1), with a = A₀/L₀.
     """
 
@@ -96,6 +110,7 @@ class Specimen(Combination):
     rest_length: Quantity = parameter("m", "length of the unstretched piece", minimum=1e-4, maximum=1.0)
     section: Reading = read_as(Area, Strip)
     strength: Reading = read_as(NotDeclared, Strength, default=NotDeclared())
+    lasting: Reading = read_as(NotDeclared, TensionSet, default=NotDeclared())
 
     @property
     def cross_section(self) -> CrossSection:

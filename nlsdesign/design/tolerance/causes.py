@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, unknown_name
@@ -105,6 +106,33 @@ class ProfileCause(Cause):
 
     # numbers: pairs of parameter name and its deviation in SI per standard deviation of the cause
     numbers: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class LastingCause(Cause):
+    """Torque that time takes: the whole of it, something between, or nothing yet."""
+
+    loss: tuple[float, ...]  # over the angles, in N·m per standard deviation, on each stroke
+
+
+@dataclass(frozen=True)
+class SinceMade(Spread):
+    """A loss that has come about wholly, in part, or not at all, each share as likely."""
+
+    fourth_moment = 1.8
+
+    def number(self, value: float, x: Array) -> Array:
+        """Return the value and the share of the loss, Φ(x)."""
+        result: Array = value + ndtr(x)
+        return result
+
+    def slope(self, value: float) -> float:
+        """Return the standard deviation of the share, 1/√12."""
+        return 1.0 / math.sqrt(12.0)
+
+    def text(self, shown: Callable[[float], str]) -> str:
+        """Return that it lies on one side."""
+        return "from nothing to the whole"
 
 
 def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int) -> Array:
@@ -220,7 +248,8 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
 def _not_of_the_torque(cam: CamNames) -> Iterator[str]:
     """Yield the numbers of strength and cable, of which only the diameter does anything to the torque."""
     for piece in cam.specimens:
-        yield from (name for name in (piece.tensile_strength, piece.elongation_at_break) if name is not None)
+        idle = (piece.tensile_strength, piece.elongation_at_break, piece.tension_set)
+        yield from (name for name in idle if name is not None)
     for coil in cam.coils:
         yield from coil.idle
     if cam.cable is not None:

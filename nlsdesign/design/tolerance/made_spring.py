@@ -35,7 +35,7 @@ from ...model import FlatModel
 from ...model.structure import CamNames
 from ..curves.target import Target
 from ..statics.equilibrium import ElasticLaw, cam_function, elastic_law
-from .causes import AnchorCause, Cause, NumberCause, ProfileCause, WaveCause
+from .causes import AnchorCause, Cause, LastingCause, NumberCause, ProfileCause, WaveCause
 
 _RUN_OUT = 101
 """Nodes over the quarter turn beyond that, where the lever arm is held."""
@@ -230,6 +230,12 @@ def made_cam(law: ElasticLaw, cam: ca.Function, angles: Array, causes: Sequence[
     )
 
 
+def losses_of(causes: Sequence[Cause], angles: Array) -> Array:
+    """Return the change of the torque per standard deviation of what time takes, shape (causes, angles)."""
+    rows = [-np.array(c.loss) if isinstance(c, LastingCause) else 0.0 * angles for c in causes]
+    return np.array(rows).reshape(len(causes), len(angles))
+
+
 _LONG = 2000
 """Number of instructions of a law from which on it is not written out for each angle."""
 
@@ -326,6 +332,7 @@ class MadeSpring:
         forces = np.array(self._forces(np.maximum(stretch, 0.0).T, numbers.T), dtype=float).T
         # A slack cable does not push.
         torques = column[self.cam.elements] * arms * np.where(stretch >= 0.0, forces, 0.0)
+        torques = torques + deviations @ losses_of(self.causes, self.angles)
         if not self.rubs:
             return torques
         exponent = self._exponent(numbers)[:, None]
@@ -356,9 +363,10 @@ class MadeSpring:
         by_number[place[self.cam.pretension]] += stiffness
         by_number[place[self.cam.elements]] += pull / elements
         rows = []
-        for cause, amounts in zip(self.causes, self._amounts, strict=True):
+        losses = losses_of(self.causes, self.angles)
+        for cause, amounts, loss in zip(self.causes, self._amounts, losses, strict=True):
             arm, longer = self.contour.sensitivity(cause)
-            row = elements * (arm * pull + arms * (stiffness * longer + amounts @ by_number))
+            row = elements * (arm * pull + arms * (stiffness * longer + amounts @ by_number)) + loss
             rows.append(self._both_strokes(row, elements * arms * pull, amounts))
         return np.array(rows).reshape(len(self.causes), len(self.wanted))
 

@@ -18,6 +18,7 @@ from ...model.roles import series_cam
 from ..curves.target import Target
 from ..statics.equilibrium import with_smooth_cables
 from .causes import NumberCause, SpreadRules, draw_deviations, shown_unit, spring_causes
+from .lasting import lasting_causes
 from .made_spring import MadeSpring, made_spring
 from .tolerance_result import SHARES, CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect, quantile
 from .trimming import Trim, Trimmed, trimmed
@@ -106,7 +107,8 @@ def tolerance_analysis(
     rules, cam = rules or SpreadRules(), series_cam(model, name)
     chosen = [Trim(cam.pretension)] if trims is None else list(trims)
     columns = [trim.column(model, cam) for trim in chosen]
-    everything = (*spring_causes(model, name, rules), *(column for column, _ in columns))
+    lasting, sentences = lasting_causes(model, name, np.linspace(0.0, target.last_angle, _ANGLES))
+    everything = (*spring_causes(model, name, rules), *lasting, *(column for column, _ in columns))
     made = made_spring(model, name, target=target, causes=everything, angles=_ANGLES)
     ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
     # The last causes of these springs are the trims.
@@ -133,6 +135,7 @@ def tolerance_analysis(
         without_effect=tuple(cause.name for k, cause in enumerate(causes) if k not in acting),
         held=made.held(deviations),
         seed=seed,
+        over_time=sentences,
     )
 
 

@@ -123,6 +123,8 @@ class ToleranceResult:
         In how many draws a number was held at the end of its range.
     seed
         Of the draws.
+    over_time
+        On what creep and set are counted, or what is stated of neither, in sentences.
     """
 
     target: Target
@@ -137,6 +139,7 @@ class ToleranceResult:
     without_effect: tuple[str, ...]
     held: int
     seed: int
+    over_time: tuple[str, ...] = ()
 
     @property
     def worst(self) -> float:
@@ -185,6 +188,7 @@ class ToleranceResult:
             ("without effect", ", ".join(self.without_effect)),
         )
         rows += [(what, name) for what, name in named if name]
+        rows += [("over time", sentence) for sentence in self.over_time]
         if self.held:
             rows.append(("held", f"a number was held at the end of its range in {self.held} draws"))
         return rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -232,6 +233,7 @@ def write_diagnosis_report(
     *,
     facts: Mapping[str, str],
     regenerated: tuple[Regeneration, Mapping[Path, str]] | None = None,
+    exported: Mapping[Path, str] = MappingProxyType({}),
 ) -> Path:
     """Write the report on a diagnosis.
 
@@ -245,13 +247,19 @@ def write_diagnosis_report(
         Short texts by name, for instance deck and records.
     regenerated
         The observer of the better model and its files, where one was designed.
+    exported
+        Files of the better machine with a few words on each.
 
     Raises
     ------
     ExportError
         If the file cannot be written.
     """
-    chapter = regeneration_sections(*regenerated) if regenerated else []
+    chapter: list[Section] = []
+    if regenerated:
+        chapter += regeneration_sections(regenerated[0], {**regenerated[1], **exported})
+    elif exported:
+        chapter.append(FileSection("Files", exported, caption="Written beside this report."))
     title = f"{verdict.declared.name}: what is missing"
     return write_report(path, *verdict_sections(verdict), *chapter, title=title, facts=facts)
 

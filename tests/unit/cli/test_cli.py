@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from nlsdesign.cli import studies
 from tests.command_line import Run, files_in, run
 from tests.undrawn import undrawn
 
@@ -130,6 +131,19 @@ def test_a_design_file_is_followed_and_a_part_drawn(run: Run, tmp_path: Path) ->
     status, _, err = run(*call, "--maximum", "5 N*m")
     assert status == 2
     assert "--maximum: stand beside --task" in err
+
+
+def test_a_fast_study_is_not_blamed_for_what_it_leaves_out(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    claimed = {name: studies.Claim(1.0, 0.1, "1", "for the test") for name in "ab"}
+    monkeypatch.setattr(studies, "claims", lambda _: claimed)
+    monkeypatch.setattr(studies, "run_study", lambda *_, **__: {"a": 2.0})
+    status, _, err = run("study", "run", "hello", "--fast", "--out", "fast")
+    assert status == 0
+    assert "a = 2" in err
+    assert "was not computed" not in err
+    status, _, err = run("study", "run", "hello", "--out", "whole")
+    assert status == 1
+    assert "b was not computed" in err
 
 
 def test_unknown_study_is_named(run: Run) -> None:

@@ -61,3 +61,13 @@ def test_what_is_not_decided_is_a_finding_and_the_mapping_is_written_all_the_sam
     assert status == 1
     assert "undecided: 'Winkel': its head names no unit" in text
     assert "# 'Winkel': its head names no unit" in (tmp_path / "records.toml").read_text()
+
+
+def test_a_mapping_beside_its_records_needs_no_option(tmp_path: Path) -> None:
+    status, text = describe(bench(tmp_path))
+    assert status == 0
+    assert text.rstrip().endswith(f"next: nlsdesign fit --deck {DECK} --records {tmp_path}")
+    assert "put it beside" not in text
+    away = tmp_path / "elsewhere.toml"
+    _, text = describe(tmp_path, "--out", str(away))
+    assert f"--mapping {away}" in text

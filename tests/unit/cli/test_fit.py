@@ -194,6 +194,8 @@ def test_the_fitted_machine_is_exported_and_belongs_to_its_deck(
     names = {str(Path(path).relative_to(tmp_path / "out")) for path in content["exported"]}
     code = {f"c/{part}{end}" for part in PARTS for end in (".c", ".h", "_selftest.c")}
     assert names == code | {"plant.fmu", *(f"{part}.fmu" for part in PARTS)}
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert all(f'href="{name}"' in page for name in names)
     declared, fitted = assembly_of(bench / "deck.toml"), assembly_of(tmp_path / "out" / "model.toml")
     assert fitted.name == f"{declared.name}_refitted_{deck_digest(fitted)[:8]}"
     for part in PARTS:

@@ -162,6 +162,8 @@ def test_a_deck_without_spread_gets_the_cascade_and_the_reason(run: Run, tmp_pat
         (("--kind", "cascade", "--certificate", "--decay", "5"), "--decay belongs to --kind certified"),
         (("--decay", "5"), "belong to --certificate"),
         (("--kind", "cascades"), "'cascades' is not one of"),
+        (("--kind", "adaptive"), "Did you mean 'corrected'?"),
+        (("--kind", "zzzzzz"), "observer --help' explains each."),
     ],
 )
 def test_what_does_not_fit_is_refused(run: Run, tmp_path: Path, words: tuple[str, ...], said: str) -> None:

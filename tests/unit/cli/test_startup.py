@@ -12,7 +12,7 @@ import pytest
 
 from nlsdesign.cli.main import program
 
-HEAVY = {"casadi", "numpy", "sympy", "control", "scipy", "matplotlib", "fmpy", "rich", "jinja2"}
+HEAVY = {"casadi", "numpy", "sympy", "control", "scipy", "matplotlib", "fmpy", "jinja2"}
 DECK = "austin2015_figure_consistent"
 SLOW_PARTS = {"scipy.signal", "scipy.stats", "scipy.integrate", "scipy.ndimage"}
 """Of SciPy, up to half a second each, which SciPy loads at their first use."""
@@ -100,7 +100,7 @@ def test_completion_in_the_shell_loads_no_library(loaded: Loaded) -> None:
 
 
 NOT_NEEDED = {
-    ("deck", "check", DECK): {"sympy", "control", "matplotlib", "fmpy", "rich", "jinja2", *SLOW_PARTS},
+    ("deck", "check", DECK): {"sympy", "control", "matplotlib", "fmpy", "jinja2", *SLOW_PARTS},
     ("deck", "show", DECK): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
     ("parts", "CoulombFriction"): {"scipy", "sympy", "control", "matplotlib", "fmpy", "jinja2"},
     ("analyse", "--deck", "austin2015_soft_spring", "--count", "2", "--out", "out"): {

@@ -168,6 +168,11 @@ def test_another_gear_ratio_carries_the_inertia_at_the_output_with_it(run: Run, 
         (("--template", "cam-actuator", "--set", "spring.cam.last_angle=9 rad"), 2, "must lie in"),
         (("--template", "cam-actuator", "--inertia", "3 g*cm^2"), 2, "belong together"),
         (("--template", "specimen", "--inertia", "3 g*cm^2", "--inertia-at", "rotor"), 2, "leave --inertia"),
+        (
+            ("--template", "cam-actuator", "--inertia", "9 gcm^2", "--inertia-at", "rotor"),
+            2,
+            "--inertia: unit",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_is_written(

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser import Tab, browser, chromium
+from tests.browser import OUT_OF_SIGHT, Tab, browser, chromium
 from tests.live_server import Server, running
-from tests.unit.presentation.test_report_in_a_browser import WIDEST
 
 pytest.importorskip("uvicorn")
 pytest.importorskip("starlette")
@@ -310,13 +309,15 @@ def test_what_belongs_to_another_angle_is_greyed_and_poles_are_read_as_numbers(t
     assert tab.evaluate(words) != before
 
 
-@pytest.mark.parametrize("width", [375, 320])
+@pytest.mark.parametrize("width", [390, 320])
 def test_nothing_is_wider_than_a_small_screen_and_points_are_large_enough_to_touch(
     tab: Tab, width: int
 ) -> None:
     tab.look(width)
+    tab.evaluate("document.getElementById('keep').click()")
+    tab.until("document.querySelectorAll('#compare-table td').length > 10")
     tab.until("document.querySelector('#torque svg').getBoundingClientRect().width < 400")
-    assert tab.evaluate(WIDEST) == []
+    assert tab.evaluate(OUT_OF_SIGHT) == []
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
     reach = tab.evaluate("document.querySelector('.handle:not(.fixed) .reach').getBoundingClientRect().width")
     assert reach >= 36.0

@@ -13,22 +13,11 @@ from nlsdesign.model.equations import equations
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 from tests import figure_samples as samples
-from tests.browser import Tab, chromium
+from tests.browser import OUT_OF_SIGHT, Tab, chromium
 
 pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
 
 LONG = "austin2015_figure_consistent_designed_791be9e6_and_once_more_refitted"
-WIDEST = """(() => {
-  const width = screen.width;
-  const scrolls = (element) => {
-    for (let each = element.parentElement; each && each !== document.body; each = each.parentElement)
-      if (['auto', 'scroll', 'hidden'].includes(getComputedStyle(each).overflowX)) return true;
-    return false;
-  };
-  return [...document.querySelectorAll('body *')]
-    .filter((e) => e.getBoundingClientRect().right > width + 1 && !scrolls(e) && !e.closest('.skip'))
-    .map((e) => `${e.tagName} ${e.className} ${(e.textContent || '').slice(0, 40)}`);
-})()"""
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +31,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         spring=tie(spring, "flywheel_of_the_machine"), damper=tie(damper, "flywheel_of_the_machine"),
     )  # fmt: skip
     table = report.TableSection(
-        LONG, ("name", "value", *"abcdefgh"), ((LONG, LONG, *"12345678"),), caption=LONG
+        LONG, ("name", "value", *"abcdefgh"), ((LONG, LONG, *"12345678"),), caption=LONG, marked={0}
     )
     figure = report.FigureSection("Gap", samples.FIGURES["gap_bars"](), caption=f"Before and after, {LONG}.")
     return report.write_report(
@@ -60,11 +49,11 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("width", [320, 375, 1280])
+@pytest.mark.parametrize("width", [320, 390, 1280])
 def test_no_page_is_wider_than_its_screen(tab: Tab, page: Path, width: int, theme: str) -> None:
     tab.look(width, theme=theme)
     tab.open(page)
-    assert tab.evaluate(WIDEST) == []
+    assert tab.evaluate(OUT_OF_SIGHT) == []
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
 
 
@@ -73,7 +62,26 @@ def test_a_page_that_is_too_wide_is_noticed(tab: Tab, page: Path, tmp_path: Path
     wide.write_text(page.read_text(encoding="utf8").replace("overflow-x: auto", "overflow-x: visible"))
     tab.look(375)
     tab.open(wide)
-    assert tab.evaluate(WIDEST)
+    assert tab.evaluate(OUT_OF_SIGHT)
+
+
+def test_a_table_that_is_moved_sideways_keeps_the_names_of_its_rows(
+    tab: Tab, page: Path, tmp_path: Path
+) -> None:
+    loose = tmp_path / "loose.html"
+    loose.write_text(page.read_text(encoding="utf8").replace("position: sticky; left: 0", "left: 0"))
+    tab.look(390)
+    tab.open(loose)
+    assert all(each.startswith("TABLE") for each in tab.evaluate(OUT_OF_SIGHT))
+    assert len(tab.evaluate(OUT_OF_SIGHT)) >= 2
+    tab.open(page)
+    grounds = tab.evaluate(
+        "[...document.querySelectorAll('.scroll :is(td, th):first-child')]"
+        ".map((each) => getComputedStyle(each).backgroundColor)"
+    )
+    # What passes under the first column must not show through it.
+    assert grounds
+    assert not any("rgba" in each for each in grounds)
 
 
 def test_nothing_is_asked_of_a_network_and_nothing_is_said_on_the_console(tab: Tab, page: Path) -> None:

@@ -39,6 +39,7 @@ from nlsdesign.design.jobs.job_file import kinds
 from nlsdesign.foundation import rubber_library as library
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.model import flatten
+from tests.browser import OUT_OF_SIGHT, browser, chromium
 
 INSTANCES = parts.instances()
 
@@ -205,6 +206,28 @@ def test_a_bad_site_is_noticed(tmp_path: Path) -> None:
     ]
 
 
+NARROW = """<!DOCTYPE html><meta name="viewport" content="width=device-width">
+<link rel="stylesheet" href="site.css">
+<style>body { margin: 0 } td, th { padding: .25rem .5rem } article { overflow-x: auto }</style><article>
+<div class="table-wrapper"><table><tr><td><code>LONG</code></td><td>WORDS</td><td>LONG</td></tr></table></div>
+<table class="genindextable"><tr><td style="width: 33%">LONG WORDS</td><td><a>LONG</a></td></tr></table>
+</article>"""
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+def test_tables_and_the_index_fit_a_telephone(root: Path, tmp_path: Path) -> None:
+    style = (root / "docs" / "site" / "static" / "site.css").read_text(encoding="utf-8")
+    (tmp_path / "site.css").write_text(style, encoding="utf-8")
+    page = tmp_path / "page.html"
+    long = "a_name_that_is_longer_than_" * 3
+    page.write_text(NARROW.replace("LONG", long).replace("WORDS", "some words " * 9))
+    with browser() as tab:
+        tab.look(390)
+        tab.open(page)
+        assert tab.evaluate(OUT_OF_SIGHT) == []
+        assert tab.evaluate("document.querySelector('article').scrollWidth") <= 390
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("furo") is None, reason="needs the extra docs")
 def test_the_site_builds_without_a_warning_and_asks_for_nothing_outside(root: Path, tmp_path: Path) -> None:
@@ -220,6 +243,14 @@ def test_the_site_builds_without_a_warning_and_asks_for_nothing_outside(root: Pa
     inner = (tmp_path / "site" / "reference" / "parts" / "core.html").read_text(encoding="utf-8")
     assert inner.count("<svg") > 5
     assert "<math" in inner
+    if chromium() is None:
+        return
+    with browser() as tab:
+        tab.look(390)
+        for name in ("genindex", "discrepancy", "index", "reference/parts/core", "gallery/emps"):
+            tab.open(tmp_path / "site" / f"{name}.html")
+            assert tab.evaluate(OUT_OF_SIGHT) == [], name
+            assert tab.evaluate("document.documentElement.scrollWidth") <= 390, name
 
 
 def test_parts_are_drawn() -> None:

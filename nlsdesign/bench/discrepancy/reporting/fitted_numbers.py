@@ -67,15 +67,14 @@ def with_records_named(assembly: Assembly, folder: str, names: Sequence[str], *,
     sourced = {
         name: number.with_value(number.value, _source(number.source, f"{shown} in {folder}, {day}"))
         for name, number in assembly.quantities().items()
-        if number.source == SOURCE or number.source.startswith(f"{SOURCE};")
+        if number.source == SOURCE or number.source.startswith((f"{SOURCE};", f"{SOURCE},"))
     }
     # Sources are a part of the content that names a derived deck.
     return named_by_content(assembly.with_values(sourced))
 
 
 def _source(before: str, records: str) -> str:
-    rest = before.removeprefix(SOURCE)
-    if rest.startswith(_DECLARED):
-        # Of a number that was fitted before, what was declared at first says more than a chain of fits.
-        rest = _DECLARED + rest.split(_DECLARED)[-1]
+    # Of a number that was fitted before, what was declared at first says more than a chain of fits.
+    rest, *declared = before.removeprefix(SOURCE).split(_DECLARED)
+    rest += _DECLARED + declared[-1] if declared else ""
     return f"{SOURCE} {records}{rest}"

@@ -295,6 +295,10 @@ def refit_of_run(result: Refit, records: RecordSet, *, folder: str, day: str) ->
     return replace(result, actuator=with_records_named(result.actuator, folder, names, day=day))
 
 
+UNTOLD = 0.9
+"""Share of a declared spread; where records leave more of it, the source says that they tell little."""
+
+
 def sourced(hypothesis: Hypothesis, *, narrowed: bool = False) -> Assembly:
     """Return the fitted assembly, its fitted numbers marked with where they come from.
 
@@ -315,7 +319,11 @@ def sourced(hypothesis: Hypothesis, *, narrowed: bool = False) -> Assembly:
     new = {u.name.partition("[")[0] for u in hypothesis.unknowns}
     written = dict[str, Quantity]()
     for name in {name.partition("[")[0] for name in hypothesis.values}:
-        now, source = known[name], SOURCE if name in new else f"{SOURCE}; declared: {declared[name].source}"
+        remaining = shares.get(name, 0.0)
+        little = remaining > UNTOLD and name not in new
+        remark = f", which leave {100 * remaining:.0f} % of its spread" if little else ""
+        now, source = known[name], SOURCE + remark
+        source += "" if name in new else f"; declared: {declared[name].source}"
         now = now.with_value(now.value, source)
         if name in new and errors.get(name, 0.0) > 0.0 and isinstance(now.value, float):
             now = now.with_spread(NormalSpread(errors[name]))

@@ -168,6 +168,7 @@ def check_spring_alone(form: AngleForm, inertia: float) -> None:
     other = inertia * rate[:, form.speed] + wanted[:, 0]
     if np.max(np.abs(other)) > ELSEWHERE * np.max(np.abs(wanted)):
         raise ArrangementError(
-            f"model '{form.model.name}'", "is moved by something else than its spring, such as its weight",
+            f"model '{form.model.name}'",
+            "is moved at rest by something beside its spring: a weight, a load or a ripple over the angle",
             next_step="take the cascade, which needs no balance: --kind cascade",
         )  # fmt: skip

@@ -20,6 +20,7 @@ from nlsdesign.components.assembly.deck_writer import deck_digest, declare, writ
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
+from nlsdesign.regeneration.exported_machine import ExportedMachine
 from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, write_declaration, write_records
 from tests.undrawn import undrawn
@@ -111,9 +112,18 @@ def test_files_of_an_earlier_run_do_not_stay_beside_a_verdict_that_has_none(
     for name in ("next_record.csv", "regeneration.json", "notes.txt"):
         (out / name).write_text("earlier", encoding="utf8")
     called = ["nlsdesign", "diagnose", "--deck", str(tmp_path / "deck.toml"), "--records", str(records)]
-    monkeypatch.setattr(sys, "argv", [*called, "--out", str(out), "--force"])
+    code = out / "c" / "observer.c"
+
+    def exported(*_: object, **__: object) -> ExportedMachine:
+        code.parent.mkdir()
+        code.write_text("")
+        return ExportedMachine({code: "observer in C99"}, ())
+
+    monkeypatch.setattr("nlsdesign.regeneration.export_machine", exported)
+    monkeypatch.setattr(sys, "argv", [*called, "--export", "--out", str(out), "--force"])
     main()
     assert (out / "verdict.json").exists()
+    assert 'href="c/observer.c"' in (out / "report.html").read_text("utf-8")
     assert not (out / "next_record.csv").exists()
     assert not (out / "regeneration.json").exists()
     assert (out / "notes.txt").exists(), "what is not ours stays"
@@ -137,6 +147,7 @@ def test_code_of_the_better_deck_is_written_with_the_verdict(
         assert f'_DECK_DIGEST "{deck_digest(better)}"' in (out / "c" / f"{name}.h").read_text("utf-8")
         assert (out / f"{name}.fmu").exists()
     assert (out / "plant.fmu").exists()
+    assert 'href="plant.fmu"' in (out / "report.html").read_text("utf-8")
 
 
 def in_millinewton(rows: np.ndarray) -> np.ndarray:

@@ -42,6 +42,19 @@ def test_after_a_second_fit_the_first_declaration_stays() -> None:
     assert twice == "fitted to bench records b in bench/april, 2026-04-20; declared: data sheet"
 
 
+def test_a_number_of_which_records_tell_nothing_says_so() -> None:
+    inertia = quantity(1e-3, "kg*m^2", source="data sheet", spread=0.1)
+    made = assembly("arm", motor=Inertia(inertia=inertia))
+    (variable,) = (v for v in flatten(made).parameters if v.name == "motor.inertia")
+    known = declared_parameter(variable, 1.01e-3)
+    for share, words in ((0.97, ", which leave 97 % of its spread"), (0.8, "")):
+        covariance = np.diag([(share * known.sigma) ** 2])
+        fit = Fit((known,), {known.name: 1.01e-3}, covariance, 0.0, {}, converged=True)
+        marked = sourced(Hypothesis(made, (), dict(fit.values), {("motor",): fit}))
+        named = with_records_named(marked, "bench", ["a"], day="2026-04-20").quantities()["motor.inertia"]
+        assert named.source == f"fitted to bench records a in bench, 2026-04-20{words}; declared: data sheet"
+
+
 def test_what_no_fit_has_marked_is_left_alone() -> None:
     earlier = "fitted to bench records a in bench/march, 2026-03-02; declared: data sheet"
     assert source_of("data sheet", ["b"]) == "data sheet"

@@ -50,6 +50,8 @@ WRITTEN = {
     "tabs": (lines(HEADS, "\t"), "utf-8"),
     "tabs and commas": (with_commas("\t"), "utf-8"),
     "comments": (["# bench 3", "% measured in May", "// ok", "", *PLAIN], "utf-8"),
+    "titles of a logger": (["Bench 3; measured in May", "", "operator: x", *PLAIN], "utf-8"),
+    "titles before units": (["Bench 3", ";".join(UNITLESS), "s;deg;N*m", *with_commas(";")[1:]], "utf-16"),
     "heads in a comment": (["# bench 3", f"# {PLAIN[0]}", *PLAIN[1:]], "utf-8"),
     "a row of units": ([",".join(UNITLESS), "s,deg,N*m", *PLAIN[1:]], "utf-8"),
     "units in brackets": ([",".join(UNITLESS), "[s],[deg],[N*m]", *PLAIN[1:]], "utf-8"),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nlsdesign.components import CurrentDrivenMotor, Gear, Inertia
+from nlsdesign.components import CurrentDrivenMotor, Gear, Inertia, TorqueRipple, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import natively
 from nlsdesign.feedback.observer import (
@@ -140,6 +140,11 @@ def test_bad_settings_are_named(linear: FlatModel) -> None:
         Duty(torque=-1.0)
     with pytest.raises(ValueRangeError, match="the spring has at most"):
         design_corrected_observer(linear, duty=Duty(torque=100.0))
+    parts = declare(load_deck("austin2015_soft_spring"))
+    ripple = TorqueRipple(sine=quantity(0.2, "N*m"), cosine=quantity(0.1, "N*m"), order=quantity(7.0, "1"))
+    rippled = replace(parts, parts=(*parts.parts, ("cogging", tie(ripple, "motor"))))
+    with pytest.raises(ArrangementError, match="or a ripple over the angle"):
+        design_corrected_observer(flatten(rippled))
     with pytest.raises(ArrangementError, match="one angle"):
         design_observer(flatten(declare(load_deck("one_sided_cable_drive"))))
 
