@@ -97,13 +97,13 @@ def test_no_record_is_proposed_for_the_values_of_a_table(tmp_path: Path) -> None
 
 
 def test_what_repeats_in_time_is_refused() -> None:
-    made = case("wrist", "periodic_disturbance", RECORDS[1:3])
+    made = case("wrist", "periodic_disturbance", RECORDS[:3])
     assert made.excess(made.base, "motor", "fit") > 1.0
     assert made.part("motor") is None
 
 
 def test_nothing_is_added_to_noise() -> None:
-    made = case("arm", "none", RECORDS[1:3])
+    made = case("arm", "none", RECORDS[:3])
     assert made.part("motor") is None
     assert made.part("spring") is None
 
