@@ -52,10 +52,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """What was collected stays until the end; garbage is looked for after 100,000 new objects, not 700."""
+    """What was collected stays until the end; garbage is looked for after 300,000 new objects, not 700."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(100_000, 20, 50)
+    gc.set_threshold(300_000, 20, 50)
 
 
 @pytest.fixture(autouse=True, scope="session")
