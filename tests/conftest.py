@@ -10,12 +10,19 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from nlsdesign.foundation import symbolic
+
 # Before anything imports matplotlib: no test opens a window.
 os.environ["MPLBACKEND"] = "Agg"
 # Two exports of one test are the same bytes, on either side of a full minute.
 os.environ["SOURCE_DATE_EPOCH"] = "1760000000"
 # FMUs and steps of controllers compile in a fifth of the time; those of users run in test_fmu_agreement.
 os.environ["NLSDESIGN_CFLAGS"] = "-O0"
+
+# Files of tests ask in turn for the same few machines, observers and loops: more are kept than elsewhere.
+# Before anything imports a room whose functions remember.
+_remembered = symbolic.remembered
+symbolic.remembered = lambda count: _remembered(8 * count)  # type: ignore[misc]
 
 # The same examples in every run; no time limit (it would test the machine); nothing written to disk.
 settings.register_profile("thorough", derandomize=True, deadline=None, database=None, max_examples=300)
@@ -45,10 +52,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """What was collected stays until the end; garbage is looked for after 100,000 new objects, not 700."""
+    """What was collected stays until the end; garbage is looked for after 300,000 new objects, not 700."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(100_000, 20, 50)
+    gc.set_threshold(300_000, 20, 50)
 
 
 @pytest.fixture(autouse=True, scope="session")

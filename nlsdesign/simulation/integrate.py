@@ -14,7 +14,7 @@ import numpy as np
 from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
-from .buffered import Translate, as_it_is
+from .buffered import Buffered, Translate, as_it_is
 from .events import Event
 from .input_signals import Drive, Drives, drives_of
 from .runge_kutta import TooStiffError, integrate_explicitly
@@ -85,11 +85,17 @@ def simulate(
             raise ValueRangeError(
                 "times", f"must lie {model.sample_time:g} s apart, the sample time of {model.name}"
             )
-        p, x = model.start(model.parameters), np.zeros((len(x0), len(times)))
+        x = np.zeros((len(x0), len(times)))
         x[:, 0] = x0
+        given = [np.zeros(model.equations.size1_in(i)) for i in range(5)]
+        given[3] = model.start(model.parameters)
+        step = Buffered(model.equations, given)
+        rows = np.array(model.equations.sparsity_out(0).row(), dtype=np.intp)  # the others stay zero
         for k in range(len(times) - 1):
-            w = model.look_up(list(x[:, k]), list(drives.samples[:, k]))
-            x[:, k + 1] = np.array(model.equations(times[k], x[:, k], drives.samples[:, k], p, w)[0]).ravel()
+            given[0][0], given[1][:], given[2][:] = times[k], x[:, k], drives.samples[:, k]
+            given[4][:] = model.look_up(list(x[:, k]), list(drives.samples[:, k]))
+            step.evaluate()
+            x[rows, k + 1] = step.results[0]
     else:
         x, events = _integrated(model, drives, x0, tolerance, translate)
     return replace(_evaluated(model, times, x, drives.samples), events=tuple(events))

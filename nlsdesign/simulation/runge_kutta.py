@@ -8,7 +8,6 @@ Solving Ordinary Differential Equations I, section II.5; coefficients from ``sci
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -16,6 +15,7 @@ import scipy
 
 from ..foundation.arrays import Array
 from ..foundation.errors import ConvergenceError
+from ..foundation.symbolic import remembered
 from ..model import FlatModel
 from .buffered import Buffered, Translate, as_it_is
 from .events import LOCATED, Event, Modes, branch_of, locate_event
@@ -48,7 +48,7 @@ class TooStiffError(Exception):
         self.events = events
 
 
-@lru_cache(maxsize=16)
+@remembered(16)
 def step_function(branch: ca.Function) -> ca.Function:
     """Return (t, h, x, U, p, tolerance, nominal, m) -> (x after the step, error, c, d, v), all dense.
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models import cam_rubber_actuator
-from nlsdesign.bench.discrepancy import diagnose
+from nlsdesign.bench.discrepancy import diagnose, effects
 from nlsdesign.bench.discrepancy.screening.causality import lagging_forces
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.residuals import loop_of
@@ -57,10 +57,20 @@ def written(folder: Path, *, order: int) -> RecordSet:
     return load_records(folder, flatten(element()))
 
 
-def test_the_points_of_fig_6_are_suspect_and_the_reason_is_said(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "catalogue",
+    [
+        (effects.second_relaxation, effects.rate_independent_hysteresis),
+        pytest.param(effects.ALL, marks=pytest.mark.slow),
+    ],
+    ids=["what delays a force", "all"],
+)
+def test_the_points_of_fig_6_are_suspect_and_the_reason_is_said(
+    tmp_path: Path, catalogue: tuple[effects.Effect, ...]
+) -> None:
     records = written(tmp_path, order=1)
     assert records.findings == (), "nothing about the channels by themselves is odd"
-    verdict = diagnose(element(), records)
+    verdict = diagnose(element(), records, catalogue=catalogue)
     assert verdict.verdict == "data_suspect"
     assert verdict.effects == ()
     said = [text for text in verdict.where if "lags rubber.extension" in text]

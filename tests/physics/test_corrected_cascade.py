@@ -110,14 +110,12 @@ def test_over_the_spread_it_errs_less_than_the_cascade_and_says_how_much(
 
 
 @cache
-def code(folder: Path) -> tuple[CorrectedDesign, CompiledStep]:
-    design = design_corrected_observer(deck(PUBLISHED))
-    return design, CompiledStep(nls.export_c(design.model, folder, name="observer", real="float"))
+def corrected() -> CorrectedDesign:
+    return design_corrected_observer(deck(PUBLISHED))
 
 
 def estimates(folder: Path, angle: np.ndarray, current: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    design, _ = code(folder)
-    step = CompiledStep(nls.export_c(design.model, folder, name="observer", real="float"))
+    step = CompiledStep(nls.export_c(corrected().model, folder, name="observer", real="float"))
     both = [step([a, c]) for a, c in zip(angle, current, strict=True)]
     return np.array([y for y, _ in both]), np.array([status for _, status in both])
 
@@ -145,7 +143,7 @@ def test_a_fault_is_forgotten_in_three_tenths_of_a_second(
 
 def test_nothing_is_learned_at_standstill(tmp_path: Path) -> None:
     """Friction holds: a current that the spring does not need says nothing of the spring."""
-    design, _ = code(tmp_path)
+    design = corrected()
     place = [v.name for v in design.model.outputs].index("correction.factor[1]")
     still = np.full(1500, 0.4 - 0.4 % 0.767e-3)
     learned, _ = estimates(tmp_path, still, np.full(1500, 5.0))
@@ -169,9 +167,9 @@ def test_a_weight_is_refused_and_the_cascade_taken_without_spreads() -> None:
         design_corrected_observer(deck(LINEAR), prior=nothing)
 
 
-def test_the_correction_is_held_within_its_reach(tmp_path: Path) -> None:
+def test_the_correction_is_held_within_its_reach() -> None:
     """Factors a hundred deviations off move the torque as far as stated and no further."""
-    design, _ = code(tmp_path)
+    design = corrected()
     model, angle = design.model, 0.6
     names = [v.name for v in model.states]
 

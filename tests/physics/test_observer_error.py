@@ -117,9 +117,10 @@ def test_a_quantised_angle_costs_no_more_than_half_a_count(
     assert rms(found["motor.speed"] - moving["motor.speed"]) < 0.15
 
 
-@pytest.mark.long_cases("31000.0")
+@pytest.mark.long_cases("2.0-31000.0", "11.0-411.0", "11.0-31000.0")
 @pytest.mark.parametrize("viscosity", [ob.PRINTED, ob.SLOW])
-def test_integrating_the_rate_of_the_extension_costs_accuracy(viscosity: float) -> None:
+@pytest.mark.parametrize("frequency", [2.0, 11.0])
+def test_integrating_the_rate_of_the_extension_costs_accuracy(frequency: float, viscosity: float) -> None:
     """The published form carries F and integrates K(δ)·dδ/dt; its error against carrying F_M; 45°, 30 Hz.
 
     The design notes say 4 to 10 times, at 31 kPa·s. Found: that, for the same rate; and more against the
@@ -135,20 +136,15 @@ def test_integrating_the_rate_of_the_extension_costs_accuracy(viscosity: float) 
         ).model,
         "minimal": design_observer_with_details(model, grid=grid).model,
     }
-    for frequency in (2.0, 11.0):
-        record = ob.servoed(viscosity, frequency, np.radians(45.0), duration=0.8)
-        error = {
-            name: rms((observe(observer, record)["spring.torque"] - record["spring.torque"])[400:])
-            for name, observer in observers.items()
-        }
-        ratio = error["total"] / error["relaxing"]
-        assert ratio > (4.0 if viscosity == ob.SLOW else 2.0), (frequency, error)
-        assert viscosity == ob.PRINTED or ratio < 10.0, (frequency, error)
-        assert (
-            error["minimal"] < error["relaxing"]
-            if viscosity == ob.SLOW
-            else error["minimal"] < error["total"]
-        )
+    record = ob.servoed(viscosity, frequency, np.radians(45.0), duration=0.8)
+    error = {
+        name: rms((observe(observer, record)["spring.torque"] - record["spring.torque"])[400:])
+        for name, observer in observers.items()
+    }
+    ratio = error["total"] / error["relaxing"]
+    assert ratio > (4.0 if viscosity == ob.SLOW else 2.0), error
+    assert viscosity == ob.PRINTED or ratio < 10.0, error
+    assert error["minimal"] < error["relaxing" if viscosity == ob.SLOW else "total"]
 
 
 def test_the_correction_reduces_what_the_rubber_model_has_wrong() -> None:

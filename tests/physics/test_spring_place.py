@@ -196,7 +196,7 @@ def test_a_later_place_has_to_be_better_by_two_per_cent() -> None:
 LIMITED = replace(DRIVE, current_limit=7.0, voltage_limit=24.0, damping=1e-5)
 
 
-QUICK = ("hip-free-both ways", "ankle-limited-in series")
+QUICK = ("ankle-free-beside", "ankle-limited-in series")
 CASES = [
     f"{joint}-{drive}-{place}"
     for joint in WALKING

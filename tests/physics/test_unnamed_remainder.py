@@ -58,10 +58,10 @@ class Case:
 
 
 @cache
-def case(actuator: str, effect: str) -> Case:
+def case(actuator: str, effect: str, only: tuple[str, ...] = RECORDS) -> Case:
     with TemporaryDirectory() as place:
         folder = Path(place)
-        tables = make_records(ACTUATORS[actuator], {effect: 1.0}, SEED, only=RECORDS)
+        tables = make_records(ACTUATORS[actuator], {effect: 1.0}, SEED, only=only)
         write_set(folder, ACTUATORS[actuator], tables)
         declared = declared_rig(folder / "rig.toml", folder / "cam.csv")
         records = load_records(folder, flatten(declared), hold_out=[HELD_OUT])
@@ -97,13 +97,13 @@ def test_no_record_is_proposed_for_the_values_of_a_table(tmp_path: Path) -> None
 
 
 def test_what_repeats_in_time_is_refused() -> None:
-    made = case("wrist", "periodic_disturbance")
+    made = case("wrist", "periodic_disturbance", RECORDS[:3])
     assert made.excess(made.base, "motor", "fit") > 1.0
     assert made.part("motor") is None
 
 
 def test_nothing_is_added_to_noise() -> None:
-    made = case("arm", "none")
+    made = case("arm", "none", RECORDS[:3])
     assert made.part("motor") is None
     assert made.part("spring") is None
 

@@ -143,10 +143,16 @@ def make_records(
     return made
 
 
+@lru_cache(maxsize=4)
+def _commands(seed: int) -> dict[str, Command]:
+    """The commands of one set; they are drawn together, whichever of its records are made."""
+    return commands(_stream(seed, _COMMAND))
+
+
 @lru_cache(maxsize=24)
 def _history(actuator: Actuator, effects: tuple[tuple[str, float], ...], seed: int, name: str) -> History:
     """True signals behind one record of a set; tests of one machine ask for the same several times."""
-    wanted = commands(_stream(seed, _COMMAND))[name]
+    wanted = _commands(seed)[name]
     return simulate(*truth(actuator, dict(effects), seed), Servo.for_actuator(actuator), wanted)
 
 

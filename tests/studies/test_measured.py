@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import nlsdesign as nls
 from nlsdesign.cli.studies import claims, run_study
+from studies import emps
+from studies._measured import data_folder
 from tests.undrawn import undrawn
 
 __all__ = ["undrawn"]
@@ -31,10 +34,29 @@ NAMED = {
 
 
 # The measurements are no part of the project: they may not travel with it.
-@pytest.mark.skipif(
+measured = pytest.mark.skipif(
     "NLSDESIGN_SHARED" not in os.environ, reason="NLSDESIGN_SHARED does not name the folder of measurements"
 )
-@pytest.mark.long_cases("emps-whole", "vhb4910-fast")
+
+
+@measured
+def test_the_drive_lacks_what_its_publishers_identified() -> None:
+    """The diagnosis of the study, without its fit by simulation, which takes most of the time."""
+    published = nls.models.positioning_drive(nls.load_deck("janot2019_positioning_drive"))
+    bare, folder = emps.viscous_only(published), data_folder("emps", None)
+    assert folder is not None
+    records = nls.load_records(folder, nls.flatten(bare), mapping=emps.MAPPING)
+    found = nls.diagnose(bare, records, catalogue=emps.RIVALS)
+    assert found.verdict == "named"
+    assert {effect.name for effect in found.effects} == NAMED["emps"]
+    # The published numbers are of a fit over the same motion; those of a balance of forces are not far off.
+    assert emps.fitted_numbers(found.actuator) == pytest.approx(emps.fitted_numbers(published), rel=0.1)
+    before, after = (emps.drive_error(drive, records) for drive in (found.declared, found.actuator))
+    assert after.force < BOUNDS["emps"]["better_force_error_percent"] < 0.25 * before.force
+
+
+@measured
+@pytest.mark.long_cases("emps-fast", "emps-whole", "vhb4910-fast")
 @pytest.mark.parametrize(("name", "way"), [("emps", "fast"), ("emps", "whole"), ("vhb4910", "fast")])
 def test_the_study_keeps_its_claims(name: str, way: str, tmp_path: Path) -> None:
     """The fast way tries few effects on the drive and fits it over fewer windows."""

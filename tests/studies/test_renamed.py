@@ -63,6 +63,7 @@ def names(model: FlatModel) -> list[list[str]]:
     return [[v.name for v in group] for group in groups]
 
 
+@pytest.mark.long_cases("exchanged", "nested", "against_the_order")
 @EVERY
 def test_deck_check_and_show(run: Run, tmp_path: Path, scheme: Scheme) -> None:
     machine = renamed(published(), scheme)
@@ -109,6 +110,7 @@ def test_analyse(run: Run, tmp_path: Path, scheme: Scheme) -> None:
     assert ranked[0] == ranked[1]
 
 
+@pytest.mark.long_cases("exchanged", "nested", "against_the_order")
 @EVERY
 def test_observer_and_controller(scheme: Scheme) -> None:
     machine = renamed(published(), scheme)

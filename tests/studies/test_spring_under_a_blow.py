@@ -17,7 +17,7 @@ from studies import spring_under_a_blow as study
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, study.Results]:
     out = tmp_path_factory.mktemp("blow")
-    return out, study.main(out)
+    return out, study.main(out, fast=True)
 
 
 def test_the_study_keeps_its_claims(results: tuple[Path, study.Results]) -> None:

@@ -298,7 +298,9 @@ def _solved(
     return np.array(solution["x"]).ravel(), np.array(solution["lam_g"]).ravel()
 
 
-QUIET: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
+QUIET: dict[str, Any] = {
+    "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "calc_lam_p": False, "no_nlp_grad": True,
+}  # fmt: skip
 _QUADRATIC: dict[str, Any] = {
     "ipopt.hessian_constant": "yes", "ipopt.jac_d_constant": "yes", "ipopt.tol": 1e-10,
     "ipopt.bound_relax_factor": 0.0,

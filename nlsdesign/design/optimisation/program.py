@@ -71,6 +71,9 @@ _OPTIONS: dict[str, Any] = {
     "print_time": False,
     "error_on_fail": False,
     "show_eval_warnings": False,
+    # Nobody asks how the optimum moves with the parameters.
+    "calc_lam_p": False,
+    "no_nlp_grad": True,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.tol": 1e-11,
@@ -84,14 +87,28 @@ _OPTIONS: dict[str, Any] = {
 
 
 _BESIDE: dict[str, Any] = {
-    "ipopt.warm_start_init_point": "yes",
-    "ipopt.mu_init": 1e-6,
-    "ipopt.mu_strategy": "adaptive",
+    "warm_start_init_point": "yes",
+    "mu_init": 1e-6,
+    "mu_strategy": "adaptive",
     **{
-        f"ipopt.warm_start_{each}": 1e-8
+        f"warm_start_{each}": 1e-8
         for each in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
     },
 }
+
+
+def interior_point(
+    name: str, program: dict[str, Any], *, iterations: int, beside: ca.Function | None = None, **options: Any
+) -> ca.Function:
+    """Return the solver of a program, with options of IPOPT.
+
+    ``beside``: another solver of it, whose derivatives are taken; to make them takes longer than to solve.
+    """
+    settings = {f"ipopt.{key}": value for key, value in options.items()}
+    if beside is not None:
+        made = {"hess_lag": "nlp_hess_l", "jac_g": "nlp_jac_g", "grad_f": "nlp_grad_f"}
+        settings |= {option: beside.get_function(function) for option, function in made.items()}
+    return ca.nlpsol(name, "ipopt", program, {**_OPTIONS, **settings, "ipopt.max_iter": iterations})
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +226,7 @@ class Program:
 
     @cached_property
     def _warm(self) -> ca.Function:
-        return self._interior_point(**_BESIDE)
+        return self._interior_point(beside=self._solver, **_BESIDE)
 
     def _interior_point(self, **options: Any) -> ca.Function:
         problem: dict[str, Any] = {
@@ -219,6 +236,4 @@ class Program:
         }
         if self.parameters is not None:
             problem["p"] = self.parameters
-        return ca.nlpsol(
-            "design", "ipopt", problem, {"ipopt.max_iter": self.iterations, **_OPTIONS, **options}
-        )
+        return interior_point("design", problem, iterations=self.iterations, **options)

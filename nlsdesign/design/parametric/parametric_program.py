@@ -24,7 +24,14 @@ from ...foundation.symbolic import Expression
 from ..curves.target import TabulatedTorque, Target
 from ..optimisation.limits import Bound, limit_kinds
 from ..optimisation.problem import SymbolicTarget, design_problem
-from ..optimisation.program import PROVED_INFEASIBLE, DesignVariable, VariableScale, scale_of, scaled
+from ..optimisation.program import (
+    PROVED_INFEASIBLE,
+    DesignVariable,
+    VariableScale,
+    interior_point,
+    scale_of,
+    scaled,
+)
 from ..optimisation.shape import ContourVariables, start_values, starts
 from ..optimisation.solve import GOALS
 from ..statics.equilibrium import elastic_law, has_corners
@@ -242,18 +249,7 @@ SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 """States of the solver that count as solved."""
 MOST_ITERATIONS = 120
 """Iterations at most of a search from a start."""
-_COMMON: dict[str, Any] = {
-    "print_time": False,
-    "error_on_fail": False,
-    "show_eval_warnings": False,
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
-    "ipopt.tol": 1e-9,
-    "ipopt.acceptable_tol": 1e-7,
-    "ipopt.honor_original_bounds": "yes",
-    "ipopt.mumps_permuting_scaling": 0,
-    "ipopt.mumps_scaling": 0,
-}
+_LOOSE: dict[str, Any] = {"tol": 1e-9, "acceptable_tol": 1e-7}
 _NONE: Array = np.zeros(0)
 
 
@@ -277,12 +273,6 @@ class SearchOutcome:
     # room: what each row of a limit gave where all limits count as kept: rounding leaves a limit that binds
     # at a held contour beyond its number by some parts in a thousand million
     room: Array | float = 0.0
-
-
-def interior_point(name: str, program: dict[str, Any], *, iterations: int, **options: Any) -> ca.Function:
-    """Return the solver of a program."""
-    settings = {f"ipopt.{key}": value for key, value in options.items()}
-    return ca.nlpsol(name, "ipopt", program, {**_COMMON, **settings, "ipopt.max_iter": iterations})
 
 
 class ProgramOutputs:
@@ -379,7 +369,7 @@ class SoftenedProgram:
 
     @cached_property
     def _softened(self) -> ca.Function:
-        return interior_point("softened", self.program, iterations=MOST_ITERATIONS)
+        return interior_point("softened", self.program, iterations=MOST_ITERATIONS, **_LOOSE)
 
     @cached_property
     def program(self) -> dict[str, ca.SX]:
@@ -419,6 +409,7 @@ _AGAIN = 45
 """Iterations at most of a search from the last design without its multipliers."""
 _STARTS = 4
 _BESIDE: dict[str, Any] = {
+    **_LOOSE,
     "warm_start_init_point": "yes",
     "mu_init": 1e-5,
     # Measured over drags of five decks: with the usual rule a flat optimum takes 50 iterations, with this 5.
@@ -443,15 +434,16 @@ class ParametricProgram:
 
     @cached_property
     def _cold(self) -> ca.Function:
-        return interior_point("quick", self.rows.program, iterations=MOST_ITERATIONS)
+        return interior_point("quick", self.rows.program, iterations=MOST_ITERATIONS, **_LOOSE)
 
     @cached_property
     def _warm(self) -> ca.Function:
-        return interior_point("beside", self.rows.program, iterations=_WARM, **_BESIDE)
+        return interior_point("beside", self.rows.program, iterations=_WARM, beside=self._cold, **_BESIDE)
 
     @cached_property
     def _again(self) -> ca.Function:
-        return interior_point("again", self.rows.program, iterations=_AGAIN, mu_strategy="adaptive")
+        options = {**_LOOSE, "mu_strategy": "adaptive"}
+        return interior_point("again", self.rows.program, iterations=_AGAIN, beside=self._cold, **options)
 
     def prepare(self) -> None:
         """Make the derivatives, which takes some tenths of a second."""

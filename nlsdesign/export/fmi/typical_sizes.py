@@ -26,6 +26,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...model.flat import FlatModel, Variable
+from ...simulation.buffered import Buffered
 
 Sizes = dict[str, float]
 
@@ -135,14 +136,20 @@ def _points(
 def _motion(model: FlatModel, sizes: Mapping[str, float]) -> list[_Point]:
     """Return states and inputs of 400 samples in which each input swings once or twice within its size."""
     box = np.array([sizes.get(v.name, 1.0) for v in model.inputs])
-    parameters = model.start(model.parameters)
     state, points = model.start(model.states), []
+    given = [np.zeros(model.equations.size1_in(i)) for i in range(5)]
+    given[3] = model.start(model.parameters)
+    step = Buffered(model.equations, given)
+    rows = np.array(model.equations.sparsity_out(0).row(), dtype=np.intp)
     for k in range(400):
         swing = [math.sin(2.0 * math.pi * k * (1 + i % 2) / 400.0) for i in range(len(box))]
         inputs = box * np.array(swing)
         points.append((state, inputs))
-        w = model.look_up(state.tolist(), inputs.tolist())
-        state = np.array(model.equations(0.0, state, inputs, parameters, w)[0], dtype=float).ravel()
+        given[1][:], given[2][:] = state, inputs
+        given[4][:] = model.look_up(state.tolist(), inputs.tolist())
+        step.evaluate()
+        state = np.zeros(len(state))
+        state[rows] = step.results[0]
         if not np.all(np.isfinite(state)):
             break
     return points

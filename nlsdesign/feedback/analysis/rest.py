@@ -20,12 +20,12 @@ from ...model.roles import measured_motion
 from ...model.transform import named
 
 
-def rate_state(model: FlatModel, angle: str) -> str:
+def rate_state(model: FlatModel, angle: str, s: Symbols | None = None) -> str:
     """Return the name of the state that is the derivative of another one."""
     states = [v.name for v in model.states]
     if angle not in states:
         raise unknown_name("state", angle, states)
-    s = model.symbols()
+    s = s or model.symbols()
     rate = s.derivative[states.index(angle)]
     for i, name in enumerate(states):
         if ca.is_equal(rate, s.state[i]):
@@ -82,9 +82,9 @@ class RestSolver:
     ) -> None:
         angle = measured_motion(model, angle)
         names, tied = [v.name for v in model.states], dict(consistent or {})
-        self._angle, self._rate = names.index(angle), names.index(rate_state(model, angle))
-        held = {self._angle, self._rate, *(names.index(name) for name in tied)}
         s = model.symbols()
+        self._angle, self._rate = names.index(angle), names.index(rate_state(model, angle, s))
+        held = {self._angle, self._rate, *(names.index(name) for name in tied)}
         known, arguments = named(model, s), [s.time, s.state, s.input, s.parameter]
         self._tied = [
             (names.index(name), ca.Function("follow", arguments, [known[signal]]))

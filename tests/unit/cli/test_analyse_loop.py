@@ -58,6 +58,8 @@ def run(out: Path, *options: str) -> tuple[int, dict]:
     return result.exit_code, json.loads(result.stdout)
 
 
+# The command in the next test; where a loop begins to limit-cycle: test_loop_onset.py, test_loop_verdict.py.
+@pytest.mark.slow
 @pytest.mark.usefixtures("five_frequencies", "two_machines")
 def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp_path: Path) -> None:
     options = ("--deck", "austin2015_figure_consistent", "--proportional", "70 rad/s/N/m",

@@ -85,6 +85,8 @@ def test_a_description_has_the_symbols_of_the_program(run: Run, code: str, tmp_p
     assert (status, "is no ELF file" in err) == (2, True)
 
 
+# The deck of a calibration is that of test_calibrate.py, and the block of any deck is made above.
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_machines")
 def test_a_calibration_writes_the_block_of_its_deck(run: Run, tmp_path) -> None:
     usual = ("--deck", LINEAR, "--what", "controller", "--out", "code")

@@ -74,6 +74,8 @@ def test_the_size_is_printed_and_a_budget_is_met_by_a_coarser_table(export: Run,
     assert sizes(exact)[2] > tables
 
 
+# The library refuses it in test_table_size.py.
+@pytest.mark.slow
 def test_a_budget_that_cannot_be_met_is_refused_and_nothing_is_written(export: Run, tmp_path: Path) -> None:
     status, out, error = export("--flash", "2kB")
     assert (status, out) == (2, "")

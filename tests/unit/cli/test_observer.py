@@ -72,6 +72,8 @@ def test_every_kind_is_written(run: Run, tmp_path: Path, kind: str) -> None:
         assert run("observer", "verify", f"{folder}/certificate.json", "--c", folder)[0] == 0
 
 
+# The poles are those of test_fitted_poles.py.
+@pytest.mark.slow
 def test_poles_are_fitted_to_records(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On two records of the study, one of them held out; few steps, for what is printed is looked at."""
     monkeypatch.setattr(fitted_poles, "GRID_POINTS", 41)

@@ -25,6 +25,7 @@ def best_of(problem: Problem) -> tuple[float, int, int]:
     return cost, times_found(search.problem, outcomes), len(outcomes)
 
 
+@pytest.mark.slow
 def test_knots_rounded_much_at_first_lead_to_what_plain_starts_mostly_miss() -> None:
     """Searches with knots of the last rounding end in the nearest of many local optima, but for a few."""
     search = ALL["README"].search()

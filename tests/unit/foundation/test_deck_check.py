@@ -68,8 +68,9 @@ def test_refused_commands_give_the_reason_that_was_said(run: Run, name: str) -> 
     assert agrees(run, name, refused) == {}
 
 
-def test_ready_commands_run(run: Run) -> None:
-    assert agrees(run, "linear-spring", ["export c", "export controller"]) == {}
+@pytest.mark.parametrize("command", [pytest.param("export c", marks=pytest.mark.slow), "export controller"])
+def test_a_ready_command_runs(run: Run, command: str) -> None:
+    assert agrees(run, "linear-spring", [command]) == {}
 
 
 def test_the_table_says_what_to_do_and_json_says_the_same(run: Run) -> None:

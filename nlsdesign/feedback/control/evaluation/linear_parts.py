@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -19,6 +18,7 @@ from scipy.linalg import expm
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
+from ....foundation.symbolic import remembered
 from ....model import FlatModel, Table
 from ....model.graph import applied, as_results, fold, read_graph
 from ....model.roles import measured_motion
@@ -53,7 +53,7 @@ def with_fine_counts(model: FlatModel) -> FlatModel:
     return replace(model, equations=_fine(model.equations, places)) if places else model
 
 
-@lru_cache(maxsize=16)
+@remembered(16)
 def _fine(function: ca.Function, places: frozenset[int]) -> ca.Function:
     """Return equations that do not round by the parameters at these places; the same for drawn numbers."""
     arguments = [ca.SX.sym(function.name_in(i), function.sparsity_in(i)) for i in range(function.n_in())]
@@ -253,7 +253,7 @@ class _AtPoints:
         return [result.reshape(shape).swapaxes(1, 2).copy() for result, shape in results]
 
 
-@lru_cache(maxsize=16)
+@remembered(16)
 def _with_slopes(equations: ca.Function, count: int) -> _AtPoints:
     """Return the equations of a discrete block at rest of time, with slopes over state, input and table."""
     t, x, u, p, w = (ca.SX.sym(equations.name_in(i), equations.size1_in(i)) for i in range(5))

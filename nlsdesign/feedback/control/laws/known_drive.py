@@ -19,6 +19,7 @@ from ....model.linear import rest_state
 from ....model.roles import contour_ends, motor_of, series_spring
 from ....model.structure import MotorNames, MovingBody
 from ....model.transform import cut, named
+from ....simulation.buffered import Buffered
 from ...analysis.rest import unmoved_states
 from .law_writer import LawWriter, LoopNames, loop_names
 
@@ -419,7 +420,9 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
     opened = cut(plant, [effort])
     states, inputs = opened.start(opened.states), opened.start(opened.inputs)
     names, places = [v.name for v in opened.states], [v.name for v in opened.inputs]
-    rate, numbers = names.index(drive.body.rate), opened.start(opened.parameters)
+    rate, looked_up = names.index(drive.body.rate), np.zeros(opened.equations.size1_in(4))
+    given = (np.zeros(1), states, inputs, opened.start(opened.parameters), looked_up)
+    equations, row = Buffered(opened.equations, given), opened.equations.sparsity_out(0).row().index(rate)
 
     def largest(way: float) -> float:
         states[rate] = way * SLOW
@@ -428,10 +431,9 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
 
         def pushes_on(torque: float) -> bool:
             inputs[places.index(effort)] = against * torque
-            slopes = opened.equations(
-                0.0, states, inputs, numbers, opened.look_up(list(states), list(inputs))
-            )[0]
-            return way * float(slopes[rate]) > 0.0
+            looked_up[:] = opened.look_up(list(states), list(inputs))
+            equations.evaluate()
+            return way * float(equations.results[0][row]) > 0.0
 
         if not pushes_on(0.0):
             return 0.0

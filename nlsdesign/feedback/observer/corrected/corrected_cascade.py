@@ -12,6 +12,7 @@ import numpy as np
 
 from ....foundation.errors import ArrangementError
 from ....foundation.quantity import typeset_unit
+from ....foundation.symbolic import remembered
 from ....foundation.written_numbers import prefixed
 from ....model import FlatModel, Variable
 from ....model.roles import measured_motion, spring_torque
@@ -206,6 +207,7 @@ def design_corrected_observer(
     return corrected(model, cascade, prior=prior, duty=duty, grid=grid, estimate=estimate, measured=measured)
 
 
+@remembered(8)
 def corrected(
     model: FlatModel,
     cascade: ObserverDesign,

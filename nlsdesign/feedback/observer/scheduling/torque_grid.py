@@ -96,7 +96,7 @@ class TableTrial:
     def _run(self, read: Array) -> Array:
         """Return the estimates with these entries, shape (N · motions,)."""
         many = self._many
-        looked_up = np.zeros((self._model.symbols().table.numel(), read.shape[1]))
+        looked_up = np.zeros((self._model.equations.size1_in(4), read.shape[1]))
         looked_up[self._columns] = read
         given = np.vstack([self._inputs, looked_up])
         state, shown = self._start, []

@@ -249,7 +249,7 @@ SLOW = pytest.param("milliampere", marks=pytest.mark.slow)
 """The turned current takes the same way."""
 
 
-@pytest.mark.long_cases("millinewton", "degrees")
+@pytest.mark.long_cases("millinewton", "degrees", "turned")
 @pytest.mark.parametrize("case", [c for c in SUSPECT if c != "milliampere"] + [SLOW])
 def test_what_looks_wrong_is_suspected_before_any_effect_is_tried(
     case: str, rig: Assembly, clean: np.ndarray, tmp_path: Path

@@ -26,7 +26,7 @@ def diagnosed(
     return diagnose(*opened(folder), catalogue=rivals)
 
 
-@pytest.mark.long_cases("1171-coarse")
+@pytest.mark.long_cases("1171-coarse", "1196-plain")
 @pytest.mark.parametrize(("seed", "condition"), [(1171, "coarse"), (1196, "plain")])
 def test_an_eccentric_disc_is_told_at_its_own_encoder(seed: int, condition: str, tmp_path: Path) -> None:
     """What the disc does to an acceleration was left out; the motor's encoder then left as little."""

@@ -86,7 +86,7 @@ COMMANDS = {
 }
 
 
-LONG = ("analyse angle", "export c", "design")
+LONG = ("analyse angle", "export c", "export controller", "design")
 
 
 @pytest.mark.parametrize(
