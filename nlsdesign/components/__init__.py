@@ -22,16 +22,15 @@ from .assembly.deck_writer import declare as declare
 from .assembly.deck_writer import write_deck as write_deck
 from .assembly.library_rubber import with_rubber
 from .assembly.named_parts import Assembly, assembly
-from .assembly.renamed import renamed as renamed
+from .assembly.part_text import renamed as renamed
 from .core.contacts import Regularised, Rounded, Sharp
-from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .core.element import Element, Parallel, Tie, parallel, tie
 from .core.part import ParameterInfo as ParameterInfo
 from .core.part import Part
 from .core.part_numbers import NotDeclared
 from .core.series import Series, series
-from .core.springs import FittedRange, LinearElastic, Spring, StrainStiffening
+from .core.springs import Dashpot, FittedRange, LinearElastic, Spring, StrainStiffening, ViscousMaterial
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
@@ -43,6 +42,8 @@ from .materials.loss_tangent import (
     loss_of,
     measured_relaxation,
     peaked_relaxation,
+    relaxing_law_of,
+    relaxing_rubber_of,
 )
 from .materials.material_law import law_of, rubber_of
 from .materials.material_law import material_laws as material_laws
@@ -56,7 +57,6 @@ from .materials.named_networks import (
 from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.quasilinear import QuasilinearRelaxation
 from .materials.rate_independent import SlidingFillers
-from .materials.relaxing_rubber import relaxing_law_of, relaxing_rubber_of
 from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
 from .materials.smooth_hysteresis import BoucWen
 from .materials.specimen import Area, Specimen, Strip, specimen

@@ -13,9 +13,9 @@ from .multiple_shooting import (
     predict_in_windows,
 )
 from .parameters import Parameter, declared_parameter, free_parameter
+from .records.column_heads import read_input_columns as read_input_columns
 from .records.description import RecordsDescription as RecordsDescription
 from .records.description import describe_records
-from .records.input_columns import read_input_columns as read_input_columns
 from .records.measurement import ColumnMap, Record, RecordSet, load_record, load_records
 from .residuals import Agreement, agreement, noise_of, rmse
 from .simulation_error import Shots, Weights

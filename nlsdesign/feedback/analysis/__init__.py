@@ -5,8 +5,7 @@ from .observability import EmpiricalGramian, Observability, RankDrops, empirical
 from .rest import ranges_at_rest
 from .rest_points import RestPoints, rest_points
 from .sensor_ranking import SensorCandidate, SensorRanking, rank_sensors
-from .stability import Stability, sampled_poles
-from .sweep import Chart, View, over_angle
+from .sweep import Chart, Stability, View, over_angle, sampled_poles
 
 __all__ = [
     "Chart",

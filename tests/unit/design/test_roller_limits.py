@@ -30,8 +30,8 @@ from nlsdesign.design import (
     tolerance_analysis,
     write_drawings,
 )
+from nlsdesign.design.statics.contour import roller_contour
 from nlsdesign.design.statics.energy import energy_profile, unmakeable_parts
-from nlsdesign.design.statics.roller_contour import roller_contour
 from nlsdesign.foundation.errors import ArrangementError, InfeasibleError, NlsError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.live.gallery import question_of

@@ -14,9 +14,8 @@ from nlsdesign.design import CamDesign
 from nlsdesign.design.optimisation.result import Miss
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.live.gallery import gallery_question
-from nlsdesign.live.lights import lights_of
 from nlsdesign.live.question import LiveQuestion
-from nlsdesign.live.work import FullDesign, whole_design
+from nlsdesign.live.work import FullDesign, lights_of, whole_design
 
 NUMBER = r"{value = [-\d.e]+"
 

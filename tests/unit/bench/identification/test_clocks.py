@@ -12,8 +12,14 @@ from scipy.signal import resample_poly
 
 from nlsdesign.bench.identification import Record, load_record, load_records, noise_of
 from nlsdesign.bench.identification.equation_error.evidence import estimate_noise
-from nlsdesign.bench.identification.records.alignment import aligned, joined, resampled
-from nlsdesign.bench.identification.records.clocks import Channel, lag_between, on_one_clock
+from nlsdesign.bench.identification.records.clocks import (
+    Channel,
+    aligned,
+    joined,
+    lag_between,
+    on_one_clock,
+    resampled,
+)
 from nlsdesign.bench.identification.records.ingest import read_run
 from nlsdesign.bench.identification.records.mapping import Column, ColumnMap, read_mapping
 from nlsdesign.bench.identification.records.table_files import RecordTable
