@@ -45,8 +45,8 @@ from .materials.loss_tangent import (
     relaxing_law_of,
     relaxing_rubber_of,
 )
-from .materials.material_law import law_of, rubber_of
 from .materials.material_law import material_laws as material_laws
+from .materials.material_law import rubber_of
 from .materials.named_networks import (
     burgers,
     generalised_maxwell,
@@ -64,7 +64,7 @@ from .materials.springpot import Springpot
 from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
-from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
+from .mechanics.bodies import Driven, Fixed, GearedMotor, Inertia, Mass
 from .mechanics.carriage import LinearDrive
 from .mechanics.coils import (
     CoilMass,
@@ -75,7 +75,7 @@ from .mechanics.coils import (
     WireStrength,
     torsion_coil,
 )
-from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
+from .mechanics.controllers import Integral, PositionLoop, RateFeedback, SpeedLoop
 from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
 from .mechanics.drive_faults import (
     CommandCompression,
@@ -92,10 +92,10 @@ from .mechanics.friction import (
     QuadraticDrag,
     StribeckFriction,
 )
-from .mechanics.gear import Gear, LossyGear, Rack, Screw, Transmission
+from .mechanics.gear import Gear, LossyGear, Rack, Screw
 from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
-from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
+from .mechanics.motor import CurrentDrivenMotor, ResistiveMotor, VoltageDrivenMotor
 from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
@@ -136,7 +136,6 @@ __all__ = [
     "Assembly",
     "AsymmetricFriction",
     "Backlash",
-    "Body",
     "BoucWen",
     "Buckling",
     "Cable",
@@ -149,7 +148,6 @@ __all__ = [
     "CommandSaturation",
     "CompressionCoil",
     "ConstantLoad",
-    "Controller",
     "CoulombFriction",
     "CurrentDrivenMotor",
     "CurrentSensor",
@@ -163,7 +161,6 @@ __all__ = [
     "DriveSaturation",
     "Driven",
     "Eccentricity",
-    "ElectricMotor",
     "Element",
     "Encoder",
     "EncoderOffset",
@@ -251,7 +248,6 @@ __all__ = [
     "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
-    "Transmission",
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
@@ -274,7 +270,6 @@ __all__ = [
     "flat_relaxation",
     "generalised_maxwell",
     "kelvin_voigt",
-    "law_of",
     "loss_of",
     "material",
     "materials",

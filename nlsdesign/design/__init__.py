@@ -1,7 +1,7 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
-from ..foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
-from .curves.beside import BesideCurve, EngagedSpring, SpringChoice, choose_spring, curve_beside
+from ..foundation.spread import Spread, UniformSpread
+from .curves.beside import SpringChoice, choose_spring, curve_beside
 from .curves.compliance import OddSpring, OneSidedSpring, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.target import (
@@ -94,10 +94,10 @@ from .optimisation.limits import (
 from .optimisation.pareto import ParetoFront, pareto
 from .optimisation.result import CamDesign, LimitState
 from .optimisation.solve import GOALS as GOALS
-from .optimisation.solve import SidesDesign, design_cam, design_sides
+from .optimisation.solve import design_cam, design_sides
 from .optimisation.stock import CoilStock, RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
-from .statics.contour import Contour, RollerContour, contour_from_lever_arm
+from .statics.contour import Contour, contour_from_lever_arm
 from .statics.declared_cam import contour_of_cam
 from .statics.equilibrium import elastic_law, equilibrium_torque
 from .tolerance.causes import Cause, SpreadRules
@@ -110,7 +110,6 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "AtMost",
-    "BesideCurve",
     "BoltCircle",
     "BothStrokes",
     "CamDesign",
@@ -122,7 +121,6 @@ __all__ = [
     "DesignJob",
     "DesignSettings",
     "EnergyLost",
-    "EngagedSpring",
     "ExponentialTorque",
     "FerruleSeat",
     "Goal",
@@ -154,7 +152,6 @@ __all__ = [
     "MixedTask",
     "MotorAndGear",
     "MotorCycle",
-    "NormalSpread",
     "NumberRange",
     "OddSpring",
     "OneNumber",
@@ -165,11 +162,8 @@ __all__ = [
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
-    "RelativeSpread",
     "RestLengthRange",
-    "RollerContour",
     "RubberStock",
-    "SidesDesign",
     "SmoothContour",
     "Spread",
     "SpreadRules",

@@ -6,11 +6,11 @@ Presentation and commands may import it; it reads models, and designs nothing.
 from .c.asap2 import write_a2l
 from .c.block_code import export_c_with_blocks
 from .c.block_files import read_parameter_block, write_parameter_block
-from .c.block_layout import BlockLayout, ParameterBlock
+from .c.block_layout import ParameterBlock
 from .c.coefficients import LoadableModel, loadable_model
 from .c.controller_code import export_c
 from .c.programs import write_examples, write_package
-from .c.watch_code import WatchedBlock, WatchPlan, WatchSource, export_watch, read_watch_record
+from .c.watch_code import WatchedBlock, WatchPlan, export_watch, read_watch_record
 from .c.writer import CSource
 from .compilation.compiled_step import natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS
@@ -38,7 +38,6 @@ __all__ = [
     "CORTEX_M7",
     "PROCESSORS",
     "Authorship",
-    "BlockLayout",
     "CSource",
     "CoSimulation",
     "Convergence",
@@ -53,7 +52,6 @@ __all__ = [
     "SamplesOf",
     "Stepping",
     "WatchPlan",
-    "WatchSource",
     "WatchedBlock",
     "Wire",
     "convergence",

@@ -22,7 +22,7 @@ from .readiness import usual_last as usual_last
 from .regenerated_observer import RegeneratedController as RegeneratedController
 from .regenerated_observer import Regeneration, regenerate, write_regeneration
 from .watch_model import watch_plan
-from .watch_reading import WatchedChange, WatchVerdict, read_watch
+from .watch_reading import read_watch
 from .watched_records import ObserverChoice
 
 __all__ = [
@@ -30,8 +30,6 @@ __all__ = [
     "ObserverChoice",
     "Regeneration",
     "SameTable",
-    "WatchVerdict",
-    "WatchedChange",
     "block_for",
     "export_machine",
     "fit_poles",

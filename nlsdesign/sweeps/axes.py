@@ -315,12 +315,6 @@ def _ends_of(ends: Array, at: list[int], shapes: Any, without: float) -> Array:
     return np.where(shapes, without, ends[at]) if len(ends) else np.full(len(at), without)
 
 
-def _chosen(name: str, places: Mapping[str, tuple[int, bool]]) -> tuple[int, bool]:
-    if name not in places:
-        raise unknown_name("number with a spread", name, places)
-    return places[name]
-
-
 def _ends(column: SweepColumn, ends: tuple[Any, ...]) -> tuple[float, float]:
     if column.lower is None:
         raise ValueRangeError(f"axis '{column.name}'", "takes words, which have no range",

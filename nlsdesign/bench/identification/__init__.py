@@ -12,7 +12,7 @@ from .multiple_shooting import (
     fit_by_simulation,
     predict_in_windows,
 )
-from .parameters import Parameter, declared_parameter, free_parameter
+from .parameters import Parameter, free_parameter
 from .records.column_heads import read_input_columns as read_input_columns
 from .records.description import RecordsDescription as RecordsDescription
 from .records.description import describe_records
@@ -33,7 +33,6 @@ __all__ = [
     "Weights",
     "agreement",
     "coloured_sigma",
-    "declared_parameter",
     "describe_records",
     "fit_by_simulation",
     "free_parameter",

@@ -95,19 +95,8 @@ def law_of(material: Material, *, using: str | None = None) -> MaterialLaw:
     :class:`StrainStiffening`, with the Maxwell branch of the same publication; moduli and exponents of
     Ogden, or a shear modulus, become their laws.
 
-    Parameters
-    ----------
-    material
-        Of the library.
-    using
-        Name of the property that the law is to come from; by default the first one in the library.
-
-    Raises
-    ------
-    ArrangementError
-        If nothing that is known of the rubber gives an elastic law, as where only a loss tangent is.
-    UnknownNameError
-        If it has no such property that gives one.
+    ``material``: of the library. ``using``: name of the property that the law is to come from; by default the
+    first one in the library.
 
     Examples
     --------

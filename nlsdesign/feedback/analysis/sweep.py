@@ -25,7 +25,7 @@ from ...foundation.quantity import typeset_unit
 from ...foundation.text_files import write_table
 from ...model import FlatModel, Variable
 from ...model.roles import measured_motion, spring_torque
-from .rest_points import PlantMode, RestPoint, RestPoints, rest_points
+from .rest_points import PlantMode, RestPoints, rest_points
 
 
 class Columns(NamedTuple):
@@ -52,28 +52,6 @@ class View(ABC):
         points
             The model at rest at each angle.
         """
-
-
-class PointView(View):
-    """A property that is computed angle by angle, the simplest way to write one of your own."""
-
-    @abstractmethod
-    def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return name, unit and description of each number."""
-
-    @abstractmethod
-    def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
-        """Return the numbers, in the order of the columns, and findings in words."""
-
-    def over(self, points: RestPoints) -> Columns:
-        """Return what :meth:`at` gives at each angle."""
-        columns = self.columns(points.model)
-        values, words = np.zeros((len(points.at), len(columns))), dict[str, list[str]]()
-        for row in range(len(points.at)):
-            values[row], texts = self.at(points.point(row))
-            for name, text in texts.items():
-                words.setdefault(name, []).append(text)
-        return Columns(columns, values, {name: tuple(texts) for name, texts in words.items()})
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli import look_up
-from nlsdesign.components import Body, Cam, DrivePart, Element, Sensor, Transmission, component_classes
+from nlsdesign.components import Cam, DrivePart, Element, Sensor, component_classes
+from nlsdesign.components.mechanics.bodies import Body
+from nlsdesign.components.mechanics.gear import Transmission
 
 KINDS = {
     "element": Element, "body": Body, "gear": Transmission, "cam": Cam, "sensor": Sensor, "drive": DrivePart,

@@ -23,7 +23,6 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.feedback.control import (
-    AntiWindup,
     BackCalculation,
     ConditionalIntegration,
     DisturbanceObserver,
@@ -40,6 +39,7 @@ from nlsdesign.feedback.control import (
     torque_controller,
 )
 from nlsdesign.feedback.control.laws.known_drive import torque_limit
+from nlsdesign.feedback.control.laws.law_writer import AntiWindup
 from nlsdesign.feedback.control.laws.torque_loop import largest_speed, rate_remarks
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
