@@ -36,11 +36,10 @@ from nlsdesign import design as design_room
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.design import DesignSettings
-from nlsdesign.design.optimisation.design_search import Search
+from nlsdesign.design.optimisation.design_search import SAME_COST, Search, SeveralStarts, times_found
 from nlsdesign.design.optimisation.limits import Limit
 from nlsdesign.design.optimisation.problem import DesignProblem
 from nlsdesign.design.optimisation.program import Rows
-from nlsdesign.design.optimisation.several_starts import SAME_COST, SeveralStarts, times_found
 from nlsdesign.design.optimisation.shape import Start, start_values, starts
 from nlsdesign.design.optimisation.solve import GOALS, USUAL, Wanted
 from nlsdesign.export.compilation.cross_compiler import BASELINE

@@ -31,7 +31,7 @@ from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.regeneration import regenerate
-from nlsdesign.regeneration.regenerated_controller import usual_controller
+from nlsdesign.regeneration.regenerated_observer import usual_controller
 from tests.rig import ACTUATORS, Actuator, Hidden, make_records, truth, write_set
 from tests.rig.bench import Servo, simulate
 from tests.rig.commands import STEP, Command

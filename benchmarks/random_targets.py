@@ -20,7 +20,7 @@ import nlsdesign as nls
 from nlsdesign import design as design_room
 from nlsdesign.design import CamDesign, DesignSettings, Limit
 from nlsdesign.design.optimisation.loosening import Freed, Give
-from nlsdesign.design.optimisation.other_ways import OtherSpring
+from nlsdesign.design.optimisation.remedies import OtherSpring
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.errors import NlsError
 

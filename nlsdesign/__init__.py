@@ -68,7 +68,7 @@ def _advice(name: str) -> str:
         own = [n for n, v in vars(module).items() if getattr(v, "__module__", None) == module.__name__]
         if name in getattr(module, "__all__", [n for n in own if not n.startswith("_")]):
             return f"{text}; it is {module.__name__}.{name}"
-    from .components.assembly.renamed import renamed  # here, as components take time to load
+    from .components.assembly.part_text import renamed  # here, as components take time to load
 
     old = renamed(name)
     if old is not None:

@@ -83,7 +83,7 @@ from .foundation.quantity import quantity as quantity
 from .foundation.quantity import sources as sources
 from .model import FlatModel as FlatModel
 from .model import flatten as flatten
-from .model.equations import equations as equations
+from .model.flat import equations as equations
 from .model.linear import linearise as linearise
 from .model.transform import with_outputs as with_outputs
 from .presentation import figures as figures

@@ -21,15 +21,10 @@ from nlsdesign.design import (
 from nlsdesign.design.optimisation.pareto import FrontPoint
 from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.feedback.analysis import Chart
-from nlsdesign.feedback.control import (
-    LoopMargins,
-    LoopVerdict,
-    OutputImpedance,
-    SaturationLine,
-    SineResponse,
-)
+from nlsdesign.feedback.control import LoopMargins, LoopVerdict, OutputImpedance, SineResponse
 from nlsdesign.feedback.control.evaluation.linear_loop import LinearLoop
 from nlsdesign.feedback.control.evaluation.margins import CoupledStability
+from nlsdesign.feedback.control.evaluation.onset import SaturationLine
 from nlsdesign.foundation.quantity import degrees
 from nlsdesign.model import Variable
 from nlsdesign.presentation import figures

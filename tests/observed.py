@@ -11,7 +11,6 @@ import numpy as np
 from nlsdesign.components import (
     ROTATION,
     Assembly,
-    Body,
     CoulombFriction,
     Dashpot,
     Driven,
@@ -31,6 +30,7 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.mechanics.bodies import Body
 from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.transform import replace_state, with_signal
 from nlsdesign.simulation import Trace, simulate

@@ -59,7 +59,7 @@ EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
     "design.jobs.written_design": ("components.assembly.deck_writer",),
     "design.statics.equilibrium": ("components.core.element",),
-    "design.optimisation.stock": ("components.assembly.library_rubber", "components.assembly.stocked_coil"),
+    "design.optimisation.stock": ("components.assembly.library_rubber",),
     "export.exported_files": ("components.assembly.deck_writer",),
     "bench.discrepancy": (ASSEMBLY,),
     "simulation.measure": (ASSEMBLY,),
@@ -263,12 +263,12 @@ def test_the_commands_import_from_a_room_only_its_front(root: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["..components.assembly.deck_writer import x", "..presentation.report.page import x"]
+    "text", ["..components.assembly.deck_writer import x", "..presentation.report.sections import x"]
 )
 def test_an_import_past_the_front_of_a_room_is_caught(tmp_path: Path, text: str) -> None:
     rooms = [
         "components/assembly/deck_writer",
-        "presentation/report/page",
+        "presentation/report/sections",
         "foundation/deck",
         "model/flatten",
     ]

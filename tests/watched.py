@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nlsdesign.export import WatchSource
+from nlsdesign.export.c.watch_code import WatchSource
 from tests.compiling import compile_program
 from tests.rig.bench import CAM_GRID, SERVO_BANDWIDTH, SERVO_DAMPING, _cam_tables
 from tests.rig.kind_decks import NAMES, deck_of

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from nlsdesign.export import CSource, WatchSource
+from nlsdesign.export import CSource
+from nlsdesign.export.c.watch_code import WatchSource
 
 HEADER = """#ifndef WATCHED_H
 #define WATCHED_H

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..foundation.command_words import typed_command
-from ..foundation.errors import MeasurementError
+from ..foundation.errors import MeasurementError, typed_command
 from ..foundation.quantity import typeset_unit, with_error
 from .export_block import block_option, written_block
 from .options import (

@@ -12,8 +12,7 @@ import traceback
 
 import click
 
-from ..foundation.command_words import typed_command
-from ..foundation.errors import NlsError, fit_for_message, nearest
+from ..foundation.errors import NlsError, fit_for_message, nearest, typed_command
 from ..foundation.locations import version
 from ..foundation.processes import usual_temporary_folder, was_interrupted
 from .analyse import analyse

@@ -14,8 +14,7 @@ from typing import Any
 
 import click
 
-from ..foundation.command_words import typed_command
-from ..foundation.errors import visible
+from ..foundation.errors import typed_command, visible
 
 WIDE = 160
 """Width of a table that is not shown on a terminal."""

@@ -22,16 +22,15 @@ from .assembly.deck_writer import declare as declare
 from .assembly.deck_writer import write_deck as write_deck
 from .assembly.library_rubber import with_rubber
 from .assembly.named_parts import Assembly, assembly
-from .assembly.renamed import renamed as renamed
+from .assembly.part_text import renamed as renamed
 from .core.contacts import Regularised, Rounded, Sharp
-from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .core.element import Element, Parallel, Tie, parallel, tie
 from .core.part import ParameterInfo as ParameterInfo
 from .core.part import Part
 from .core.part_numbers import NotDeclared
 from .core.series import Series, series
-from .core.springs import FittedRange, LinearElastic, Spring, StrainStiffening
+from .core.springs import Dashpot, FittedRange, LinearElastic, Spring, StrainStiffening, ViscousMaterial
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
@@ -43,9 +42,11 @@ from .materials.loss_tangent import (
     loss_of,
     measured_relaxation,
     peaked_relaxation,
+    relaxing_law_of,
+    relaxing_rubber_of,
 )
-from .materials.material_law import law_of, rubber_of
 from .materials.material_law import material_laws as material_laws
+from .materials.material_law import rubber_of
 from .materials.named_networks import (
     burgers,
     generalised_maxwell,
@@ -56,7 +57,6 @@ from .materials.named_networks import (
 from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.quasilinear import QuasilinearRelaxation
 from .materials.rate_independent import SlidingFillers
-from .materials.relaxing_rubber import relaxing_law_of, relaxing_rubber_of
 from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
 from .materials.smooth_hysteresis import BoucWen
 from .materials.specimen import Area, Specimen, Strip, specimen
@@ -64,7 +64,7 @@ from .materials.springpot import Springpot
 from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
-from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
+from .mechanics.bodies import Driven, Fixed, GearedMotor, Inertia, Mass
 from .mechanics.carriage import LinearDrive
 from .mechanics.coils import (
     CoilMass,
@@ -75,7 +75,7 @@ from .mechanics.coils import (
     WireStrength,
     torsion_coil,
 )
-from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
+from .mechanics.controllers import Integral, PositionLoop, RateFeedback, SpeedLoop
 from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
 from .mechanics.drive_faults import (
     CommandCompression,
@@ -92,10 +92,10 @@ from .mechanics.friction import (
     QuadraticDrag,
     StribeckFriction,
 )
-from .mechanics.gear import Gear, LossyGear, Rack, Screw, Transmission
+from .mechanics.gear import Gear, LossyGear, Rack, Screw
 from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
-from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
+from .mechanics.motor import CurrentDrivenMotor, ResistiveMotor, VoltageDrivenMotor
 from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
@@ -136,7 +136,6 @@ __all__ = [
     "Assembly",
     "AsymmetricFriction",
     "Backlash",
-    "Body",
     "BoucWen",
     "Buckling",
     "Cable",
@@ -149,7 +148,6 @@ __all__ = [
     "CommandSaturation",
     "CompressionCoil",
     "ConstantLoad",
-    "Controller",
     "CoulombFriction",
     "CurrentDrivenMotor",
     "CurrentSensor",
@@ -163,7 +161,6 @@ __all__ = [
     "DriveSaturation",
     "Driven",
     "Eccentricity",
-    "ElectricMotor",
     "Element",
     "Encoder",
     "EncoderOffset",
@@ -251,7 +248,6 @@ __all__ = [
     "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
-    "Transmission",
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
@@ -274,7 +270,6 @@ __all__ = [
     "flat_relaxation",
     "generalised_maxwell",
     "kelvin_voigt",
-    "law_of",
     "loss_of",
     "material",
     "materials",

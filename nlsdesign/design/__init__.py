@@ -1,7 +1,7 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
-from ..foundation.spread import NormalSpread, RelativeSpread, Spread, UniformSpread
-from .curves.beside import BesideCurve, EngagedSpring, SpringChoice, choose_spring, curve_beside
+from ..foundation.spread import Spread, UniformSpread
+from .curves.beside import SpringChoice, choose_spring, curve_beside
 from .curves.compliance import OddSpring, OneSidedSpring, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.target import (
@@ -33,18 +33,17 @@ from .drawing.machined_cam import (
     FerruleSeat,
     MachinedCam,
     MachinedOneSidedCam,
+    MachinedRollerCam,
     MachinedTwoSidedCam,
 )
-from .drawing.machined_roller import MachinedRollerCam
 from .drawing.making import process_of as process_of
 from .jobs.job_file import DRAWS as DRAWS
-from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.job_file import DesignJob, TaskTarget, job_of, read_job
 from .jobs.job_file import kinds as kinds
 from .jobs.job_file import read_entries as read_entries
 from .jobs.job_file import read_stock as read_stock
 from .jobs.job_file import read_target_entry as read_target_entry
 from .jobs.job_file import target_of_file as target_of_file
-from .jobs.task_target import TaskTarget
 from .jobs.written_design import (
     DESIGN_FILES,
     design_summary,
@@ -52,8 +51,15 @@ from .jobs.written_design import (
     write_part,
     write_sides,
 )
-from .optimisation.coil_limits import GoodmanSafety, MaximumSpringIndex, MaximumTravel, MinimumSpringIndex
-from .optimisation.defaults import safe_limits
+from .optimisation.coil_limits import (
+    GoodmanSafety,
+    MaximumPressureAngle,
+    MaximumSpringIndex,
+    MaximumTravel,
+    MinimumHollowRadius,
+    MinimumSpringIndex,
+)
+from .optimisation.defaults import DesignSettings, safe_limits
 from .optimisation.goals import (
     BothStrokes,
     EnergyLost,
@@ -87,17 +93,13 @@ from .optimisation.limits import (
 )
 from .optimisation.pareto import ParetoFront, pareto
 from .optimisation.result import CamDesign, LimitState
-from .optimisation.roller_limits import MaximumPressureAngle, MinimumHollowRadius
-from .optimisation.settings import DesignSettings
-from .optimisation.sides import SidesDesign, design_sides
 from .optimisation.solve import GOALS as GOALS
-from .optimisation.solve import design_cam
+from .optimisation.solve import design_cam, design_sides
 from .optimisation.stock import CoilStock, RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_lever_arm
 from .statics.declared_cam import contour_of_cam
 from .statics.equilibrium import elastic_law, equilibrium_torque
-from .statics.roller_contour import RollerContour
 from .tolerance.causes import Cause, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
@@ -108,7 +110,6 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "AtMost",
-    "BesideCurve",
     "BoltCircle",
     "BothStrokes",
     "CamDesign",
@@ -120,7 +121,6 @@ __all__ = [
     "DesignJob",
     "DesignSettings",
     "EnergyLost",
-    "EngagedSpring",
     "ExponentialTorque",
     "FerruleSeat",
     "Goal",
@@ -152,7 +152,6 @@ __all__ = [
     "MixedTask",
     "MotorAndGear",
     "MotorCycle",
-    "NormalSpread",
     "NumberRange",
     "OddSpring",
     "OneNumber",
@@ -163,11 +162,8 @@ __all__ = [
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
-    "RelativeSpread",
     "RestLengthRange",
-    "RollerContour",
     "RubberStock",
-    "SidesDesign",
     "SmoothContour",
     "Spread",
     "SpreadRules",

@@ -6,30 +6,28 @@ Presentation and commands may import it; it reads models, and designs nothing.
 from .c.asap2 import write_a2l
 from .c.block_code import export_c_with_blocks
 from .c.block_files import read_parameter_block, write_parameter_block
-from .c.block_layout import BlockLayout, ParameterBlock
+from .c.block_layout import ParameterBlock
 from .c.coefficients import LoadableModel, loadable_model
 from .c.controller_code import export_c
-from .c.packages import write_package
-from .c.programs import write_examples
-from .c.watch_code import WatchedBlock, WatchPlan, WatchSource, export_watch, read_watch_record
+from .c.programs import write_examples, write_package
+from .c.watch_code import WatchedBlock, WatchPlan, export_watch, read_watch_record
 from .c.writer import CSource
 from .compilation.compiled_step import natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS
 from .compilation.processors import CORTEX_M4F, CORTEX_M7, PROCESSORS, Processor
 from .compilation.proof import StepProof as StepProof
 from .compilation.proof import prove_step
-from .compilation.target_build import controller_sizes as controller_sizes
+from .compilation.target_run import controller_sizes as controller_sizes
 from .compilation.target_run import measure_on_target
-from .cosimulation.convergence import Convergence, convergence
-from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
+from .cosimulation.cosimulate import Convergence, CoSimulation, FmuSystem, convergence, cosimulate
 from .cosimulation.coupling import Coupling as Coupling
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
+from .cosimulation.run_plan import Late, SamplesOf, Wire
+from .cosimulation.run_plan import as_wire as as_wire
 from .cosimulation.ssp import read_ssp, write_ssp
-from .cosimulation.wires import Late, SamplesOf, Wire
-from .cosimulation.wires import as_wire as as_wire
 from .exported_files import read_exports
-from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
+from .fmi.fmu_documentation import Authorship
 from .fmi.reference_results import write_reference
 from .modelica.modelica_model import export_modelica
 from .mujoco.actuator_model import export_mujoco
@@ -40,7 +38,6 @@ __all__ = [
     "CORTEX_M7",
     "PROCESSORS",
     "Authorship",
-    "BlockLayout",
     "CSource",
     "CoSimulation",
     "Convergence",
@@ -55,7 +52,6 @@ __all__ = [
     "SamplesOf",
     "Stepping",
     "WatchPlan",
-    "WatchSource",
     "WatchedBlock",
     "Wire",
     "convergence",

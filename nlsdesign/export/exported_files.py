@@ -23,9 +23,9 @@ from ..components.assembly.deck_writer import deck_digest, declare
 from ..foundation.deck import read_deck
 from ..foundation.errors import ExportError, NlsError
 from ..model.origin import digits_in_name
-from .c.provenance import SHORT, stamp_of
+from .c.c_text import SHORT, stamp_of
 from .files import BROKEN_ARCHIVE
-from .fmi.authorship import ORIGIN_FILE, ORIGIN_FORMAT
+from .fmi.fmu_documentation import ORIGIN_FILE, ORIGIN_FORMAT
 
 MEGABYTE = 1 << 20
 LARGEST_TEXT, LARGEST_ARCHIVE = 32 * MEGABYTE, 512 * MEGABYTE

@@ -1,9 +1,15 @@
-"""Errors that name the thing, the rule, the nearest valid name and the next step."""
+"""Errors that name the thing, the rule, the nearest valid name and the next step.
+
+A command as somebody types it: words with blanks or special characters are quoted for the shell.
+"""
 
 from __future__ import annotations
 
 import difflib
+import os
 import re
+import shlex
+import subprocess
 from collections.abc import Iterable
 
 _LONGEST_NAME = 120
@@ -228,3 +234,21 @@ def missing_library(what: str, library: str, extra: str) -> MissingLibraryError:
     return MissingLibraryError(
         what, f"needs {library}, which is not installed", next_step=f"pip install 'nlsdesign[{extra}]'"
     )
+
+
+def typed_command(*words: object) -> str:
+    """Return words as one line that can be copied into a shell.
+
+    Parameters
+    ----------
+    words
+        Of the command, each unquoted.
+
+    Examples
+    --------
+    >>> typed_command("nlsdesign", "deck", "check", "my leg.toml")
+    "nlsdesign deck check 'my leg.toml'"
+    """
+    texts = [str(item) for item in words]
+    # The shells of Windows know double quotes only.
+    return subprocess.list2cmdline(texts) if os.name == "nt" else shlex.join(texts)

@@ -501,13 +501,6 @@ def same_dimension(unit: str, other: str) -> bool:
     return parse_unit(unit).exponents == parse_unit(other).exponents
 
 
-def convert(value: float, from_unit: str, to_unit: str) -> float:
-    """Convert a value between units of the same dimension."""
-    if not same_dimension(from_unit, to_unit):
-        raise UnitError(f"'{from_unit}'", f"is not of the dimension of '{to_unit}'")
-    return value * parse_unit(from_unit).factor / parse_unit(to_unit).factor
-
-
 def sources(quantities: Mapping[str, Quantity]) -> dict[str, float]:
     """Return the share of numbers per kind of evidence: ``assumed`` and ``sourced``.
 

@@ -94,11 +94,6 @@ class RelativeSpread(Spread):
     ----------
     relative
         At least zero, without a unit: 0.1 for ± 10 %.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is negative or not a number.
     """
 
     relative: float
@@ -166,11 +161,6 @@ class NormalSpread(Spread):
     ----------
     size
         Standard deviation in SI.
-
-    Raises
-    ------
-    ValueRangeError
-        If it is not above zero, or not finite.
     """
 
     size: float

@@ -1,4 +1,7 @@
-"""Long work on a design: whole design, tolerance cloud, torque loop, diagnosis, files; each in a process."""
+"""Long work on a design: whole design, tolerance cloud, torque loop, diagnosis, files; each in a process.
+
+Whether a checked design can be made, will hold, and its torque can be known: yes, no, or unknown.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,14 +30,19 @@ from ..design import (
     tolerance_analysis,
     write_drawings,
 )
+from ..design.drawing.making import process_of
 from ..design.jobs.written_design import declared_edge
+from ..design.optimisation.defaults import strain_ends
+from ..design.optimisation.limits import limit_kinds
 from ..design.parametric.parametric_solver import ParametricDesign
+from ..feedback.observer import least_torque_error, observer_bench
 from ..foundation.arrays import Array
-from ..foundation.errors import ConvergenceError, InfeasibleError, ValueRangeError, unknown_name
+from ..foundation.errors import ConvergenceError, InfeasibleError, NlsError, ValueRangeError, unknown_name
 from ..foundation.written_numbers import prefixed
-from ..model import flatten
+from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_cam, series_spring
 from ..model.transform import with_outputs
+from ..simulation import declared_prior
 from .answers import (
     AnswerSource,
     AnswerState,
@@ -46,9 +54,97 @@ from .answers import (
 )
 from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
-from .lights import Light, lights_of
 from .question import LiveQuestion
 from .views import in_words, not_kept, unkept, view_of
+
+_LARGEST_ERROR = 0.05
+"""Assumed: part of the largest torque by which a made spring may err, and its torque may be unknown, rms."""
+_BROKEN = 5e-4
+_STRENGTHS = {
+    "rubber": {"MaximumStrain", "MaximumStress"},
+    "cable": {"MaximumCableTension"},
+    "coil": {"GoodmanSafety"},
+}
+"""Limits of which one at least must hold of what a spring is made of, or nobody knows whether it holds."""
+YES, NO, UNKNOWN = "yes", "no", "unknown"
+
+
+class Light(NamedTuple):
+    """One question that decides whether a design is worth building."""
+
+    asked: str  # "can be made", "will hold" or "will be known"
+    answer: str  # "yes", "no" or "unknown"
+    words: str  # by what
+
+
+def lights_of(design: CamDesign, keep: tuple[Limit, ...]) -> tuple[Light, ...]:
+    """Return the three lights of a finished design.
+
+    ``keep``: all limits that held.
+    """
+    model = flatten(design.actuator)
+    return (
+        Light("can be made", *can_be_made(design, model)),
+        Light("will hold", *will_hold(design, model, {type(each).__name__ for each in keep})),
+        Light("will be known", *will_be_known(model, design.target.largest)),
+    )
+
+
+def can_be_made(design: CamDesign, model: FlatModel) -> tuple[str, str]:
+    """Return whether the edge can be cut and made springs are alike enough: answer and reason."""
+    largest, made = design.target.largest, design.tolerance
+    if not design.met:
+        return NO, f"even with exact numbers the torque errs by {prefixed(design.rms)} rms"
+    kind, radius = declared_edge(design.actuator, series_cam(model))
+    if radius is None:
+        return UNKNOWN, "the deck declares no cable, so that there is no edge to cut"
+    try:
+        part = kind(**{"cable_radius": radius}).part(design.contour)  # type: ignore[arg-type]
+    except NlsError as error:
+        return NO, str(error)
+    if made is None or not made.causes:
+        return UNKNOWN, "the deck declares no spread, so that nobody knows how made springs differ"
+    built, trim = made.quantiles[-1].value, made.trims[0] if made.trims else None
+    words = f"95 % of made springs err by less than {prefixed(built)} rms"
+    if trim is not None and built > _LARGEST_ERROR * largest:
+        words += f", {prefixed(trim.quantiles[-1].value)} once {trim.name} is set on the bench"
+        built = trim.quantiles[-1].value
+    if built > _LARGEST_ERROR * largest:
+        return (
+            NO,
+            f"{words}; {prefixed(_LARGEST_ERROR * largest)} would do: tighten {made.tighten_first}",
+        )
+    return YES, f"{words}; {process_of(part)}"
+
+
+def will_hold(design: CamDesign, model: FlatModel, kept: set[str]) -> tuple[str, str]:
+    """Return whether limits and what is stated of the rubber hold: answer and reason."""
+    strengths = [each for each in design.limits if each.limit in limit_kinds()]
+    for each in strengths:
+        past = (each.value - each.bound) * (1.0 if each.upper else -1.0)
+        if past > _BROKEN * abs(each.bound):
+            kind = limit_kinds()[each.limit]
+            return NO, f"{each.of} is {kind.shown(each.value)}, allowed {kind.shown(each.bound)}"
+    for name, end in strain_ends(model).items():
+        if max(design.curves.strains[name]) > end.strain * (1.0 + _BROKEN):
+            return NO, f"{name} is stretched further than is stated of it"
+    cam = series_cam(model)
+    parts = {"rubber": cam.specimens, "cable": cam.cable, "coil": cam.coils}
+    unstated = [name for name, there in parts.items() if there and not kept & _STRENGTHS[name]]
+    if unstated:
+        return UNKNOWN, f"no strength is declared, and no limit set, of {' and '.join(unstated)}"
+    return YES, f"within its limits: {', '.join(sorted({each.of for each in strengths}))}"
+
+
+def will_be_known(model: FlatModel, largest: float) -> tuple[str, str]:
+    """Return whether sensors and spreads let an observer know the torque: answer and reason."""
+    try:
+        least = least_torque_error(observer_bench(model))(declared_prior(model))
+    except NlsError as error:
+        return UNKNOWN, str(error)
+    words = f"no observer errs by less than {prefixed(least)} rms over the declared spreads"
+    return (YES if least <= _LARGEST_ERROR * largest else NO), words
+
 
 MOST_DRAWS = 2000
 _FEWEST_DRAWS = 20

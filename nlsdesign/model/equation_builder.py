@@ -8,8 +8,7 @@ from dataclasses import replace
 import casadi as ca
 
 from ..components.assembly.named_parts import Assembly
-from ..components.core.element import UNBOUNDED, Range, Tie
-from ..components.core.switches import Jump, Kink, StictionConstraint
+from ..components.core.element import UNBOUNDED, Jump, Kink, Range, StictionConstraint, Tie
 from ..foundation.errors import ArrangementError
 from ..foundation.symbolic import Expression, depends, symbol
 from .flat import Variable

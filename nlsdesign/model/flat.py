@@ -12,10 +12,9 @@ import numpy as np
 
 from ..foundation.arrays import Array
 from ..foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
-from ..foundation.quantity import Quantity, changed_source, same_dimension, with_unit
+from ..foundation.quantity import Quantity, changed_source, same_dimension, typeset_unit, with_unit
 from ..foundation.spread import EXACT, Spread, as_spread
 from ..foundation.symbolic import Expression
-from .notebook_view import model_html
 from .origin import Origin
 from .readings import ReadingNames
 from .structure import MovingBody, SpringNames
@@ -506,9 +505,13 @@ class FlatModel:
 
     def _repr_html_(self) -> str:
         """Return the model as a block with its signals, and its equations, for notebooks."""
-        return model_html(
-            self.name, self.description, (self.inputs, self.states, self.outputs), self._latex()
-        )
+        from .symbolic_view import model_html
+
+        groups = [
+            [f"{v.name} [{typeset_unit(v.unit) or '1'}]" for v in group]
+            for group in (self.inputs, self.states, self.outputs)
+        ]
+        return model_html(self.name, self.description, groups, self._latex())
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
         """Return text, equations and picture; a notebook takes the richest that it can show."""
@@ -591,3 +594,19 @@ def casadi_dae(model: FlatModel) -> dict[str, ca.SX]:
         )
     s = model.symbols()
     return {"t": s.time, "x": s.state, "u": s.input, "p": s.parameter, "ode": s.derivative, "y": s.output}
+
+
+def equations(model: FlatModel) -> Equations:
+    """Return the equations of a flat model as SymPy expressions; the same as ``model.symbolic_equations()``.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+
+    Raises
+    ------
+    ExportError
+        If a law uses an operation that has no SymPy counterpart here.
+    """
+    return model.symbolic_equations()

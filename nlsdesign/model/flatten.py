@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..components.assembly.named_parts import Assembly
-from ..components.assembly.sensor_chains import source_problems
+from ..components.assembly.named_parts import Assembly, source_problems
 from ..components.core.element import Tie, observed_effort
 from ..components.mechanics.bodies import Body, Motion
 from ..components.sensing.sensors import Sensor

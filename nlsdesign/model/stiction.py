@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from ..components.core.switches import StictionConstraint
+from ..components.core.element import StictionConstraint
 from ..foundation.errors import ArrangementError
 from ..foundation.symbolic import Expression, depends
 from .equation_builder import EquationBuilder

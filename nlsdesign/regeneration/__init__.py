@@ -8,22 +8,21 @@ that a room below can decide alone.
 
 from .exported_machine import MACHINE as MACHINE
 from .exported_machine import export_machine
+from .fitted_poles import FittedPoles as FittedPoles
 from .fitted_poles import fit_poles
 from .flash import require_flash as require_flash
 from .flash import sized_observer
 from .loadable_code import CodeRecipe, SameTable, block_for
-from .pole_errors import FittedPoles as FittedPoles
-from .range_remarks import beyond_contour as beyond_contour
-from .range_remarks import range_remarks
-from .range_remarks import swept_angle as swept_angle
-from .range_remarks import usual_last as usual_last
 from .readiness import Readiness as Readiness
+from .readiness import beyond_contour as beyond_contour
 from .readiness import errors_while_running as errors_while_running
-from .readiness import readiness
-from .regenerated_controller import RegeneratedController as RegeneratedController
+from .readiness import range_remarks, readiness
+from .readiness import swept_angle as swept_angle
+from .readiness import usual_last as usual_last
+from .regenerated_observer import RegeneratedController as RegeneratedController
 from .regenerated_observer import Regeneration, regenerate, write_regeneration
 from .watch_model import watch_plan
-from .watch_reading import WatchedChange, WatchVerdict, read_watch
+from .watch_reading import read_watch
 from .watched_records import ObserverChoice
 
 __all__ = [
@@ -31,8 +30,6 @@ __all__ = [
     "ObserverChoice",
     "Regeneration",
     "SameTable",
-    "WatchVerdict",
-    "WatchedChange",
     "block_for",
     "export_machine",
     "fit_poles",

@@ -18,8 +18,7 @@ from ..model import Table
 from .buffered import Translate, as_it_is
 from .column_graph import ColumnGraph, NotByColumnsError, column_graph
 from .numpy_columns import NumpyColumns
-from .sample_writer import SampleWriter
-from .sampled_system import SampledSystem
+from .sample_writer import SampledSystem, SampleWriter
 
 CHUNK = 250
 """Samples that one call computes; between calls a run can be interrupted."""

@@ -65,7 +65,7 @@ def sine(name: str, amplitude: float, frequency: float, *, offset: float = 0.0) 
     frequency
         In Hz.
     offset
-        In the unit of the input.
+        About which it swings, in the same unit.
 
     Examples
     --------

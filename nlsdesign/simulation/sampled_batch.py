@@ -20,8 +20,7 @@ from ..foundation.arrays import Array, Mask
 from ..foundation.errors import ValueRangeError, unknown_name
 from .buffered import Translate, as_it_is
 from .column_runs import CHUNK, column_run
-from .sample_writer import SampleWriter
-from .sampled_system import PLANT, SampledSystem
+from .sample_writer import PLANT, SampledSystem, SampleWriter
 
 Course = Callable[[float], float] | float | Array
 """An input: a function of time, a constant, or values at the samples, shape (T,) or (runs, T)."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..foundation.arrays import Array
-from ..foundation.data_frames import Axis, data_frame, data_set
+from ..foundation.csv_tables import Axis, data_frame, data_set
 from ..foundation.errors import MeasurementError, unknown_name
 from ..foundation.quantity import parse_unit, with_unit
 from ..foundation.text_files import write_table

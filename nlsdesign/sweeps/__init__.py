@@ -3,13 +3,12 @@
 The report of a sweep and the command import it. It decides no physics: questions ask the rooms below.
 """
 
-from .axes import GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axes import GridAxis, LatinHypercube, Listed, RandomDraws, SaltelliSample, SobolSample
 from .preferences import Preference, Requirement
 from .questions import AngleQuestion, DesignQuestion, DiagnosisQuestion, LoopQuestion, SpreadQuestion
 from .run_sweep import SweepSettings as SweepSettings
 from .run_sweep import SweepTask, sweep
 from .run_sweep import run_task as run_task
-from .saltelli import SaltelliSample
 from .sweep_columns import SweepColumn
 from .sweep_columns import libraries as libraries
 from .sweep_file import read_sweep_file as read_sweep_file

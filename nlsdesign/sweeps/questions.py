@@ -26,8 +26,7 @@ from ..foundation.errors import ArrangementError, MeasurementError, ValueRangeEr
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, passed_ends, series_spring
 from ..model.transform import with_outputs
-from .axis_values import in_unit, si_unit
-from .changes import ASK
+from .axis_values import ASK, in_unit, si_unit
 from .run_sweep import same_bits
 from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer, worst

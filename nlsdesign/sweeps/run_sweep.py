@@ -24,11 +24,9 @@ from ..foundation.work_sharing import Executor, PointOutcome, Processes, shared_
 from ..simulation.column_graph import ColumnGraph, NotByColumnsError
 from ..simulation.column_runs import ColumnRun
 from .axes import AxisSet
-from .axis_values import Subject
-from .changes import DECK
+from .axis_values import DECK, Subject
 from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn, libraries
-from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
-from .sweep_plan import PointPlan
+from .sweep_folder import PointPlan, about_sweep, contents_of, only_run, opened, written_about
 from .sweep_question import PointWork, SweepQuestion
 from .sweep_table import SweepTable, read_sweep
 

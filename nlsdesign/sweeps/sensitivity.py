@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..foundation.arrays import Array, Mask
 from ..foundation.errors import missing_library
 from .answer_statistics import codes, dependent_axes
-from .saltelli import SaltelliForm, saltelli_plan
+from .axes import SaltelliForm, saltelli_plan
 from .sweep_columns import SALTELLI
 
 FEWEST_POINTS: Final = 200

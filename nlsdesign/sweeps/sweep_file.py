@@ -17,7 +17,7 @@ from ..foundation.errors import DeckError, NlsError, UnitError, brief, unknown_n
 from ..foundation.quantity import parse_unit, same_dimension
 from ..foundation.text_files import text_of
 from ..foundation.written_numbers import split_number
-from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SaltelliSample, SobolSample
 from .axis_values import unit_of_field
 from .questions import (
     QUICK,
@@ -29,7 +29,6 @@ from .questions import (
     SpreadQuestion,
 )
 from .run_sweep import SweepTask, require_askable, sweep_task
-from .saltelli import SaltelliSample
 from .sweep_question import SweepQuestion
 
 _TABLES: Final = ("decks", "axes", "ask")

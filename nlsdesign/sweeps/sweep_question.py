@@ -17,8 +17,7 @@ from typing import Any
 from ..components.assembly.named_parts import Assembly
 from ..foundation.errors import ValueRangeError, WorkSharingError, brief
 from ..foundation.quantity import Quantity
-from .axis_values import with_settings
-from .changes import ASK, changed_assembly
+from .axis_values import ASK, changed_assembly, with_settings
 from .sweep_columns import SweepColumn
 
 

@@ -17,7 +17,7 @@ from ..foundation.arrays import Mask
 from ..foundation.deck import read_deck
 from ..foundation.errors import DeckError, MeasurementError, NlsError, unknown_name
 from ..foundation.text_files import is_there, text_of
-from .changes import changed_assembly
+from .axis_values import changed_assembly
 from .sweep_columns import DONE, RESULTS_FILE, SweepColumn, give_back, libraries, numpy_column, read_columns
 from .sweep_parts import rows_in_order
 

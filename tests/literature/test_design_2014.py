@@ -16,9 +16,9 @@ from nlsdesign.components import Domain
 from nlsdesign.components.core.element import MATERIAL, Scope
 from nlsdesign.components.core.springs import Elastic
 from nlsdesign.design import design_cam
-from nlsdesign.design.statics.energy import energy_profile
 from nlsdesign.foundation.symbolic import Expression
 from tests.cam_cases import ALONE, CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, NeoHooke, actuator
+from tests.closed_form import energy_profile
 
 # Average tensile curve of PMC-770, ICRA 2014, Fig. 3: stretch, force in N of an element of 1 cm² and 12.5 mm.
 TENSILE = np.array(

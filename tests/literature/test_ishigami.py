@@ -16,7 +16,7 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.sweeps import FunctionQuestion, SaltelliSample
 from nlsdesign.sweeps.axis_values import Subject
 from nlsdesign.sweeps.sensitivity import AnswerSensitivity, sensitivity
-from nlsdesign.sweeps.sweep_plan import PointPlan
+from nlsdesign.sweeps.sweep_folder import PointPlan
 
 PARTS = (0.5 * (1.0 + 0.1 * np.pi**4 / 5.0) ** 2, 7.0**2 / 8.0, 8.0 * 0.1**2 * np.pi**8 / 225.0)
 FIRST = {"x1": PARTS[0] / sum(PARTS), "x2": PARTS[1] / sum(PARTS), "x3": 0.0}

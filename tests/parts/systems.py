@@ -7,9 +7,7 @@ from nlsdesign.components import (
     ROTATION,
     TRANSLATION,
     Assembly,
-    Body,
     Cam,
-    Controller,
     DrivePart,
     Element,
     Encoder,
@@ -23,13 +21,15 @@ from nlsdesign.components import (
     Sensor,
     Spring,
     Tie,
-    Transmission,
     specimen,
     through,
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.components.core.part_numbers import readings
+from nlsdesign.components.mechanics.bodies import Body
+from nlsdesign.components.mechanics.controllers import Controller
+from nlsdesign.components.mechanics.gear import Transmission
 
 EXAMPLES: list[Part] = []
 """None here; every module of this folder has the list."""

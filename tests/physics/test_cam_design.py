@@ -7,8 +7,8 @@ import pytest
 
 from nlsdesign.design import CamDesign, design_cam
 from nlsdesign.design.statics.contour import contour_from_curvature
-from nlsdesign.design.statics.energy import energy_profile
 from tests.cam_cases import ALONE, CONCAVE, CONTOUR, CONVEX, KEEP, PRETENSION, TARGET, actuator
+from tests.closed_form import energy_profile
 
 
 def rms_of(nodes: np.ndarray, radii: np.ndarray, first: float, pretension: float) -> float:

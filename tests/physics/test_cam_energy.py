@@ -11,11 +11,12 @@ from nlsdesign.components.core.element import Scope
 from nlsdesign.design import PowerTorque, elastic_law, equilibrium_torque
 from nlsdesign.design.optimisation.finish import torque_check
 from nlsdesign.design.statics.declared_cam import cam_from_profile
-from nlsdesign.design.statics.energy import CamProfile, energy_profile
+from nlsdesign.design.statics.energy import CamProfile
 from nlsdesign.foundation.errors import InfeasibleError
 from nlsdesign.foundation.symbolic import Expression
 from nlsdesign.model import flatten
 from tests.cam_cases import CONCAVE, CONVEX, TARGET, actuator
+from tests.closed_form import energy_profile
 
 LAWS: dict[str, Element] = {
     "linear": LinearElastic(modulus=1.2e6),

@@ -15,7 +15,6 @@ from nlsdesign.export import natively
 from nlsdesign.feedback.control import (
     ClosedLoop,
     TorqueGains,
-    coupled_stability,
     encoder_loop,
     largest_torque,
     loop_margins,
@@ -27,6 +26,7 @@ from nlsdesign.feedback.control import (
     zero_torque,
 )
 from nlsdesign.feedback.control.evaluation.linear_loop import linear_loop
+from nlsdesign.feedback.control.evaluation.margins import coupled_stability
 from nlsdesign.feedback.control.evaluation.responses import torque_resolution
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck

@@ -31,7 +31,7 @@ from nlsdesign.feedback.analysis import (
     rest_points,
     sampled_poles,
 )
-from nlsdesign.feedback.analysis.stability import least_damped
+from nlsdesign.feedback.analysis.sweep import least_damped
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer
 from nlsdesign.feedback.observer.scheduling.scheduled import error_matrices
 from nlsdesign.foundation.deck import load_deck

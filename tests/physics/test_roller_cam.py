@@ -15,7 +15,8 @@ from scipy.optimize import minimize_scalar
 
 from nlsdesign.components import Driven, RollerCam, SlidingGuide, Spring, through, tie
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.design import RollerContour, contour_of_cam
+from nlsdesign.design import contour_of_cam
+from nlsdesign.design.statics.contour import RollerContour
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate

@@ -20,11 +20,11 @@ from nlsdesign.design import (
     MachinedRollerCam,
     MaximumPressureAngle,
     MaximumStrain,
-    RollerContour,
     TabulatedTorque,
     design_cam,
     write_design,
 )
+from nlsdesign.design.statics.contour import RollerContour
 from nlsdesign.foundation.quantity import quantity
 from tests.cam_cases import CONTOUR, PRETENSION, actuator
 from tests.dxf_reading import entities_of, header_of, offset_points, polylines_of

@@ -15,7 +15,6 @@ import pytest
 from scipy.optimize import linprog, minimize, minimize_scalar, nnls
 
 from nlsdesign.design import (
-    BesideCurve,
     LeastPeakPower,
     MotorAndGear,
     SpringLimits,
@@ -26,6 +25,7 @@ from nlsdesign.design import (
     curve_for_task,
     walking_task,
 )
+from nlsdesign.design.curves.beside import BesideCurve
 from nlsdesign.foundation.errors import InfeasibleError, ValueRangeError
 
 DRIVE = MotorAndGear(inertia=1.4e-5, torque_constant=0.03, resistance=0.3, gear_ratio=60.0)

@@ -22,7 +22,7 @@ from ..identification.covariance import Piece, inverse_information, robust_covar
 from ..identification.least_squares import Minimum, huber_rows, minimise
 from ..identification.records.quality import Finding
 from ..identification.records.table_files import table_files
-from .bench_rows import BenchRows
+from .bench_response import BenchRows
 from .bench_test import WEIGHT, CalibrationTest
 from .unknowns import BenchEvidence, Unknowns, recorded_bench
 

@@ -17,8 +17,19 @@ from ...simulation import Prior, declared_prior
 from ..discrepancy.block_prediction import shown_values
 from ..identification import Record
 from ..identification.covariance import Piece
-from .bench_response import BALANCE, BenchCourse, BenchResponse, bench_response, shared_factors
-from .bench_rows import BenchRows, RecordedRun, SampleNoise, rate_of, rows_of, window_length
+from .bench_response import (
+    BALANCE,
+    BenchCourse,
+    BenchResponse,
+    BenchRows,
+    RecordedRun,
+    SampleNoise,
+    bench_response,
+    rate_of,
+    rows_of,
+    shared_factors,
+    window_length,
+)
 from .bench_test import WEIGHT, CalibrationTest, HungWeightTest
 
 LEAST_ROWS = 8

@@ -12,10 +12,10 @@ from .multiple_shooting import (
     fit_by_simulation,
     predict_in_windows,
 )
-from .parameters import Parameter, declared_parameter, free_parameter
+from .parameters import Parameter, free_parameter
+from .records.column_heads import read_input_columns as read_input_columns
 from .records.description import RecordsDescription as RecordsDescription
 from .records.description import describe_records
-from .records.input_columns import read_input_columns as read_input_columns
 from .records.measurement import ColumnMap, Record, RecordSet, load_record, load_records
 from .residuals import Agreement, agreement, noise_of, rmse
 from .simulation_error import Shots, Weights
@@ -33,7 +33,6 @@ __all__ = [
     "Weights",
     "agreement",
     "coloured_sigma",
-    "declared_parameter",
     "describe_records",
     "fit_by_simulation",
     "free_parameter",

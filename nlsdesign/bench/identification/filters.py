@@ -65,7 +65,7 @@ def blurred(signal: Array, step: float, *, span: float) -> Array:
     """Return what a span takes from the rate of a signal: that between neighbours less that over the span.
 
     Where the span has too few samples for quartics, the rate over it is the one on a finer clock, on which a
-    record may be read, see :mod:`.equation_error.between_samples`.
+    record may be read, see :mod:`.equation_error.evidence`.
     """
     times = max(1, math.ceil(_LEAST_POINTS * step / span))
     finer = signal

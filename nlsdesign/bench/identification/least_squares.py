@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ...foundation.arrays import Array, Mask
-from ...foundation.errors import ConvergenceError, ValueRangeError
+from ...foundation.errors import ConvergenceError
 from .covariance import Piece, covariance_by_records, inverse_information, robust_covariance
 from .equation_error.evidence import Evidence
 from .parameters import Parameter as Parameter
@@ -30,8 +30,6 @@ from .parameters import box
 from .parameters import declared_parameter as declared_parameter
 from .residuals import autocorrelation
 
-_95 = 1.9207
-"""Half of the 95 % quantile of χ² with one degree of freedom."""
 ENOUGH = 0.02
 """A predicted gain of half a sum of squares below this cannot matter to any decision on noisy data."""
 _LONGEST = 1.5
@@ -520,56 +518,3 @@ def covariance_of(residual: Array, slope: Array, priors: int) -> Array:
     strength, axes = np.linalg.eigh(information)
     result: Array = np.asarray((axes / np.maximum(strength, _LEAST_INFORMATION)) @ axes.T, dtype=np.float64)
     return result
-
-
-@dataclass(frozen=True, eq=False)
-class Profile:
-    """The profile of one number."""
-
-    name: str
-    # value, rise: held values in SI, ascending, and how much the cost lies above its minimum; shape (n,)
-    value: Array
-    rise: Array
-    # lower, upper: ends of the 95 % interval, where the rise passes 1.92; infinite where it never does: there
-    # the records leave the number open
-    lower: float
-    upper: float
-
-    def words(self) -> str:
-        """Return what the records say of the number, in a sentence."""
-        sides = [s for s, end in (("below", self.lower), ("above", self.upper)) if not np.isfinite(end)]
-        if not sides:
-            return f"{self.name}: between {self.lower:.4g} and {self.upper:.4g} (95 %)"
-        known = "" if len(sides) == 2 else f", {'at least' if np.isfinite(self.lower) else 'at most'} "
-        known += "" if len(sides) == 2 else f"{self.lower if np.isfinite(self.lower) else self.upper:.4g}"
-        return f"{self.name}: not bounded {' or '.join(sides)} by the records{known}"
-
-
-def profile_of(
-    fit: Fit, name: str, refit: Callable[[str, float], Fit], *, points: int = 9, reach: float = 3.0
-) -> Profile:
-    """Hold a number at several values and fit the others again."""
-    names = [p.name for p in fit.parameters]
-    if name not in names or points < 5:
-        raise ValueRangeError(f"profile of '{name}' with {points} points", "needs a fitted number and five")
-    parameter = fit.parameters[names.index(name)]
-    centre = parameter.inward(fit.values[name])
-    width = fit.standard_error(name) / abs(parameter.slope(fit.values[name]))
-    values = [parameter.outward(centre + reach * width * k) for k in np.linspace(-1.0, 1.0, points)]
-    inside = [v for v in values if parameter.lower <= v <= parameter.upper]
-    rise = np.array([refit(name, v).cost - fit.cost for v in inside])
-    value = np.array(inside)
-    return Profile(name, value, rise, _end(value, rise, -1), _end(value, rise, 1))
-
-
-def _end(value: Array, rise: Array, side: int) -> float:
-    """Return where the rise passes its limit on one side; its root runs nearly straight."""
-    best = int(np.argmin(rise))
-    rows = range(best, len(value) if side > 0 else -1, side)
-    root = np.sqrt(np.maximum(rise, 0.0))
-    limit = float(np.sqrt(_95))
-    for one, other in zip(rows, list(rows)[1:], strict=False):
-        if root[other] >= limit:
-            share = (limit - root[one]) / (root[other] - root[one])
-            return float(value[one] + share * (value[other] - value[one]))
-    return side * float("inf")

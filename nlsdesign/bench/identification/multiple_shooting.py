@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, MeasurementError, missing_library
 from ...model import FlatModel
 from .least_squares import Fit, Loss, covariance_of
-from .parameters import Parameter, box
+from .parameters import Parameter
 from .records.measurement import Record
 from .residuals import effective_size, rmse
 from .simulation_error import Linear, Point, Shots, SimulationError, Weights
@@ -46,12 +46,6 @@ class SimulatedFit:
     point: Point  # fitted scale, and the state at the beginning of each window
     problem: SimulationError  # what was minimised; its residual can be asked at other points
     iterations: int  # steps taken
-
-    @property
-    def first_states(self) -> dict[str, Array]:
-        """State at the first sample by name of the record."""
-        pairs = zip(self.problem.records, self.point.starts, strict=True)
-        return {record.name: start[0] for record, start in pairs}
 
 
 class _Place(NamedTuple):
@@ -221,11 +215,6 @@ def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:
     }
 
 
-def without(fit: SimulatedFit, name: str) -> tuple[Parameter, ...]:
-    """Return the parameters of a fit, at their fitted values, without one of them."""
-    return tuple(replace(p, start=fit.fit.values[p.name]) for p in fit.fit.parameters if p.name != name)
-
-
 class Prediction(NamedTuple):
     """A record as predicted in windows.
 
@@ -290,49 +279,6 @@ def predict_in_windows(
     rows = problem.residual(problem.start()).reshape(len(problem.sigma), -1) * problem.sigma[:, None]
     error = {name: rows[i, :kept] for i, name in enumerate(problem.wiring.outputs)}
     return Prediction(record.trace.time[:kept], error)
-
-
-@dataclass(frozen=True)
-class Evolved:
-    """Where CMA-ES ended."""
-
-    values: dict[str, float]  # in SI by name
-    cost: float  # half the sum of squares of residuals and priors, as of fit_by_simulation
-    simulations: int  # how often all records were simulated
-
-
-def fit_by_cma(
-    model: FlatModel,
-    records: Sequence[Record],
-    parameters: Sequence[Parameter],
-    *,
-    shots: Shots,
-    weights: Weights | None = None,
-    seed: int = 1,
-    simulations: int = 5000,
-) -> Evolved:
-    """Fit parameters with the evolution strategy of Hansen and Ostermeier 2001.
-
-    ``model``, ``records``, ``parameters``, ``shots``, ``weights``: as for :func:`fit_by_simulation`; the
-    windows must be apart, since nothing here joins them. ``seed``: of the random numbers; the same seed gives
-    the same result.
-    """
-    if shots.joined:
-        raise ConvergenceError(
-            "a fit by CMA-ES", "cannot join windows", next_step="use Shots(length, joined=False)"
-        )
-    problem = SimulationError(model, records, parameters, shots=shots, weights=weights, slopes=False)
-    starts = problem.start().starts
-
-    def cost(x: Array) -> float:
-        try:
-            residual = problem.residual(Point(x, starts))
-        except ConvergenceError:
-            return _FAILED
-        return 0.5 * float(residual @ residual)
-
-    best, least, count = least_by_cma(cost, box(parameters), seed=seed, simulations=simulations)
-    return Evolved(problem.values(best), least, count)
 
 
 def least_by_cma(

@@ -90,12 +90,8 @@ def declared_parameter(variable: Variable, start: float | None = None) -> Parame
     spread has a unit in a straight line too; one of a range within that range, each value as likely. Other
     fits stop at three standard deviations.
 
-    Parameters
-    ----------
-    variable
-        Parameter of a flat model that is not known exactly.
-    start
-        Where to begin; at the declared value by default.
+    ``variable``: parameter of a flat model that is not known exactly. ``start``: where to begin; at the
+    declared value by default.
     """
     value, spread = variable.start, variable.spread
     logarithmic = value > 0.0 and isinstance(spread, RelativeSpread)

@@ -25,7 +25,7 @@ from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
 from .library_rubber import FIELDS, takes_material, with_library_rubber
-from .renamed import NUMBERS, renamed
+from .part_text import NUMBERS, renamed
 
 _PARENT_FIELDS = ("name", "digest", "change", "parent")
 

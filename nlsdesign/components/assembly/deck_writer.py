@@ -16,9 +16,8 @@ from ..core.part import Part
 from ..mechanics.gear import Transmission
 from ..sensing.sensors import Sensor
 from .deck_reader import Builder
-from .named_parts import Assembly, arrangement_problems
+from .named_parts import Assembly, arrangement_problems, source_problems
 from .part_text import part_lines, text_of
-from .sensor_chains import source_problems
 
 
 def deck_problems(deck: Deck) -> list[NlsError]:

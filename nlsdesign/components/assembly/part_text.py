@@ -1,4 +1,7 @@
-"""Parts as the text of a deck: tables, numbers that read back exactly, texts."""
+"""Parts as the text of a deck: tables, numbers that read back exactly, texts.
+
+Names that components and their numbers had before, and what to write instead.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from fractions import Fraction
 from itertools import chain
 
 from ...foundation.deck import Written
+from ...foundation.errors import UnknownNameError
 from ...foundation.quantity import Quantity, parse_unit
 from ...foundation.spread import NormalSpread, RelativeSpread, UniformSpread
 from ..core.part import Part
@@ -60,3 +64,47 @@ def _shortest(value: float, factor: float) -> str:
     # Where no float times the factor is the value, the text has more digits than a float.
     long = (str(Context(prec=n).divide(exact.numerator, exact.denominator)) for n in range(17, 40))
     return next(text for text in chain(short, long) if Written(text).times(factor) == value)
+
+
+COMPONENTS: dict[str, str] = {
+    "CableGuide": "CapstanFriction with guide=WrapProduct(wrap=...); in a deck with wrap",
+    "ConstantForce": "ConstantLoad, with its load in N",
+    "DryFriction": "CoulombFriction, which sticks unless it has a creep_speed",
+    "DryLoadFriction": "LoadFriction, which sticks unless it has a creep_speed",
+    "DryStribeckFriction": "StribeckFriction, which sticks unless it has a creep_speed",
+    "DelayedForceSensor": "TransportDelay of the force, and a ForceSensor of its reading",
+    "DelayedMotor": 'GearedMotor with chain=(("delay", DriveDelay(...)),); in a deck with [motor.delay]',
+    "DriftingForceSensor": "Drift of the force, and a ForceSensor of its reading",
+    "DrivenPoint": 'Driven with domain=TRANSLATION; in a deck with domain = "translation"',
+    "EccentricEncoder": "Eccentricity of the angle, and an Encoder of its reading",
+    "FixedPoint": 'Fixed with domain=TRANSLATION; in a deck with domain = "translation"',
+    "InertialBacklash": "Backlash with contact=Inertial(inertia=...); in a deck with inertia",
+    "LooseCable": "Slack, which is sharp unless it has a width",
+    "MisshapenCam": "CamWithProfileError",
+    "Play": "Backlash, which is sharp unless it has a width or an inertia",
+    "RoundedEndStop": "EndStop with contact=Rounded(width=...); in a deck with width",
+    "SampledEncoder": "SampleAndHold of the angle, and an Encoder of its reading",
+    "SaturatingMotor": 'GearedMotor with chain=(("saturation", DriveSaturation(...)),); '
+    "in a deck with [motor.saturation]",
+    "SlidingFriction": "CoulombFriction, with its sliding_effort in N",
+    "SmoothStrainStiffening": "StrainStiffening with contact=Rounded(width=...); in a deck with width",
+    "Softening": "StressSoftening with curve=OgdenRoxburgh(...); in a deck with strength and scale",
+    "TensionSet": "PermanentSet with memory=Following(...); in a deck with following",
+    "TorsionDashpot": "Dashpot, with its damping in N·m·s/rad",
+    "TorsionSpring": "Spring, with its stiffness in N·m/rad",
+    "ViscousHeating": "SelfHeating with heat=ViscousHeat(...); in a deck with halving_speed",
+    "WorkHeating": "SelfHeating with heat=WorkHeat(...); in a deck with halving_work",
+}
+"""What stands for a component of an old name: the new name first, then what else to say."""
+
+NUMBERS: dict[str, str] = {"sliding_force": "sliding_effort", "sliding_torque": "sliding_effort"}
+"""New name of a number by its old one."""
+
+
+def renamed(name: str) -> UnknownNameError | None:
+    """Return the error that says the new name of a component; ``None`` if the name was never one."""
+    if name not in COMPONENTS:
+        return None
+    return UnknownNameError(
+        f"component '{name}'", "has another name now", next_step=f"write {COMPONENTS[name]}"
+    )

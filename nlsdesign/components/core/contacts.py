@@ -15,9 +15,8 @@ import casadi as ca
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression, positive_part, smooth_sign
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
-from .element import Element, Scope
+from .element import Element, Scope, dry
 from .part_numbers import Reading, parameter, read_as
-from .switches import dry
 
 Pair = tuple[Expression, Expression]
 Level = Callable[[Expression], Expression]

@@ -10,10 +10,9 @@ from typing import TypeAlias
 
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity
-from ..core.dampers import ViscousMaterial
 from ..core.element import Element, Parallel, parallel
 from ..core.series import Series, series
-from ..core.springs import LinearElastic
+from ..core.springs import LinearElastic, ViscousMaterial
 
 Number: TypeAlias = Quantity | float
 

@@ -13,7 +13,7 @@ from ...foundation.symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION
 from ..core.element import Combination, Scope
 from ..core.part_numbers import Reading, parameter, read_as
-from .memory import following, rising
+from .stress_softening import following, rising
 
 
 @dataclass(frozen=True)

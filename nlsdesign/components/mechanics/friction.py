@@ -10,10 +10,10 @@ import casadi as ca
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
 from ..core.contacts import WithFriction
-from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Combination, Scope
 from ..core.part_numbers import one_of, parameter
+from ..core.springs import Viscous
 
 
 def stribeck(rate: Expression, speed: Expression) -> Expression:

@@ -9,10 +9,10 @@ import casadi as ca
 
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression
-from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
 from ..core.part_numbers import one_of, parameter
+from ..core.springs import Viscous
 from .friction import stribeck
 
 

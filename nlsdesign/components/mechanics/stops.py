@@ -12,12 +12,10 @@ from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression, symbol
 from ..core.contacts import WithCorners
-from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
-from ..core.element import Element, Scope
+from ..core.element import Element, Scope, StictionConstraint
 from ..core.part_numbers import one_of, parameter
-from ..core.springs import Elastic
-from ..core.switches import StictionConstraint
+from ..core.springs import Elastic, Viscous
 
 
 def _check_order(lower: Quantity, upper: Quantity) -> None:

@@ -2,7 +2,7 @@
 
 Decision. A flat model is continuous, so a sensor gives it what is continuous of the reading: gain, bias,
 drift, delay and filter, and the rounding of an encoder as a static function. Noise, exact delay, sample rate
-and hold live in :meth:`Sensor.recorded`, which :func:`nlsdesign.simulation.measure` asks for what the bench
+and hold live in :meth:`Sensor.recorded`, which :func:`nlsdesign.simulation.trace` asks for what the bench
 would have written down of a simulated run. A controller that samples is a discrete flat model of its own with
 its own sample time; a hold inside the plant would count its half sample twice.
 

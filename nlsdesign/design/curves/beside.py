@@ -48,10 +48,7 @@ class EngagedSpring:
     def torque(self, angle: Array) -> Array:
         """Return the torque on the joint in N·m, of the same shape, positive along the angle.
 
-        Parameters
-        ----------
-        angle
-            Of the joint in rad, any shape; beyond the table the torque stays what it is there.
+        ``angle``: of the joint in rad, any shape; beyond the table the torque stays what it is there.
         """
         further = np.clip(self.way * (np.asarray(angle) - self.engaged), 0.0, self.target.last_angle)
         return np.asarray(-self.way * self.target.torque(further))

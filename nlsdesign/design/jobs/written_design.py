@@ -17,11 +17,10 @@ from ...model.structure import CamNames
 from ..curves.numbers import in_unit
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
-from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
-from ..drawing.machined_roller import MachinedRollerCam
+from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedRollerCam, MachinedTwoSidedCam
 from ..drawing.making import Mounting
 from ..optimisation.result import CamDesign
-from ..optimisation.sides import SidesDesign
+from ..optimisation.solve import SidesDesign
 from ..statics.declared_cam import declared_cam
 from .job_file import DesignJob, built
 

@@ -22,15 +22,14 @@ from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contou
 from ..statics.equilibrium import cam_function, torque_function, with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
+from .coil_limits import side_forces
 from .defaults import safe_limits
-from .design_search import Search, carried_over, spans_of
+from .design_search import Search, carried_over, same_design, spans_of
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Solution
 from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
-from .roller_limits import side_forces
-from .several_starts import same_design
 from .shape import INTERVALS
 from .size_ranges import size_ranges
 

@@ -14,7 +14,7 @@ from ...foundation.quantity import Quantity, same_dimension, typeset_unit
 from ...foundation.symbolic import Expression
 from ..curves.numbers import hold_in_si, in_unit, plain
 from ..curves.target import TorqueBand
-from ..statics.roller_contour import STRAIGHT
+from ..statics.contour import STRAIGHT
 from .design_point import DesignPoint, anchor_of
 from .edges import EdgeRow
 from .goals import Goal

@@ -21,21 +21,21 @@ import numpy as np
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
-from ...foundation.data_frames import Axis, data_frame
+from ...foundation.csv_tables import Axis, data_frame
 from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...foundation.quantity import parse_unit, typeset_unit
 from ...foundation.text_files import write_table
 from ...foundation.work_sharing import parallel_map
 from ..curves.numbers import in_unit
 from ..curves.target import Target
-from .conflict import feasible_point
+from .defaults import DesignSettings
 from .design_search import Search
 from .finish import SolvedSearch, finished, limit_state
 from .goals import Goal, GoalMeasure, SmoothContour
 from .limits import Limit, MaximumTorqueError
 from .program import Program, Rows, Solution
+from .remedies import feasible_point
 from .result import CamDesign
-from .settings import DesignSettings
 from .shape import starts
 from .solve import USUAL, Wanted
 

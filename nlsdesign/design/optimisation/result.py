@@ -10,7 +10,7 @@ import numpy as np
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
-from ...foundation.data_frames import Axis, data_frame
+from ...foundation.csv_tables import Axis, data_frame
 from ...foundation.quantity import MM, Quantity, parse_unit
 from ...foundation.written_numbers import prefixed, without_power
 from ...model.structure import CamNames

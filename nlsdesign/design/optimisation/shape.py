@@ -16,10 +16,9 @@ from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ...model.structure import CamNames
-from ..statics.contour import Contour, contour_from_curvature
+from ..statics.contour import Contour, RollerContour, contour_from_curvature, roller_contour
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
-from ..statics.roller_contour import RollerContour, roller_contour
 from .design_point import DesignPoint
 from .edges import CableEdge, Edge, RollerEdge
 from .limits import Bound

@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...components.assembly.library_rubber import with_rubber
+from ...components.assembly.library_rubber import placed_coil, with_rubber
 from ...components.assembly.named_parts import Assembly
-from ...components.assembly.stocked_coil import placed_coil
 from ...foundation.errors import ArrangementError, NlsError, ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity
 from ...foundation.rubber_library import material

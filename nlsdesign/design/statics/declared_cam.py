@@ -18,8 +18,7 @@ from ...components.transmission.roller_cam import RollerCam
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity, significant
-from .contour import Contour, contour_from_lever_arm
-from .roller_contour import RollerContour, roller_contour
+from .contour import Contour, RollerContour, contour_from_lever_arm, roller_contour
 
 Made = TypeVar("Made", bound=Cam)
 

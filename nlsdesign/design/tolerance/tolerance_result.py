@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import bdtr
 
 from ...foundation.arrays import Array
-from ...foundation.data_frames import Axis, data_frame
+from ...foundation.csv_tables import Axis, data_frame
 from ...foundation.quantity import parse_unit, with_unit
 from ...foundation.written_numbers import prefixed, shared_prefix, without_power
 from ..curves.target import Target

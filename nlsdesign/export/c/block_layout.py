@@ -96,10 +96,7 @@ class BlockLayout:
     def offset(self, member: str) -> int:
         """Return the bytes before a member of the structure.
 
-        Parameters
-        ----------
-        member
-            Name of a member.
+        ``member``: name of a member.
         """
         fields: Any = self.record.fields
         return int(fields[member][1])
@@ -114,19 +111,8 @@ class BlockLayout:
     def block(self, numbers: BlockNumbers, names: tuple[str, ...], model: FlatModel) -> ParameterBlock:
         """Return the block with the numbers of another design.
 
-        Parameters
-        ----------
-        numbers
-            As :meth:`LoadableModel.numbers_of` gives them.
-        names
-            Of the parameters, in their order.
-        model
-            The design, with its deck.
-
-        Raises
-        ------
-        ExportError
-            If a number is out of its range.
+        ``numbers``: as :meth:`LoadableModel.numbers_of` gives them. ``names``: of the parameters, in their
+        order. ``model``: the design, with its deck.
         """
         values = dict(zip(names, numbers.parameters, strict=True))
         values |= {v.name: x for v, x in zip(self.coefficients, numbers.coefficients, strict=True)}

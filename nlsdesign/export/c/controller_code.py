@@ -15,11 +15,20 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import write_all
-from .c_text import Real, comment, identifier, signature
+from .c_text import (
+    Real,
+    comment,
+    identifier,
+    interface_version,
+    number_lines,
+    origin_lines,
+    origin_macros,
+    signature,
+    stamped,
+)
 from .elementary import elementary_functions
 from .guarded_step import STATUS_BITS, first_outputs, index_bit
 from .programs import selftest_source
-from .provenance import interface_version, number_lines, origin_lines, origin_macros, stamped
 from .writer import (
     CSource,
     CWriter,

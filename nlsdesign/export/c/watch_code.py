@@ -23,9 +23,8 @@ from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import write_all
 from .block_code import half_byte_sums
-from .c_text import Real, comment, identifier
+from .c_text import Real, comment, identifier, origin_lines, stamped
 from .controller_code import export_c
-from .provenance import origin_lines, stamped
 from .writer import CSource
 
 LENGTH = 20

@@ -8,17 +8,20 @@ Order. Without ``order`` all sampled instances that are due read before any comp
 do: what a sampled instance computes reaches the others one sample later. With ``order`` each reads what
 earlier ones have just computed (Gauss-Seidel): observer and controller before the plant give a loop without
 computing delay. A wire from an instance that stands later carries its previous sample. Any other delay is
-that of the :class:`~nlsdesign.export.cosimulation.wires.Wire`. No delay depends on the communication step;
+that of the :class:`~nlsdesign.export.cosimulation.run_plan.Wire`. No delay depends on the communication step;
 the result lists them in seconds.
+
+How a co-simulation converges when the step is halved again and again.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -34,8 +37,19 @@ from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, re
 from .fmu_instance import FmuInstance
 from .isolation import IsolatedWork, Watch
 from .master import Master
-from .run_plan import Given, Link, Plan, points_of
-from .wires import Wire, as_wire, check_wires, delay_of, ends, gain_to, split_name
+from .run_plan import (
+    Given,
+    Link,
+    Plan,
+    Wire,
+    as_wire,
+    check_wires,
+    delay_of,
+    ends,
+    gain_to,
+    points_of,
+    split_name,
+)
 
 _STEPS_OF_A_PERIOD = 4
 Signal: TypeAlias = Callable[[float], float] | tuple[ArrayLike, ArrayLike]
@@ -186,8 +200,8 @@ def cosimulate(
         FMU by name of the instance.
     wires
         Source by target, for instance ``{"observer.motor.angle": "plant.motor.angle"}``; a
-        :class:`~nlsdesign.export.cosimulation.wires.Wire` adds a gain or a delay, a :class:`Late` one is late
-        by one sample.
+        :class:`~nlsdesign.export.cosimulation.run_plan.Wire` adds a gain or a delay, a :class:`Late` one is
+        late by one sample.
     inputs
         Signals from outside by input. A sampled instance reads them at its samples, a continuous one gets
         their value in the middle of each step.
@@ -397,3 +411,83 @@ def _sampled_signal(signal: Signal, points: Array) -> Given:
         return Given(*(np.array([float(signal(time)) for time in times.tolist()]) for times in courses))
     given, values = (np.asarray(each, dtype=float) for each in signal)
     return Given(*(np.asarray(np.interp(times, given, values), dtype=float) for times in courses))
+
+
+_EXACT = 1e-9
+"""Differences below this part of the range of a signal are those of the integrators, not of the coupling."""
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """What halving the step changes.
+
+    Parameters
+    ----------
+    steps
+        Longest step of each run in s, each half of the one before.
+    differences
+        By signal: largest difference of each run from the next, in the unit of the signal.
+    ranges
+        By signal: largest less smallest value in the last run.
+    """
+
+    steps: tuple[float, ...]
+    differences: Mapping[str, tuple[float, ...]]
+    ranges: Mapping[str, float]
+
+    def orders(self, name: str) -> tuple[float, ...]:
+        """Return the observed order at each halving after the first, not a number where nothing changes.
+
+        Parameters
+        ----------
+        name
+            Of a signal.
+        """
+        changes = self.differences[name]
+        floor = _EXACT * self.ranges[name]
+        return tuple(
+            math.log2(one / other) if one > floor and other > floor else math.nan
+            for one, other in itertools.pairwise(changes)
+        )
+
+
+def convergence(
+    system: FmuSystem,
+    *,
+    inputs: Mapping[str, Signal],
+    stop: float,
+    stepping: Stepping | None = None,
+    halvings: int = 3,
+) -> Convergence:
+    """Run a system with a step that is halved again and again.
+
+    Parameters
+    ----------
+    system
+        FMUs and wires.
+    inputs
+        Signals from outside by input.
+    stop
+        End in s.
+    stepping
+        The first step, coupling, and limits.
+    halvings
+        Number of halvings, at least 2 for an order.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are fewer than two halvings or more than ten.
+    """
+    if not 2 <= halvings <= 10:
+        raise ValueRangeError(f"{halvings} halvings", "from 2 to 10 tell an order")
+    plain = replace(stepping or Stepping(), estimate=False)
+    runs = [system.run(inputs=inputs, stop=stop, stepping=plain, parts=2**k) for k in range(halvings + 1)]
+    differences = {
+        name: tuple(
+            float(np.max(np.abs(one[name] - other[name][::2]))) for one, other in itertools.pairwise(runs)
+        )
+        for name in runs[0].trace.signals
+    }
+    steps = tuple(runs[0].step / 2**k for k in range(halvings + 1))
+    return Convergence(steps, differences, {name: float(np.ptp(runs[-1][name])) for name in differences})

@@ -22,7 +22,7 @@ from ...foundation.quantity import BASE, Quantity, Unit, parse_unit
 from ...foundation.text_files import draft
 from .cosimulate import FmuSystem, check_order, check_signals, unpacked_fmus
 from .fmu_description import FmuDescription, FmuScalar, fit_to_show, unpack
-from .wires import Wire, as_wire, check_wires, delay_of, gain_to, split_name
+from .run_plan import Wire, as_wire, check_wires, delay_of, gain_to, split_name
 
 VERSIONS = ("1.0", "2.0")
 STRUCTURE_FILE = "SystemStructure.ssd"

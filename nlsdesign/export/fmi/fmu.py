@@ -34,12 +34,10 @@ from ..compilation.cross_compiler import (
     flags_of_environment,
 )
 from ..files import template
-from .authorship import Authorship, with_origin
-from .fmu_documentation import icon, page
+from .fmu_documentation import Authorship, icon, page, with_origin
 from .fmu_sources import fmu_sources, main_source
-from .fmu_variables import layout
+from .fmu_variables import layout, terminals
 from .model_description import build_description, model_description, terminals_and_icons
-from .terminals import terminals
 
 MOST_KEPT = 200
 """Number of binaries that are kept; the oldest go first. One has 20 to 60 kB."""

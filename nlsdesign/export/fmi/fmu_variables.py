@@ -4,14 +4,26 @@ A value reference is an index into one array; the groups are in the order time, 
 inputs, parameters, outputs, signals, event indicators, modes, one extra, and behind them the status word.
 An output that is a state is one variable, as is a signal that is an output. Each switch of a model that is
 located shows its mode and an event indicator.
+
+What the graph of an expression says where its derivative says nothing: dependence and range.
+
+A rounded reading has the slope zero and yet depends on what is rounded; so both are read off the operations.
+
+Terminals of an FMU (FMI 3.0): what belongs together when it is wired, and the pictures of it.
+
+Two kinds. A *loop* is a bus: readings are named after what they show, so that plant, observer and controller
+are wired by equal names. A *flange* is what a load is attached to, with the names of Modelica: ``phi``,
+``w``, ``tau`` in rotation, ``s``, ``v``, ``f`` in translation. FMI 2.0 has no terminals.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
@@ -20,10 +32,235 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ExportError
 from ...foundation.symbolic import remembered
 from ...model.flat import FlatModel, Switch, Variable
+from ...model.graph import fold, read_graph
 from ..c.guarded_step import FIRST_INDEX_BIT, STATUS_BITS
-from .expression_walk import EVERYTHING, ranges
-from .terminals import with_flange_outputs
 from .typical_sizes import typical_sizes, with_sizes
+
+LOOP, FLANGE = "loop", "flange"
+_MODELICA = {
+    "rotation": ("phi", "w", "tau", "Modelica.Mechanics.Rotational.Interfaces.Flange_a"),
+    "translation": ("s", "v", "f", "Modelica.Mechanics.Translational.Interfaces.Flange_a"),
+}
+
+
+@dataclass(frozen=True)
+class TerminalMember:
+    """One variable of a terminal."""
+
+    name: str
+    variable: str
+    kind: str = "signal"
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """Variables that are wired together."""
+
+    name: str
+    description: str
+    picture: str
+    rule: str
+    kind: str
+    members: tuple[TerminalMember, ...]
+
+
+def flanges(model: FlatModel) -> tuple[Terminal, ...]:
+    """Return the flanges of a plant: the bodies that a load acts on or that are moved from outside.
+
+    ``model``: continuous; a sampled one has none.
+    """
+    return tuple(_flanges(model))
+
+
+def _flanges(model: FlatModel) -> Iterator[Terminal]:
+    inputs = {v.name for v in model.inputs}
+    everything = inputs | {v.name for v in (*model.states, *model.outputs, *model.signals)}
+    for body in model.bodies:
+        domain = body.domain
+        for name in (body.name, *body.geared):
+            lead = name == body.name
+            motion = body.motion if lead else f"{name}.{domain.motion}"
+            rate = body.rate if lead else f"{name}.{domain.rate}"
+            effort = f"{name}.reaction" if body.prescribed else f"{name}.{domain.effort}"
+            attached = {motion, rate} <= inputs if body.prescribed else effort in inputs
+            if attached and {motion, rate, effort} <= everything:
+                variables = (motion, rate, effort)
+                *labels, kind = _MODELICA[domain.name]
+                kinds = ("signal", "signal", "inflow")
+                members = tuple(TerminalMember(*each) for each in zip(labels, variables, kinds, strict=True))
+                yield Terminal(name, f"Where a load is attached to {name}", FLANGE, "plug", kind, members)
+
+
+def terminals(model: FlatModel) -> tuple[Terminal, ...]:
+    """Return all terminals of the FMU of a model."""
+    attached = flanges(model)
+    taken = {member.variable for each in attached for member in each.members}
+    outputs = [v.name for v in model.outputs if v.name not in taken]
+    inputs = [v.name for v in model.inputs if v.name not in taken]
+    # Of several readings of one thing that through most sensors has its name; what is an input keeps its own.
+    chain = {r.signal: len(r.sensors) for r in model.readings}
+    shown = {r.signal: r.measured for r in model.readings if r.measured not in inputs}
+    last = {name: max(n for s, n in chain.items() if shown.get(s) == name) for name in shown.values()}
+    shown = {signal: name for signal, name in shown.items() if chain[signal] == last[name]}
+    labels = {name: shown.get(name, name) for name in (*outputs, *inputs)}
+    count = Counter(labels.values())
+    members = tuple(
+        TerminalMember(label if count[label] == 1 else name, name) for name, label in labels.items()
+    )
+    text = (
+        "What controllers and observers of this machine are wired with; readings are named by what they show"
+    )
+    name = LOOP if LOOP not in {each.name for each in attached} else "signal_loop"
+    bus = (Terminal(name, text, LOOP, "bus", "nlsdesign.loop", members),) if members else ()
+    return (*bus, *attached)
+
+
+def with_flange_outputs(model: FlatModel) -> FlatModel:
+    """Return a plant whose outputs include what its flanges give out: a local variable cannot be wired."""
+    known = {v.name for v in (*model.inputs, *model.outputs)}
+    wanted = dict.fromkeys(m.variable for each in flanges(model) for m in each.members)
+    missing = [name for name in wanted if name not in known]
+    if not missing:
+        return model
+    s = model.symbols()
+    variables = (*model.states, *model.signals)
+    places = [[v.name for v in variables].index(name) for name in missing]
+    outputs = _extended(s.output, s.state, s.signal, places)
+    groups = [s.time, s.state, s.input, s.parameter, s.table]
+    equations = ca.Function("equations", groups, [s.derivative, outputs, s.signal, s.residual])
+    switching = model.switching
+    if switching is not None:
+        modes = ca.SX.sym("m", switching.shown.size1_in(4))
+        held, signals = switching.shown(*groups[:4], modes)
+        extended = _extended(held, s.state, signals, places)
+        switching = replace(switching, shown=ca.Function("shown", [*groups[:4], modes], [extended, signals]))
+    added = tuple(variables[i] for i in places)
+    return replace(model, outputs=(*model.outputs, *added), equations=equations, switching=switching)
+
+
+def _extended(outputs: ca.SX, states: ca.SX, signals: ca.SX, places: Sequence[int]) -> ca.SX:
+    """Return outputs with further ones, chosen from states and signals."""
+    given = ca.densify(ca.vertcat(states, signals))
+    return ca.vertcat(ca.densify(outputs), *[given[i] for i in places])
+
+
+Interval = tuple[float, float]
+EVERYTHING: Interval = (-math.inf, math.inf)
+
+_Value = TypeVar("_Value")
+
+_LINEAR = frozenset([ca.OP_ADD, ca.OP_SUB, ca.OP_NEG, ca.OP_TWICE, ca.OP_ASSIGN, ca.OP_LIFT])
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How a value depends on numbered symbols; sets are the bits of whole numbers."""
+
+    on: int = 0  # all symbols that it depends on
+    # scaled: those whose factor is not a constant: it depends on other symbols, or there is no factor at all
+    scaled: int = 0
+    # nonlinear: those whose factor changes while the model runs, or for which there is none: rounded,
+    # compared, multiplied by another changing value
+    nonlinear: int = 0
+
+    def joined(self, other: Dependence) -> Dependence:
+        """Return the dependence of a sum."""
+        return Dependence(self.on | other.on, self.scaled | other.scaled, self.nonlinear | other.nonlinear)
+
+    def times(self, factor: Dependence, changing: int) -> Dependence:
+        """Return the part of a product's dependence that comes through this operand."""
+        if not factor.on:
+            return self
+        return Dependence(self.on, self.on, self.on if factor.on & changing else self.nonlinear)
+
+    def anyhow(self) -> Dependence:
+        """Return the dependence of a function of this value that is no multiple of it."""
+        return Dependence(self.on, self.on, self.on)
+
+
+def dependences(function: ca.Function, symbols: Sequence[Sequence[int]], changing: int) -> list[Dependence]:
+    """Return how each nonzero of the first result of an SX function depends on symbols.
+
+    ``symbols``: for each argument the number of the symbol that each element stands for. Looked-up numbers
+    stand for the argument of their table, and are nonlinear.
+    """
+    looked_up = len(symbols) - 1
+
+    def given(argument: int, element: int) -> Dependence:
+        bit = 1 << symbols[argument][element]
+        return Dependence(bit, bit, bit) if argument == looked_up else Dependence(bit)
+
+    def combined(operation: int, operands: Sequence[Dependence]) -> Dependence:
+        together = Dependence()
+        for each in operands:
+            together = together.joined(each)
+        if operation in _LINEAR:
+            return together
+        if operation in (ca.OP_MUL, ca.OP_DIV, ca.OP_IF_ELSE_ZERO):
+            one, other = operands
+            weight, weighed = (other, one) if operation == ca.OP_DIV else (one, other)
+            factor = weight.times(weighed, changing) if operation == ca.OP_MUL else weight.anyhow()
+            return weighed.times(weight, changing).joined(factor)
+        return together.anyhow()
+
+    return _of_first_result(fold(read_graph(function), given, lambda _: Dependence(), combined=combined))
+
+
+def ranges(function: ca.Function, bounds: Sequence[Sequence[Interval]]) -> list[Interval]:
+    """Return an interval that holds each nonzero of the first result, by interval arithmetic.
+
+    The interval may be wider than the values that occur, never narrower.
+    """
+    values = fold(
+        read_graph(function),
+        lambda argument, element: bounds[argument][element],
+        lambda value: (value, value),
+        combined=lambda operation, operands: (
+            _RANGES[operation](*operands) if operation in _RANGES else EVERYTHING
+        ),
+    )
+    return _of_first_result(values)
+
+
+def _of_first_result(values: Mapping[tuple[int, int], _Value]) -> list[_Value]:
+    """Return what is known of each nonzero of the first result."""
+    first = {nonzero: value for (result, nonzero), value in values.items() if result == 0}
+    return [first[i] for i in range(len(first))]
+
+
+def _sum(a: Interval, b: Interval) -> Interval:
+    return a[0] + b[0], a[1] + b[1]
+
+
+def _negative(a: Interval) -> Interval:
+    return -a[1], -a[0]
+
+
+def _product(a: Interval, b: Interval) -> Interval:
+    # 0·∞ is 0 here: an unbounded number is not infinite.
+    corners = [0.0 if 0.0 in (x, y) else x * y for x in a for y in b]
+    return min(corners), max(corners)
+
+
+def _size(a: Interval) -> Interval:
+    least = 0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))
+    return least, max(abs(a[0]), abs(a[1]))
+
+
+_RANGES: Mapping[int, Callable[..., Interval]] = {
+    ca.OP_ADD: _sum,
+    ca.OP_SUB: lambda a, b: _sum(a, _negative(b)),
+    ca.OP_NEG: _negative,
+    ca.OP_TWICE: lambda a: _sum(a, a),
+    ca.OP_MUL: _product,
+    ca.OP_SQ: lambda a: _product(_size(a), _size(a)),
+    ca.OP_FABS: _size,
+    ca.OP_FMIN: lambda a, b: (min(a[0], b[0]), min(a[1], b[1])),
+    ca.OP_FMAX: lambda a, b: (max(a[0], b[0]), max(a[1], b[1])),
+    ca.OP_IF_ELSE_ZERO: lambda _, a: (min(a[0], 0.0), max(a[1], 0.0)),
+    ca.OP_ASSIGN: lambda a: a,
+    **dict.fromkeys((ca.OP_SIN, ca.OP_COS, ca.OP_TANH, ca.OP_ERF, ca.OP_SIGN), lambda _: (-1.0, 1.0)),
+}
 
 
 def located_switches(model: FlatModel) -> tuple[Switch, ...]:

@@ -21,8 +21,7 @@ from ...foundation.quantity import NOT_STATED, parse_unit
 from ...foundation.text_files import write_text
 from ...model import FlatModel, Variable
 from ...model.graph import Instruction, read_graph
-from ..c.c_text import comment, identifier
-from ..c.provenance import origin_lines, stamped
+from ..c.c_text import comment, identifier, origin_lines, stamped
 from .modelica_terms import ATOM, SERIES, SIGNED, WRITTEN_TWICE, Term, kept, term
 
 LONGEST = 16

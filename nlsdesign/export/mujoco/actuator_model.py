@@ -19,9 +19,18 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...foundation.quantity import same_dimension
 from ...model.flat import FlatModel, Variable
-from ..c.c_text import Real, cells, comment, identifier, string
+from ..c.c_text import (
+    Real,
+    cells,
+    comment,
+    identifier,
+    number_lines,
+    origin_lines,
+    origin_macros,
+    stamped,
+    string,
+)
 from ..c.instructions import print_statements
-from ..c.provenance import number_lines, origin_lines, origin_macros, stamped
 from ..files import filled, write_all
 
 HOLDER = "inner_states"

@@ -3,10 +3,9 @@
 from .kalman import EstimateDeviation, NoiseAssumptions
 from .observability import EmpiricalGramian, Observability, RankDrops, empirical_gramian, rank_drops
 from .rest import ranges_at_rest
-from .rest_points import RestPoints, rest_points
+from .rest_points import rest_points
 from .sensor_ranking import SensorCandidate, SensorRanking, rank_sensors
-from .stability import Stability, sampled_poles
-from .sweep import Chart, View, over_angle
+from .sweep import Chart, Stability, View, over_angle, sampled_poles
 
 __all__ = [
     "Chart",
@@ -15,7 +14,6 @@ __all__ = [
     "NoiseAssumptions",
     "Observability",
     "RankDrops",
-    "RestPoints",
     "SensorCandidate",
     "SensorRanking",
     "Stability",

@@ -28,7 +28,6 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.flat import Switching
-from ...model.linear import LinearModel
 from .rest import evaluate_at, evaluate_rows, rate_state, rest_states, typical_sizes
 
 JUMP = 1e-6
@@ -239,19 +238,6 @@ def _extrapolated(values: list[Array]) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class RestPoint:
-    """The model at rest at one angle."""
-
-    model: FlatModel  # whole model
-    angle: str  # name of the state that is swept
-    state: Array  # rest state, shape (states,)
-    # linear: exact linearisation there. Where dry friction is smoothed, it is that of its corner; see
-    # PlantMode for the machine that slides or sticks.
-    linear: LinearModel
-    sizes: Mapping[str, float]  # typical size of states and outputs over the sweep
-
-
-@dataclass(frozen=True, eq=False)
 class RestPoints:
     """The model at rest at N angles.
 
@@ -315,21 +301,6 @@ class RestPoints:
     def moving(self) -> PlantMode:
         """The mode in which the machine moves forward."""
         return self.modes[0]
-
-    def point(self, row: int) -> RestPoint:
-        """Return one of them.
-
-        Parameters
-        ----------
-        row
-            Which one.
-        """
-        inputs = tuple(v.name for v in self.model.inputs)
-        linear = LinearModel(
-            self.a[row], self.b[row], self.c[row], self.d[row],
-            self.state_names, inputs, self.output_names, self.model.sample_time,
-        )  # fmt: skip
-        return RestPoint(self.model, self.angle, self.states[row], linear, self.sizes)
 
 
 def rest_points(

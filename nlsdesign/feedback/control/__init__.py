@@ -3,17 +3,10 @@
 from .closed_loop import ClosedLoop, encoder_loop, joined
 from .evaluation.linear_parts import with_fine_counts
 from .evaluation.loop_verdict import LoopJudge, LoopVerdict
-from .evaluation.margins import (
-    LoopMargins,
-    OutputImpedance,
-    coupled_stability,
-    loop_margins,
-    output_impedance,
-)
+from .evaluation.margins import LoopMargins, OutputImpedance, loop_margins, output_impedance
 from .evaluation.onset import (
     LimitCycleOnset,
     LoopSpread,
-    SaturationLine,
     loop_over_spread,
     onset_of_limit_cycling,
     saturation_line,
@@ -30,19 +23,17 @@ from .evaluation.whole_evaluation import BIAS as BIAS
 from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, cascade_loops, evaluate_loop
 from .evaluation.whole_evaluation import with_margin as with_margin
 from .laws.known_drive import check_torque, largest_torque
-from .laws.law_writer import AntiWindup, BackCalculation, ConditionalIntegration
-from .laws.outer_laws import DesiredRate, FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
+from .laws.law_writer import BackCalculation, ConditionalIntegration
+from .laws.outer_laws import FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
 from .laws.torque_loop import REPRODUCED_GAINS, TorqueGains, torque_controller
 from .laws.velocity_loop import DisturbanceObserver, FrictionCompensation, VelocityLoop
 from .tuning import LoopChoice, LoopLimits, bandwidth_against_impedance, best_choices, largest_gain
 
 __all__ = [
     "REPRODUCED_GAINS",
-    "AntiWindup",
     "BackCalculation",
     "ClosedLoop",
     "ConditionalIntegration",
-    "DesiredRate",
     "DisturbanceObserver",
     "FilteredDifference",
     "FrictionCompensation",
@@ -58,7 +49,6 @@ __all__ = [
     "LoopVerdict",
     "OutputImpedance",
     "PidTorque",
-    "SaturationLine",
     "ScheduledTorque",
     "SineResponse",
     "TorqueGains",
@@ -70,7 +60,6 @@ __all__ = [
     "best_choices",
     "cascade_loops",
     "check_torque",
-    "coupled_stability",
     "encoder_loop",
     "evaluate_loop",
     "joined",

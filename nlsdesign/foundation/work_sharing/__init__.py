@@ -6,9 +6,8 @@ room that may import ``distributed``, ``dask`` and ``mpi4py``.
 
 from .chunks import CodeIdentity, PointOutcome, code_identity
 from .dask_scheduler import DaskScheduler
-from .mpi_ranks import MpiRanks
 from .shared_map import parallel_map, shared_map, spread_over
-from .teams import Executor, InThisProcess, Processes
+from .teams import Executor, InThisProcess, MpiRanks, Processes
 
 __all__ = [
     "CodeIdentity",

@@ -19,13 +19,12 @@ from ...design import (
     TaskCurve,
     ToleranceResult,
 )
-from ...design.statics.contour import turn
-from ...design.statics.roller_contour import RollerContour
+from ...design.statics.contour import RollerContour, turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, parse_unit, typeset_number, typeset_unit, with_unit
 from ...foundation.written_numbers import shared_prefix
-from .roller_picture import draw_roller, roller_picture
+from .cam_motion import draw_roller, roller_picture
 from .style import (
     AFTER,
     BEFORE,

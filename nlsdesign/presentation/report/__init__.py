@@ -10,7 +10,6 @@ from .command_pages import (
 )
 from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
 from .diagnosis_sections import verdict_sections
-from .page import write_report
 from .sections import (
     Chapter,
     FigureSection,
@@ -21,6 +20,7 @@ from .sections import (
     Section,
     TableSection,
     TextSection,
+    write_report,
 )
 from .side_by_side import ComparedResult, differing_numbers, key_figures, write_comparison
 from .tables import (

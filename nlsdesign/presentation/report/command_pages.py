@@ -27,7 +27,6 @@ from ..figures import (
 )
 from ..figures.over_time import run_over_time
 from .diagnosis_sections import ROLES, fitted_table, regeneration_sections, verdict_sections
-from .page import write_report
 from .sections import (
     FigureSection,
     FileSection,
@@ -36,6 +35,7 @@ from .sections import (
     Section,
     TableSection,
     TextSection,
+    write_report,
 )
 
 if TYPE_CHECKING:

@@ -24,7 +24,6 @@ from ..figures import (
 )
 from ..figures.cam_motion import MARKER, CamMotion, cam_picture
 from ..figures.design_figures import design_picture, limit_margins
-from .page import write_report
 from .sections import (
     FigureSection,
     FileSection,
@@ -36,6 +35,7 @@ from .sections import (
     TableSection,
     TextSection,
     data_link,
+    write_report,
 )
 from .tables import numbers_table
 

@@ -16,8 +16,7 @@ from ...foundation.errors import NlsError, ValueRangeError
 from ...foundation.quantity import Quantity, three_digits, with_error, with_unit
 from ...model import FlatModel
 from ..figures import RecordError, curves, gap_bars
-from .page import write_report
-from .sections import FigureSection, Section, TableSection, TextSection
+from .sections import FigureSection, Section, TableSection, TextSection, write_report
 from .tables import value_in_words
 
 _NONE = "–"

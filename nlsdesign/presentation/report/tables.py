@@ -15,7 +15,7 @@ from ..figures.style import compact
 from .sections import Html, PagePosition, Section, TableSection
 
 if TYPE_CHECKING:
-    from ...model.equations import Equations
+    from ...model.symbolic_view import Equations
 
 _LONGEST_ROW = 8
 
@@ -260,7 +260,7 @@ class EquationsSection(Section):
     Parameters
     ----------
     equations
-        From :func:`nlsdesign.model.equations.equations`.
+        From :func:`nlsdesign.model.flat.equations`.
     caption
         What they describe.
     folded

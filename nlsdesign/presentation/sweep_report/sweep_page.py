@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...foundation.command_words import typed_command
-from ...foundation.errors import MissingLibraryError, NlsError, visible
+from ...foundation.errors import MissingLibraryError, NlsError, typed_command, visible
 from ...foundation.text_files import write_table, write_text
 from ...sweeps import SweepTable
 from ...sweeps.preferences import Preference, RankedPoints, Requirement, rank_points

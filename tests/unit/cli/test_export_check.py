@@ -15,7 +15,7 @@ import pytest
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import deck_digest, declare, write_deck
 from nlsdesign.export import export_c, export_fmu, exported_files
-from nlsdesign.export.fmi.authorship import ORIGIN_FILE
+from nlsdesign.export.fmi.fmu_documentation import ORIGIN_FILE
 from nlsdesign.feedback.control import torque_controller
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli import listed_parts
-from nlsdesign.components import Body, Cam, DrivePart, Element, Sensor, Transmission, component_classes
+from nlsdesign.cli import look_up
+from nlsdesign.components import Cam, DrivePart, Element, Sensor, component_classes
+from nlsdesign.components.mechanics.bodies import Body
+from nlsdesign.components.mechanics.gear import Transmission
 
 KINDS = {
     "element": Element, "body": Body, "gear": Transmission, "cam": Cam, "sensor": Sensor, "drive": DrivePart,
@@ -16,7 +18,7 @@ KINDS = {
 
 
 def test_what_is_read_from_files_is_what_python_knows() -> None:
-    found = listed_parts.listed_parts()
+    found = look_up.listed_parts()
     known = component_classes()
     assert set(found) == set(known)
     assert len(found) > 80
@@ -57,5 +59,5 @@ def test_what_leaves_something_open_is_hidden_or_is_no_part_is_not_listed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "parts.py").write_text(FILE)
-    monkeypatch.setattr(listed_parts, "_FOLDER", tmp_path)
-    assert listed_parts.listed_parts() == {"Both": ("element", "Right.")}
+    monkeypatch.setattr(look_up, "_FOLDER", tmp_path)
+    assert look_up.listed_parts() == {"Both": ("element", "Right.")}

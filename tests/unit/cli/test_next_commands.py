@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli.bench import as_read
-from nlsdesign.foundation.command_words import typed_command
+from nlsdesign.foundation.errors import typed_command
 from tests.command_line import Run, run
 
 __all__ = ["run"]
@@ -44,5 +44,5 @@ def test_records_are_read_again_as_they_were() -> None:
 
 
 def test_windows_takes_double_quotes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nlsdesign.foundation.command_words.os.name", "nt")
+    monkeypatch.setattr("nlsdesign.foundation.errors.os.name", "nt")
     assert typed_command("nlsdesign", "deck", "check", "my leg.toml") == 'nlsdesign deck check "my leg.toml"'

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.bench.identification.records.table_files import table_files
-from nlsdesign.cli.typed_signals import read_driving_signal
+from nlsdesign.cli.simulate import read_driving_signal
 from nlsdesign.cli.typed_values import parse_number
 from nlsdesign.components.core.part_numbers import ParameterInfo
 from nlsdesign.design.curves.target_files import read_target

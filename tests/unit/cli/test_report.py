@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.foundation.errors import NlsError
-from nlsdesign.sweeps.saltelli import saltelli_plan
+from nlsdesign.sweeps.axes import saltelli_plan
 from nlsdesign.sweeps.sweep_file import read_sweep_file
 from nlsdesign.sweeps.sweep_parts import Parts
 from nlsdesign.sweeps.sweep_table import about_text, read_sweep

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nlsdesign.cli.typed_signals import read_driving_signal
+from nlsdesign.cli.simulate import read_driving_signal
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.simulation import Sine, StepAt
 from tests.command_line import Run, run

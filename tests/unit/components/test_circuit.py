@@ -26,7 +26,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import deck_names, load_deck
 from nlsdesign.model import flatten
-from nlsdesign.model.equations import equations
+from nlsdesign.model.flat import equations
 
 SVG = "{http://www.w3.org/2000/svg}"
 

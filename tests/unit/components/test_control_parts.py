@@ -23,7 +23,6 @@ from nlsdesign.components import (
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.feedback.control import (
-    AntiWindup,
     BackCalculation,
     ConditionalIntegration,
     DisturbanceObserver,
@@ -39,8 +38,9 @@ from nlsdesign.feedback.control import (
     largest_torque,
     torque_controller,
 )
-from nlsdesign.feedback.control.laws.command_limits import largest_speed, rate_remarks
 from nlsdesign.feedback.control.laws.known_drive import torque_limit
+from nlsdesign.feedback.control.laws.law_writer import AntiWindup
+from nlsdesign.feedback.control.laws.torque_loop import largest_speed, rate_remarks
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, ValueRangeError
 from nlsdesign.model import FlatModel, Variable, flatten

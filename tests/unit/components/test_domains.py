@@ -35,7 +35,7 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
-from nlsdesign.components.assembly.renamed import COMPONENTS, NUMBERS
+from nlsdesign.components.assembly.part_text import COMPONENTS, NUMBERS
 from nlsdesign.foundation.deck import Deck, read_deck
 from nlsdesign.foundation.errors import ArrangementError, UnitError, UnknownNameError
 from nlsdesign.foundation.quantity import Quantity

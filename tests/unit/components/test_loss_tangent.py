@@ -19,7 +19,6 @@ from nlsdesign.components import (
     SelfHeating,
     WorkHeat,
     flat_relaxation,
-    law_of,
     loss_of,
     material,
     materials,
@@ -31,6 +30,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.components.materials.loss_tangent import relaxation_of
+from nlsdesign.components.materials.material_law import law_of
 from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten

@@ -22,7 +22,6 @@ from nlsdesign.components import (
     Specimen,
     StrainStiffening,
     Yeoh,
-    law_of,
     material,
     materials,
     rubber_of,
@@ -31,8 +30,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.components.materials.curve_fit import fit_curve
-from nlsdesign.components.materials.material_law import material_laws
+from nlsdesign.components.materials.material_law import fit_curve, law_of, material_laws
 from nlsdesign.components.materials.specimen import Strength
 from nlsdesign.foundation.deck import load_deck, read_deck
 from nlsdesign.foundation.errors import ArrangementError, NlsError, UnknownNameError, ValueRangeError

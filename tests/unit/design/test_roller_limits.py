@@ -22,7 +22,6 @@ from nlsdesign.design import (
     MaximumStrain,
     MinimumHollowRadius,
     MinimumRadiusOfCurvature,
-    RollerContour,
     TabulatedTorque,
     contour_of_cam,
     design_cam,
@@ -30,8 +29,7 @@ from nlsdesign.design import (
     tolerance_analysis,
     write_drawings,
 )
-from nlsdesign.design.statics.energy import energy_profile, unmakeable_parts
-from nlsdesign.design.statics.roller_contour import roller_contour
+from nlsdesign.design.statics.contour import RollerContour, roller_contour
 from nlsdesign.foundation.errors import ArrangementError, InfeasibleError, NlsError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.live.gallery import question_of
@@ -119,12 +117,6 @@ def test_a_tolerance_is_refused_and_a_design_says_so_in_a_remark() -> None:
     )
     assert design.tolerance is None
     assert any(remark.startswith("no tolerance: ") for remark in design.remarks)
-
-
-def test_where_a_cable_would_lift_off_is_no_question_of_a_roller() -> None:
-    profile = energy_profile(actuator(SOFT, pretension=6e-3), target=hill())
-    with pytest.raises(ArrangementError, match="no cable that could lift off"):
-        unmakeable_parts(profile, CAM)
 
 
 def test_the_live_page_refuses_a_roller_with_the_next_step() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks.cam_design import Problem, problems, random_point
 from nlsdesign.design import DesignSettings, design_cam
+from nlsdesign.design.optimisation.design_search import SeveralStarts, same_design, times_found
 from nlsdesign.design.optimisation.program import Solution
-from nlsdesign.design.optimisation.several_starts import SeveralStarts, same_design, times_found
 from nlsdesign.design.optimisation.shape import starts
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, TARGET, actuator
 

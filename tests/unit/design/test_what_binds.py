@@ -26,10 +26,10 @@ from nlsdesign.design import (
     design_cam,
 )
 from nlsdesign.design.optimisation.loosening import Loosened
-from nlsdesign.design.statics.energy import energy_profile, unmakeable_parts
 from nlsdesign.foundation.errors import InfeasibleError
 from nlsdesign.foundation.quantity import quantity
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, actuator
+from tests.closed_form import energy_profile, unmakeable_parts
 
 WHOLE = DesignSettings(look_for_size_ranges=False, draws=0, starts=2)
 QUICK = replace(WHOLE, starts=1)

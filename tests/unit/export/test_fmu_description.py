@@ -15,10 +15,10 @@ from lxml import etree
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.export.fmi.authorship import Authorship
-from nlsdesign.export.fmi.dependencies import model_structure
 from nlsdesign.export.fmi.fmu import fmu_texts
+from nlsdesign.export.fmi.fmu_documentation import Authorship
 from nlsdesign.export.fmi.fmu_variables import layout
+from nlsdesign.export.fmi.model_description import model_structure
 from nlsdesign.feedback.control import REPRODUCED_GAINS, torque_controller
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError, ValueRangeError

@@ -12,7 +12,7 @@ from lxml import etree
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export.fmi.fmu import fmu_texts
-from nlsdesign.export.fmi.terminals import with_flange_outputs
+from nlsdesign.export.fmi.fmu_variables import with_flange_outputs
 from nlsdesign.feedback.control import torque_controller
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.deck import load_deck

@@ -12,9 +12,8 @@ import pytest
 
 from nlsdesign.components.assembly.deck_writer import deck_digest, declare
 from nlsdesign.export import export_c
-from nlsdesign.export.c.c_text import Real
+from nlsdesign.export.c.c_text import Real, stamp_of, stamped
 from nlsdesign.export.c.controller_code import header_text
-from nlsdesign.export.c.provenance import stamp_of, stamped
 from nlsdesign.export.c.writer import CSource, CWriter
 from nlsdesign.feedback.control import torque_controller
 from nlsdesign.feedback.observer import CascadeGain, FixedGrid, design_observer

@@ -11,8 +11,13 @@ from nlsdesign.export import export_c
 from nlsdesign.export.compilation import target_run
 from nlsdesign.export.compilation.cross_compiler import run_compiler
 from nlsdesign.export.compilation.processors import CORTEX_M4F, PROCESSORS
-from nlsdesign.export.compilation.target_build import SectionSizes, section_sizes
-from nlsdesign.export.compilation.target_run import emulated, measure_on_target, missing_emulator
+from nlsdesign.export.compilation.target_run import (
+    SectionSizes,
+    emulated,
+    measure_on_target,
+    missing_emulator,
+    section_sizes,
+)
 from nlsdesign.foundation.errors import ExportError
 from tests.hand_built import controller, observer
 

@@ -54,7 +54,7 @@ def test_a_missed_goal_is_named(plant, monkeypatch):
         source=None,
         processor=CORTEX_M4F,
         alone=None,
-        added=nls.export.compilation.target_build.SectionSizes(20_000, 0, 0),
+        added=nls.export.compilation.target_run.SectionSizes(20_000, 0, 0),
         state=10,
         run=TargetRun(np.array([450, 460, 470]), np.array([8]), np.zeros(1), np.zeros(1), True),
     )

@@ -12,7 +12,8 @@ import pytest
 
 import nlsdesign as nls
 from nlsdesign.bench.discrepancy.effects import catalogue
-from nlsdesign.components import component_classes, law_of, materials
+from nlsdesign.components import component_classes, materials
+from nlsdesign.components.materials.material_law import law_of
 from nlsdesign.foundation.errors import ArrangementError, DeckError, NlsError
 from nlsdesign.foundation.extensions import extended_by, load_extension
 from nlsdesign.live.edits import drop_limit, edit

@@ -13,7 +13,7 @@ from nlsdesign.bench.calibration import read_joint_numbers
 from nlsdesign.bench.identification.records.table_files import read_table
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.design.jobs.job_file import job_of
-from nlsdesign.export.fmi.authorship import Authorship
+from nlsdesign.export.fmi.fmu_documentation import Authorship
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.foundation.errors import MeasurementError, NlsError
 from nlsdesign.foundation.locations import bundled

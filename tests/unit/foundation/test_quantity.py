@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from nlsdesign.foundation.errors import UnitError, ValueRangeError
 from nlsdesign.foundation.quantity import (
     Quantity,
-    convert,
     degrees,
     parse_unit,
     quantity,
@@ -154,17 +153,6 @@ units = st.sampled_from(sorted(EXPECTED))
 @given(finite, units)
 def test_shown_number_is_the_one_that_was_given(value: float, unit: str) -> None:
     assert quantity(value, unit).shown == pytest.approx(value, rel=1e-14, abs=0.0)
-
-
-@given(finite, units, units)
-def test_conversion_there_and_back(value: float, unit: str, other: str) -> None:
-    if same_dimension(unit, other):
-        there = convert(value, unit, other)
-        assert there * EXPECTED[other][0] == pytest.approx(value * EXPECTED[unit][0], rel=1e-14)
-        assert convert(there, other, unit) == pytest.approx(value, rel=1e-14)
-    else:
-        with pytest.raises(UnitError):
-            convert(value, unit, other)
 
 
 @given(st.lists(st.tuples(st.sampled_from(PREFIXED), st.integers(-3, 3)), min_size=1, max_size=4))

@@ -34,8 +34,8 @@ from nlsdesign.foundation.work_sharing.chunks import (
     refused,
     sendable,
 )
-from nlsdesign.foundation.work_sharing.mpi_ranks import FuturesTeam
 from nlsdesign.foundation.work_sharing.shared_map import ChunkSizes
+from nlsdesign.foundation.work_sharing.teams import FuturesTeam
 
 
 def square(number: int) -> int:

@@ -14,9 +14,8 @@ from nlsdesign.design import CamDesign
 from nlsdesign.design.optimisation.result import Miss
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.live.gallery import gallery_question
-from nlsdesign.live.lights import can_be_made, will_be_known, will_hold
 from nlsdesign.live.question import LiveQuestion
-from nlsdesign.live.work import FullDesign, whole_design
+from nlsdesign.live.work import FullDesign, can_be_made, whole_design, will_be_known, will_hold
 from nlsdesign.model import flatten
 
 NUMBER = r"{value = [-\d.e]+"

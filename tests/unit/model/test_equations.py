@@ -42,7 +42,8 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.model import FlatModel, Variable, flatten
-from nlsdesign.model.equations import Equations, equations
+from nlsdesign.model.flat import equations
+from nlsdesign.model.symbolic_view import Equations
 
 
 def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import re
 from xml.etree import ElementTree
 
-from nlsdesign.model.flat import Variable
-from nlsdesign.model.notebook_view import block_svg
+from nlsdesign.model.symbolic_view import block_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 
 
 def test_inputs_enter_on_the_left_and_outputs_leave_on_the_right() -> None:
-    inputs = [Variable(name, "A", "") for name in ("current", "more")]
-    picture = ElementTree.fromstring(
-        block_svg("motor", inputs, [Variable("speed", "rad/s", "")], [Variable("torque", "N*m", "")])
-    )
+    inputs = ["current [A]", "more [A]"]
+    picture = ElementTree.fromstring(block_svg("motor", inputs, ["speed [rad/s]"], ["torque [N·m]"]))
     block = picture.find(f"{SVG}rect")
     left = float(block.get("x"))
     right = left + float(block.get("width"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.design import ExponentialTorque, design_cam
-from nlsdesign.design.optimisation.settings import DesignSettings
+from nlsdesign.design.optimisation.defaults import DesignSettings
 from nlsdesign.design.tolerance.tolerance_result import QuantileEstimate
 from nlsdesign.feedback.observer.spread.spread_errors import SpreadErrors
 from nlsdesign.foundation.quantity import quantity

@@ -25,12 +25,11 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import flatten
-from nlsdesign.model.equations import equations
+from nlsdesign.model.flat import equations
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 from nlsdesign.presentation.report.mathml import formula
-from nlsdesign.presentation.report.page import report_text
-from nlsdesign.presentation.report.sections import prose, words
+from nlsdesign.presentation.report.sections import prose, report_text, words
 from tests import figure_samples as samples
 
 EVIL = "\"'><img src=x onerror=alert(1)><script>alert(2)</script>&amp;"

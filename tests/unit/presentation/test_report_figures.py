@@ -19,8 +19,7 @@ from nlsdesign.presentation import figures, report
 from nlsdesign.presentation.figures.before_after import CandidateShare, candidate_shares
 from nlsdesign.presentation.figures.style import AFTER, BEFORE, HOLDS, LIMIT, TONES
 from nlsdesign.presentation.figures.svg import figure_data
-from nlsdesign.presentation.report.page import report_text
-from nlsdesign.presentation.report.sections import KeyNumber, NumbersSection
+from nlsdesign.presentation.report.sections import KeyNumber, NumbersSection, report_text
 from tests import figure_samples as samples
 
 ROOT = Path(__file__).parents[3]

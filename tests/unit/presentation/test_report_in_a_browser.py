@@ -9,7 +9,7 @@ import pytest
 from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
-from nlsdesign.model.equations import equations
+from nlsdesign.model.flat import equations
 from nlsdesign.presentation import report
 from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 from tests import figure_samples as samples

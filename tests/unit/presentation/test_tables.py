@@ -20,7 +20,7 @@ from nlsdesign.design import design_cam
 from nlsdesign.design.optimisation.pareto import FrontPoint, ParetoFront
 from nlsdesign.feedback.analysis import Stability, over_angle
 from nlsdesign.feedback.observer import SpreadErrors
-from nlsdesign.foundation.data_frames import data_frame, data_set
+from nlsdesign.foundation.csv_tables import data_frame, data_set
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError, MissingLibraryError, NlsError, ValueRangeError
 from nlsdesign.model import FlatModel, casadi_dae, flatten
@@ -254,7 +254,7 @@ def test_control_has_the_linear_model_with_its_names() -> None:
 
 
 def test_a_frame_is_not_needed_to_import_the_room(tmp_path: Path) -> None:
-    import nlsdesign.foundation.data_frames as room
+    import nlsdesign.foundation.csv_tables as room
 
     assert "pandas" not in vars(room)
     assert issubclass(MissingLibraryError, NlsError)

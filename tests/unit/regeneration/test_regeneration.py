@@ -27,7 +27,6 @@ from nlsdesign.regeneration import (
     ObserverChoice,
     Regeneration,
     regenerate,
-    regenerated_controller,
     regenerated_observer,
     write_regeneration,
 )
@@ -217,10 +216,10 @@ def test_a_controller_that_follows_worse_or_hunts_replaces_nothing(
     def usual(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
         return torque_controller(model, sample_time=sample_time), "margins"
 
-    monkeypatch.setattr(regenerated_controller, "sine_error", error)
-    monkeypatch.setattr(regenerated_controller, "usual_controller", usual)
+    monkeypatch.setattr(regenerated_observer, "sine_error", error)
+    monkeypatch.setattr(regenerated_observer, "usual_controller", usual)
     declared, better = flatten(machine(DECLARED)), flatten(machine(TRUE))
-    chosen = regenerated_controller.regenerated_controller(declared, better, 2e-3)
+    chosen = regenerated_observer.regenerated_controller(declared, better, 2e-3)
     assert bool(chosen.kept) == stays
     assert chosen.controller.origin == (declared if stays else better).origin
     assert chosen.words()[1].startswith("The controller stays" if stays else "The controller is that of the")
@@ -239,10 +238,10 @@ def test_a_controller_without_an_observer_of_its_model_says_whose_is_in_the_loop
     def usual(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
         return torque_controller(model, sample_time=sample_time), "margins"
 
-    monkeypatch.setattr(regenerated_controller, "design_observer", observer)
-    monkeypatch.setattr(regenerated_controller, "usual_controller", usual)
-    monkeypatch.setattr(regenerated_controller, "sine_error", lambda *_: 1.0)
-    chosen = regenerated_controller.regenerated_controller(declared, better, 2e-3)
+    monkeypatch.setattr(regenerated_observer, "design_observer", observer)
+    monkeypatch.setattr(regenerated_observer, "usual_controller", usual)
+    monkeypatch.setattr(regenerated_observer, "sine_error", lambda *_: 1.0)
+    chosen = regenerated_observer.regenerated_controller(declared, better, 2e-3)
     assert chosen.words()[1].endswith("the observer in the loop is that of the declared model for both.")
 
 

@@ -44,8 +44,8 @@ from nlsdesign.model import FlatModel, Table, Variable, flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.simulation import Trace, simulate
 from nlsdesign.simulation.input_signals import drives_of
+from nlsdesign.simulation.integrate import integrate_implicitly
 from nlsdesign.simulation.runge_kutta import TooStiffError, integrate_explicitly
-from nlsdesign.simulation.stiff import integrate_implicitly
 
 TIMES = np.linspace(0.0, 2.0, 201)
 

@@ -8,13 +8,13 @@ from scipy.stats import norm
 
 from nlsdesign.foundation.errors import UnknownNameError, ValueRangeError
 from nlsdesign.sweeps.answer_statistics import AnswerSurface, answer_quantiles, answer_surface, dependent_axes
+from nlsdesign.sweeps.axes import saltelli_plan
 from nlsdesign.sweeps.preferences import (
     Preference,
     Requirement,
     nondominated,
     rank_points,
 )
-from nlsdesign.sweeps.saltelli import saltelli_plan
 from nlsdesign.sweeps.sensitivity import sensitivity
 
 NAN, INF = float("nan"), float("inf")

@@ -37,10 +37,9 @@ from nlsdesign.sweeps import (
     run_sweep,
     sweep,
 )
-from nlsdesign.sweeps.axis_values import Subject
-from nlsdesign.sweeps.changes import changed_assembly
+from nlsdesign.sweeps.axis_values import Subject, changed_assembly
 from nlsdesign.sweeps.questions import QUICK
-from nlsdesign.sweeps.sweep_plan import PointPlan
+from nlsdesign.sweeps.sweep_folder import PointPlan
 from tests.sweeping import AREA, INERTIA, actuator, question
 
 CONSISTENT = declare(load_deck("austin2015_figure_consistent"))

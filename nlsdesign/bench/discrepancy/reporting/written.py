@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any
 
-from ....foundation.data_frames import Axis, data_frame
+from ....foundation.csv_tables import Axis, data_frame
 from ....foundation.errors import NlsError
 from ....foundation.locations import version
 from ...identification.records.measurement import RecordSet

@@ -79,20 +79,6 @@ class Sampling:
         held = _later(values, self.held_from)[:-1]
         return held, held
 
-    def at_times(self, time: Array, values: Array, wanted: Array) -> Array:
-        """Return the signal at other times; held at the ends.
-
-        ``time``: of the samples, uniform, in s.
-        """
-        if self.held_from is None:
-            result: Array = np.interp(wanted, time, self.at_samples(values))
-            return result
-        step = (time[-1] - time[0]) / (len(time) - 1)
-        # A time that was computed may miss the sample at which it stands by a rounding error.
-        since = np.floor((wanted - time[0]) / step + 1e-6).astype(int)
-        held: Array = _later(values, self.held_from)[np.clip(since, 0, len(values) - 1)]
-        return held
-
 
 def _later(values: Array, samples: int) -> Array:
     places = np.clip(np.arange(len(values)) + samples, 0, len(values) - 1)

@@ -285,30 +285,13 @@ def coupled_stability(
 ) -> CoupledStability:
     """Return whether the loop is stable on each load of a range, at rest at one angle of the spring.
 
-    Parameters
-    ----------
-    loop
-        Its plant has a load whose motion is prescribed; here it moves freely instead.
-    angle
-        Of the driven body in rad; the load rests at zero.
-    inertias
-        Of the load in kg·m², shape (i,).
-    stiffnesses
-        Of a spring between load and frame in N·m/rad, shape (s,); zero is a free load. A constant torque
-        balances that of the actuator, so that the load rests.
-    damping
-        Between load and frame in N·m·s/rad.
-    load
-        Name of the load; decided from the structure of the plant if it is left out.
-    speed
-        Of the driven body, at which the slopes of the plant are taken; zero for one stuck in its friction.
-
-    Raises
-    ------
-    ArrangementError
-        If the plant has no load whose motion is prescribed.
-    ValueRangeError
-        If an inertia is not positive, or a stiffness or the damping negative.
+    ``loop``: its plant has a load whose motion is prescribed; here it moves freely instead. ``angle``: of the
+    driven body in rad; the load rests at zero. ``inertias``: of the load in kg·m², shape (i,).
+    ``stiffnesses``: of a spring between load and frame in N·m/rad, shape (s,); zero is a free load. A
+    constant torque balances that of the actuator, so that the load rests. ``damping``: between load and frame
+    in N·m·s/rad. ``load``: name of the load; decided from the structure of the plant if it is left out.
+    ``speed``: of the driven body, at which the slopes of the plant are taken; zero for one stuck in its
+    friction.
     """
     moved = moved_load(loop.plant, load)
     j, k = np.asarray(inertias, dtype=float), np.asarray(stiffnesses, dtype=float)

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ....foundation.arrays import Array
-from ....foundation.data_frames import Axis, data_set
+from ....foundation.csv_tables import Axis, data_set
 from ....foundation.errors import ArrangementError, ConvergenceError, unknown_name
 from ....foundation.quantity import three_digits
 from ....foundation.text_files import write_table, write_text

@@ -24,8 +24,14 @@ from nlsdesign.bench.calibration import (
     what_calibration_buys,
     write_calibration,
 )
-from nlsdesign.bench.calibration.bench_response import BenchCourse, bench_response
-from nlsdesign.bench.calibration.bench_rows import RecordedRun, SampleNoise, rows_of, windows
+from nlsdesign.bench.calibration.bench_response import (
+    BenchCourse,
+    RecordedRun,
+    SampleNoise,
+    bench_response,
+    rows_of,
+    windows,
+)
 from nlsdesign.bench.calibration.bench_test import CalibrationTest
 from nlsdesign.bench.calibration.estimate import Estimate
 from nlsdesign.components import Assembly, CoulombFriction

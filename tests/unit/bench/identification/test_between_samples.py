@@ -13,9 +13,8 @@ from nlsdesign.bench.discrepancy.block_prediction import band_errors, predict
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import block_noise, evidence, inferred_sampling
-from nlsdesign.bench.identification.equation_error.between_samples import on_clock
 from nlsdesign.bench.identification.equation_error.block import Block
-from nlsdesign.bench.identification.equation_error.evidence import Bench
+from nlsdesign.bench.identification.equation_error.evidence import Bench, on_clock
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.sampling import HELD, SAMPLED
 from nlsdesign.components import ROTATION, Dashpot, Encoder, Inertia, Spring, tie

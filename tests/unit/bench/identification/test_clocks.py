@@ -10,15 +10,17 @@ from scipy.io import savemat
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import resample_poly
 
-from nlsdesign.bench.identification import Record, load_record, load_records, noise_of
+from nlsdesign.bench.identification import load_record, load_records
 from nlsdesign.bench.identification.equation_error.evidence import estimate_noise
-from nlsdesign.bench.identification.records.alignment import aligned, joined, resampled
-from nlsdesign.bench.identification.records.clocks import Channel, lag_between, on_one_clock
+from nlsdesign.bench.identification.records.clocks import (
+    Channel,
+    lag_between,
+    on_one_clock,
+)
 from nlsdesign.bench.identification.records.ingest import read_run
 from nlsdesign.bench.identification.records.mapping import Column, ColumnMap, read_mapping
 from nlsdesign.bench.identification.records.table_files import RecordTable
-from nlsdesign.foundation.errors import MeasurementError, UnknownNameError, ValueRangeError
-from nlsdesign.simulation import Trace
+from nlsdesign.foundation.errors import MeasurementError, ValueRangeError
 from tests.unit.bench.identification.test_measurement import COUNT, MAPPING, STEP, model, table, write
 
 __all__ = ["model"]
@@ -68,26 +70,6 @@ def test_the_same_clock_changes_nothing_and_says_nothing() -> None:
     found = on_one_clock([given], 500.0)
     assert found.changes == ()
     assert np.array_equal(found.values["sine"], given.values)
-
-
-def test_the_noise_of_a_resampled_record_is_still_known() -> None:
-    """A filter of the same bandwidth sees the same noise before and after, whatever the samples look like."""
-    rng = np.random.default_rng(5)
-    noise, time = 0.02 * rng.standard_normal(20000), np.arange(20000) * 1e-3
-    units = {"cell.reading": "N"}
-    record = Record("a", Trace(time, {"cell.reading": noise}, units, "a"))
-    for rate in (250.0, 4000.0):
-        other = resampled(record, rate)
-        assert other.resolution_of("cell.reading").noise == pytest.approx(
-            0.02 * np.sqrt(rate / 1000.0), rel=0.05
-        )
-        # Gaussian of 20 ms: σ·√(Δt / (2·√π·width)) for white noise of this σ.
-        width = 0.02
-        seen = gaussian_filter1d(other.trace["cell.reading"], width * rate)
-        expected = other.resolution_of("cell.reading").noise / np.sqrt(2.0 * np.sqrt(np.pi) * width * rate)
-        assert np.std(seen) == pytest.approx(expected, rel=0.15)
-    # Sampled up, the samples themselves would say that there is hardly any.
-    assert noise_of(other.trace["cell.reading"]) < 0.1 * other.resolution_of("cell.reading").noise
 
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, float("nan"), float("inf")])
@@ -166,39 +148,6 @@ def test_a_constant_channel_cannot_be_aligned_by() -> None:
     late, reference = shaken(1, 0.0)
     with pytest.raises(MeasurementError, match=r"'late': is constant"):
         lag_between(Channel("late", late.time, np.ones(len(late.time))), reference)
-
-
-def test_two_recordings_become_one_record_that_tells_what_was_done() -> None:
-    late, reference = shaken(7, 0.0412)
-    units = {"encoder.reading": "rad", "sync": "1", "cell.reading": "N"}
-    first = Record(
-        "a", Trace(reference.time, {"encoder.reading": reference.values}, units, "a"), source="a.csv"
-    )
-    rows = {"sync": late.values, "cell.reading": 2.0 * late.values}
-    other = Record("b", Trace(late.time, rows, units, "b"), source="b.csv")
-    record, lag = joined(first, other, ("encoder.reading", "sync"), rate=200.0, longest=0.2)
-    assert lag.seconds == pytest.approx(0.0412, abs=5e-4)
-    assert set(record.trace.signals) == {"encoder.reading", "sync", "cell.reading"}
-    # What is moved shows the motion where the other does: noise is all that is left.
-    apart = record.trace["sync"] - (3.0 * record.trace["encoder.reading"] + 1.0)
-    assert np.std(apart) < 3.0 * 0.05 * 1.3
-    assert "a.csv (joined with b.csv; sync is 41." in record.source
-    assert "which was removed" in record.source
-    with pytest.raises(UnknownNameError, match="signal of record 'b'"):
-        joined(first, other, ("encoder.reading", "synk"), rate=200.0)
-
-
-def test_a_late_signal_of_a_record_is_moved_and_the_others_are_not() -> None:
-    late, reference = shaken(8, 0.03)
-    both = on_one_clock([late, reference], 500.0)
-    record = Record("a", Trace(both.time, both.values, dict.fromkeys(both.values, "1"), "a"))
-    found, lag = aligned(record, "late", "reference", longest=0.2)
-    assert lag.seconds == pytest.approx(0.03, abs=5e-4)
-    again = lag_between(
-        *(Channel(n, found.trace.time, found.trace[n]) for n in ("late", "reference")), longest=0.2
-    )
-    assert abs(again.seconds) < 3e-4
-    assert found.trace.time[0] >= record.trace.time[0]
 
 
 # Through records.toml ---------------------------------------------------------------------------------------

@@ -17,8 +17,6 @@ from nlsdesign.bench.identification import (
     free_parameter,
     predict_in_windows,
 )
-from nlsdesign.bench.identification.least_squares import Fit, profile_of
-from nlsdesign.bench.identification.multiple_shooting import fit_by_cma
 from nlsdesign.bench.identification.parameters import Parameter
 from nlsdesign.bench.identification.simulation_error import Point, SimulationError
 from nlsdesign.bench.identification.windowed_simulation import wired
@@ -112,7 +110,7 @@ def test_the_true_numbers_are_found_however_long_the_windows_are(length: float) 
     for name, value in TRUE.items():
         assert abs(found.fit.values[name] - value) < 4.0 * found.fit.standard_error(name)
         assert found.fit.standard_error(name) < 0.01 * value
-    assert found.first_states["run1"] == pytest.approx([0.05, -0.1], abs=0.01)
+    assert found.point.starts[0][0] == pytest.approx([0.05, -0.1], abs=0.01)
     rows = 2 * 400
     assert found.fit.cost == pytest.approx(rows / 2, rel=0.15), "what is left is noise"
 
@@ -208,36 +206,6 @@ def test_a_simulation_that_runs_away_is_no_result() -> None:
         fit_by_simulation(stiff, [truth(1)], [], shots=Shots(7.98))
 
 
-def test_cma_ends_where_gauss_newton_does_with_many_more_simulations() -> None:
-    pytest.importorskip("cma")
-    shots = Shots(2.0, joined=False)
-    quick = fit_by_simulation(model(), [truth(1, seconds=4.0)], parameters(), shots=shots)
-    slow = fit_by_cma(model(), [truth(1, seconds=4.0)], parameters(), shots=shots, seed=3)
-    assert slow.cost == pytest.approx(quick.fit.cost, rel=1e-6)
-    for name in NAMES:
-        assert slow.values[name] == pytest.approx(quick.fit.values[name], rel=1e-3)
-    assert slow.simulations > 10 * quick.iterations
-    with pytest.raises(ConvergenceError, match="cannot join"):
-        fit_by_cma(model(), [truth(1, seconds=4.0)], parameters(), shots=Shots(2.0))
-
-
-def test_the_profile_of_a_known_number_is_its_parabola() -> None:
-    weights, shots = Weights({"body.position": NOISE}), Shots(1.0)
-    fitted = fit_by_simulation(model(), [truth(1)], parameters(), shots=shots, weights=weights).fit
-
-    def refit(name: str, value: float) -> Fit:
-        rest = [p for p in parameters() if p.name != name]
-        held = model().with_values({name: value})
-        return fit_by_simulation(held, [truth(1)], rest, shots=shots, weights=weights).fit
-
-    found = profile_of(fitted, "spring.stiffness", refit, points=7)
-    error = fitted.standard_error("spring.stiffness")
-    assert found.rise.min() == pytest.approx(0.0, abs=0.01)
-    assert found.lower < fitted.values["spring.stiffness"] < found.upper
-    assert found.upper - found.lower == pytest.approx(2 * 1.96 * error, rel=0.25)
-    assert "between" in found.words()
-
-
 def test_a_number_that_the_records_leave_open_is_said_to_be_open() -> None:
     """Without a push only ratios show: mass, stiffness and damping may all be twice as large."""
     time = np.arange(0.0, 4.0, STEP)
@@ -251,12 +219,3 @@ def test_a_number_that_the_records_leave_open_is_said_to_be_open() -> None:
     assert all(name in words for name in NAMES)
     assert words.count("up") == 3 or words.count("down") == 0
     assert words.endswith("not known at all")
-
-    def refit(name: str, value: float) -> Fit:
-        rest = [p for p in parameters() if p.name != name]
-        return fit_by_simulation(
-            model().with_values({name: value}), [record], rest, shots=shots, weights=weights
-        ).fit
-
-    found = profile_of(fitted, "body.mass", refit, points=5, reach=1e-3)
-    assert found.words().startswith("body.mass: not bounded below or above")

@@ -12,8 +12,8 @@ from nlsdesign.components import Dashpot, Mass, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.feedback.analysis import Chart, Stability, over_angle
 from nlsdesign.feedback.analysis.rest import rate_state, rest_states, typical_sizes
-from nlsdesign.feedback.analysis.rest_points import RestPoint
-from nlsdesign.feedback.analysis.sweep import PointView
+from nlsdesign.feedback.analysis.rest_points import RestPoints
+from nlsdesign.feedback.analysis.sweep import Columns, View
 from nlsdesign.foundation.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.paper_form import paper_form
@@ -22,15 +22,13 @@ from tests import observed as ob
 ANGLES = np.radians([-45.0, -5.0, 0.0, 5.0, 45.0])
 
 
-class Torque(PointView):
+class Torque(View):
     """The torque at rest and its sign in words."""
 
-    def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        return (Variable("torque", "N*m", "torque at rest"),)
-
-    def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
-        torque = point.model.evaluate(list(point.state))["spring.torque"]
-        return (torque,), {"sign": "pulls" if torque > 0.0 else "pushes or rests"}
+    def over(self, points: RestPoints) -> Columns:
+        torques = np.array([points.model.evaluate(list(state))["spring.torque"] for state in points.states])
+        signs = tuple("pulls" if torque > 0.0 else "pushes or rests" for torque in torques)
+        return Columns((Variable("torque", "N*m", "torque at rest"),), torques[:, None], {"sign": signs})
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from nlsdesign.components import LinearElastic, ViscousMaterial, series
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.export import export_c
 from nlsdesign.export.compilation.processors import CORTEX_M4F
-from nlsdesign.export.compilation.target_build import controller_sizes
+from nlsdesign.export.compilation.target_run import controller_sizes
 from nlsdesign.feedback.observer import (
     FixedGrid,
     GridByTolerance,
