@@ -108,7 +108,7 @@ def interior_point(
     if beside is not None:
         made = {"hess_lag": "nlp_hess_l", "jac_g": "nlp_jac_g", "grad_f": "nlp_grad_f"}
         settings |= {option: beside.get_function(function) for option, function in made.items()}
-    return ca.nlpsol(name, "ipopt", program, {**_OPTIONS, **settings, "ipopt.max_iter": iterations})
+    return ca.nlpsol(name, "ipopt", program, {"ipopt.max_iter": iterations, **_OPTIONS, **settings})
 
 
 @dataclass(frozen=True, eq=False)
