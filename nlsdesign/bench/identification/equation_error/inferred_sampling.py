@@ -101,7 +101,7 @@ def _told(
 ) -> tuple[RecordSet, list[Finding]]:
     """Return the records with some columns read as they tell best, one after the other, and the remarks.
 
-    ``gated``: whether an answer without plain terms counts only if the one with them allows it.
+    ``gated``: see :func:`_likelihood_of`.
     """
     remarks = []
     for column in columns:
@@ -128,7 +128,9 @@ def _motions_told(
         before = records.column(column.signal).sampling
         shift = before.late if before else 0.0
         around = [shifted(SAMPLED, shift + off) for off in (0.0, by, -by)]
-        likelihood = _likelihood_of(around, _asking(seen, column.signal), records, column.signal, missing)
+        likelihood = _likelihood_of(
+            around, _asking(seen, column.signal), records, signal=column.signal, missing=missing, gated=False
+        )
         if likelihood is None:
             continue
         # What was found is in units of what lies between the two sides.
@@ -244,35 +246,41 @@ def _asked(
     ``declared``: the form, where one is.
     """
     asked = _asking(seen, signal)
-
-    def told(forms: Sequence[Sampling]) -> _Likelihood | None:
-        if not gated:
-            return _likelihood_of(forms, asked, records, signal, missing)
-        plain = _likelihood_of(forms, asked, records, signal, plain_terms)
-        if plain is None or missing is plain_terms:
-            return plain
-        sharper = _likelihood_of(forms, asked, records, signal, missing)
-        return sharper if sharper and plain.allows(sharper.shift) else plain
-
-    likelihood = told(_FORMS)
+    likelihood = _likelihood_of(_FORMS, asked, records, signal=signal, missing=missing, gated=gated)
     if likelihood is None or likelihood.loss(form := likelihood.likeliest) < _NO_FORM:
         return likelihood
     # The residuals are no straight line over half a sample: a shift is looked for anew around itself.
     around = [shifted(declared or form, likelihood.shift + by) for by in (0.0, *_EITHER_WAY)]
-    again = told(around)
+    again = _likelihood_of(around, asked, records, signal=signal, missing=missing, gated=gated)
     return again and likelihood.moved(again)
 
 
 def _likelihood_of(
-    forms: Sequence[Sampling], asked: Sequence[BlockNoise], records: RecordSet, signal: str, missing: Missing
+    forms: Sequence[Sampling],
+    asked: Sequence[BlockNoise],
+    records: RecordSet,
+    *,
+    signal: str,
+    missing: Missing,
+    gated: bool,
 ) -> _Likelihood | None:
-    """Return how likely three forms of a signal are, of which two are half a sample off the first."""
-    ways = [{signal: form} for form in forms]
+    """Return how likely three forms of a signal are, of which two are half a sample off the first.
+
+    ``gated``: whether an answer without plain terms counts only if the one with them allows it.
+    """
+    ways, plainly = [{signal: form} for form in forms], plain_terms if gated else missing
     try:
-        rows = [rows_of(each, records.deciding, ways, missing) for each in asked]
+        rows = [rows_of(each, records.deciding, ways, plainly) for each in asked]
     except ConvergenceError:
         return None  # a fit tells that the declared numbers give no response
-    return _likelihood(rows) if rows else None
+    first = _likelihood(rows) if rows else None
+    if first is None or missing is plainly:
+        return first
+    others = zip(asked, rows, strict=True)
+    sharper = _likelihood(
+        [own._replace(own=terms_of(each, records.deciding, missing)) for each, own in others]
+    )
+    return sharper if sharper and first.allows(sharper.shift) else first
 
 
 def _asking(seen: Sequence[BlockNoise], signal: str) -> list[BlockNoise]:

@@ -113,19 +113,18 @@ def _held(late: float) -> tuple[tuple[int, float], ...]:
     return tuple((first - _REACH + k, float(weight)) for k, weight in enumerate(weights) if weight)
 
 
-def _mean_before() -> tuple[tuple[int, float], ...]:
-    """Return the taps of a signal that is logged as its mean over the period before."""
-    later = _symmetric([k + 0.5 for k in range(_REACH + 1)], _SINGLE)
-    weights = [*0.5 * later[::-1], *0.5 * later]
-    return tuple((k - _REACH, float(weight)) for k, weight in enumerate(weights))
-
-
 SAMPLED = Sampling("sampled", "is what the signal was at its stamps")
 HELD = Sampling("held", "holds each value from its stamp to the next", _held(0.0), 0.5, 0)
 HELD_BEFORE = Sampling(
     "held_before", "holds each value from the stamp before to its own", _held(-1.0), -0.5, 1
 )
-AVERAGED = Sampling("averaged", "is the mean over the period before each stamp", _mean_before(), -0.5)
+_LATER = 0.5 * _symmetric([k + 0.5 for k in range(_REACH + 1)], _SINGLE)
+AVERAGED = Sampling(
+    "averaged",
+    "is the mean over the period before each stamp",
+    tuple((k - _REACH, float(weight)) for k, weight in enumerate([*_LATER[::-1], *_LATER])),
+    -0.5,
+)
 FORMS = (SAMPLED, HELD, HELD_BEFORE, AVERAGED)
 
 
