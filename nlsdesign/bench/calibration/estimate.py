@@ -20,7 +20,6 @@ from ...simulation import Prior, declared_prior
 from ..identification import RecordSet, load_record
 from ..identification.covariance import Piece, inverse_information, robust_covariance
 from ..identification.least_squares import Minimum, huber_rows, minimise
-from ..identification.records.quality import Finding
 from ..identification.records.table_files import table_files
 from .bench_response import BenchRows
 from .bench_test import WEIGHT, CalibrationTest
@@ -142,19 +141,17 @@ def load_calibration(
                 f"measures {', '.join(one.signals)}, the others {', '.join(sets[0].signals)}",
                 next_step="put records of another kind into a folder of their own",
             )
+    findings = [finding for one in sets for finding in one.findings]
+    # A weight stays the same, as it should.
+    for weight in (c.name for c in sets[0].columns if c.signal == f"{WEIGHT}.torque"):
+        findings = [f for f in findings if "constant" not in f.text or f"column '{weight}'" not in f.place]
     records = RecordSet(
         tuple(record for one in sets for record in one.records),
         sets[0].columns,
-        tuple(finding for one in sets for finding in one.findings if not _hangs(finding, one)),
+        tuple(findings),
         tuple(remark for one in sets for remark in one.remarks),
     )
     return CalibrationRecords(kind, records, str(folder))
-
-
-def _hangs(finding: Finding, records: RecordSet) -> bool:
-    """Tell whether a finding says that a weight stays the same, as it should."""
-    heads = [c.name for c in records.columns if c.signal == f"{WEIGHT}.torque"]
-    return "constant" in finding.text and any(f"column '{head}'" in finding.place for head in heads)
 
 
 def record_findings(tests: Sequence[CalibrationRecords]) -> list[str]:

@@ -78,20 +78,20 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     ]  # fmt: skip
     others = [c for c in records.columns if c.signal in motions and not c.declared][1:]
     others = [c for c in others if c.sampling is SAMPLED]
-    read, remarks = _told(records, inputs, seen, missing)
+    read, remarks = _inputs_read(records, inputs, seen, missing)
     of_motions: list[Finding] = []
     # A motion and an input that are read falsely mislead each other: each is asked anew beside the other.
     for by in _NEARER if missing is not plain_terms else ():
-        read, of_motions = _motions_told(read, others, seen, missing, by)
+        read, of_motions = _motions_read(read, others, seen, missing, by)
         if not of_motions:
             break
         unread = read.read_as({c.signal: c.sampling for c in inputs if c.sampling})
         # As the motions were read as if nothing else were missing, plain terms have no say any more.
-        read, remarks = _told(unread, inputs, seen, missing, gated=False)
+        read, remarks = _inputs_read(unread, inputs, seen, missing, gated=False)
     return replace(read, remarks=(*records.remarks, *remarks, *of_motions))
 
 
-def _told(
+def _inputs_read(
     records: RecordSet,
     columns: Sequence[Column],
     seen: Sequence[BlockNoise],
@@ -116,7 +116,7 @@ def _told(
     return records, remarks
 
 
-def _motions_told(
+def _motions_read(
     records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing, by: float
 ) -> tuple[RecordSet, list[Finding]]:
     """Return the records with some motions shifted against the first as they tell best, and the remarks.
@@ -135,9 +135,9 @@ def _motions_told(
             continue
         # What was found is in units of what lies between the two sides.
         shift, error = shift + 2.0 * by * likelihood.shift, 2.0 * by * likelihood.error
-        told = abs(shift) <= _MOST and 0.5 * (shift / error) ** 2 >= _NO_FORM
-        records = records.read_as({column.signal: shifted(SAMPLED, shift) if told else SAMPLED})
-        if not told:
+        shows = abs(shift) <= _MOST and 0.5 * (shift / error) ** 2 >= _NO_FORM
+        records = records.read_as({column.signal: shifted(SAMPLED, shift) if shows else SAMPLED})
+        if not shows:
             continue
         way = "earlier" if shift > 0.0 else "later"
         text = (
