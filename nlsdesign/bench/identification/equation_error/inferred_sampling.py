@@ -49,8 +49,8 @@ _LEAST = 0.05
 _WEIGHINGS = 2
 _EITHER_WAY = (0.5, -0.5)
 """Samples by which a signal is read later and earlier, for the slope of the residuals with a shift."""
-_NEARER = (0.5, 0.5, 0.1, 0.1, 0.1, 0.1)
-"""Samples to either side of the last shift of a motion, each time that it is looked for anew."""
+_SEARCHES = 2
+"""How often a shift of a motion is looked for around the last."""
 _MOST = 1.1
 """Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
 little longer stands at the least one of its search, so no effect could be named for it."""
@@ -80,11 +80,9 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     others = [c for c in others if c.sampling is SAMPLED]
     read, remarks = _inputs_read(records, inputs, seen, missing)
     of_motions: list[Finding] = []
-    # A motion and an input that are read falsely mislead each other: each is asked anew beside the other.
-    for by in _NEARER if missing is not plain_terms else ():
-        read, of_motions = _motions_read(read, others, seen, missing, by)
-        if not of_motions:
-            break
+    if missing is not plain_terms:
+        read, of_motions = _motions_read(read, others, seen, missing)
+    if of_motions:
         unread = read.read_as({c.signal: c.sampling for c in inputs if c.sampling})
         # As the motions were read as if nothing else were missing, plain terms have no say any more.
         read, remarks = _inputs_read(unread, inputs, seen, missing, gated=False)
@@ -117,28 +115,28 @@ def _inputs_read(
 
 
 def _motions_read(
-    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing, by: float
+    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing
 ) -> tuple[RecordSet, list[Finding]]:
     """Return the records with some motions shifted against the first as they tell best, and the remarks.
 
-    ``by``: samples to either side of the last shift from which the slope of the residuals is taken.
+    Plain terms take all that tells it, so nothing is asked beside them.
     """
     remarks = []
     for column in columns:
-        before = records.column(column.signal).sampling
-        shift = before.late if before else 0.0
-        around = [shifted(SAMPLED, shift + off) for off in (0.0, by, -by)]
-        likelihood = _likelihood_of(
-            around, _asking(seen, column.signal), records, signal=column.signal, missing=missing, gated=False
-        )
-        if likelihood is None:
+        shift, error, asked = 0.0, math.inf, _asking(seen, column.signal)
+        for _ in range(_SEARCHES):
+            around = [shifted(SAMPLED, shift + by) for by in (0.0, *_EITHER_WAY)]
+            likelihood = _likelihood_of(
+                around, asked, records, signal=column.signal, missing=missing, gated=False
+            )
+            if likelihood is None:
+                break
+            shift, error = shift + likelihood.shift, likelihood.error
+            if abs(shift) > _MOST:
+                break
+        if abs(shift) > _MOST or 0.5 * (shift / error) ** 2 < _NO_FORM:
             continue
-        # What was found is in units of what lies between the two sides.
-        shift, error = shift + 2.0 * by * likelihood.shift, 2.0 * by * likelihood.error
-        shows = abs(shift) <= _MOST and 0.5 * (shift / error) ** 2 >= _NO_FORM
-        records = records.read_as({column.signal: shifted(SAMPLED, shift) if shows else SAMPLED})
-        if not shows:
-            continue
+        records = records.read_as({column.signal: shifted(SAMPLED, shift)})
         way = "earlier" if shift > 0.0 else "later"
         text = (
             f"is read {abs(shift):.2f} ± {error:.2g} of a sample {way}, as where channels are sampled in "
