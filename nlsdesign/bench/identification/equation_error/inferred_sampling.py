@@ -51,6 +51,8 @@ _EITHER_WAY = (0.5, -0.5)
 """Samples by which a signal is read later and earlier, for the slope of the residuals with a shift."""
 _SEARCHES = 2
 """How often a shift of a motion is looked for around the last."""
+_SMALLEST = 0.1
+"""Samples from which a motion is shifted: less lies within what its shift and that of an input share."""
 _MOST = 1.1
 """Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
 little longer stands at the least one of its search, so no effect could be named for it."""
@@ -68,14 +70,10 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     ``records``: inputs of which nothing is said have columns without a sampling. Of the motions of which
     nothing is said the first is the clock of all others. ``missing``: what the blocks may lack.
     """
-    drives = [drive for each in seen for drive in each.block.drives.values()]
-    motions = {drive.signal for drive in drives if drive.order > 0}
-    driving = {drive.signal for drive in drives} - motions
-    # What was inferred before is not asked again.
-    inputs = [
-        c for c in records.columns
-        if c.sampling is None or (c.signal in driving and c.declared and c.sampling in FORMS)
-    ]  # fmt: skip
+    motions = {d.signal for each in seen for d in each.block.drives.values() if d.order > 0}
+    # What is declared to be what it was at its stamp, a load cell for instance, is not asked, nor is what was
+    # inferred before.
+    inputs = [c for c in records.columns if c.sampling is None or (c.declared and c.sampling in FORMS[1:])]
     others = [c for c in records.columns if c.signal in motions and not c.declared][1:]
     others = [c for c in others if c.sampling is SAMPLED]
     read, remarks = _inputs_read(records, inputs, seen, missing)
@@ -134,13 +132,13 @@ def _motions_read(
             shift, error = shift + likelihood.shift, likelihood.error
             if abs(shift) > _MOST:
                 break
-        if abs(shift) > _MOST or 0.5 * (shift / error) ** 2 < _NO_FORM:
+        if not _SMALLEST <= abs(shift) <= _MOST or 0.5 * (shift / error) ** 2 < _NO_FORM:
             continue
         records = records.read_as({column.signal: shifted(SAMPLED, shift)})
         way = "earlier" if shift > 0.0 else "later"
         text = (
-            f"is read {abs(shift):.2f} ± {error:.2g} of a sample {way}, as where channels are sampled in "
-            "turn: so it fits the first motion that is measured; to forbid it, write between_samples = "
+            f"is read about {abs(shift):.2f} of a sample {way}, as where channels are sampled in turn: "
+            "so it fits the first motion that is measured; to forbid it, write between_samples = "
             '"sampled" in records.toml'
         )
         remarks.append(Finding(f"column '{column.name}'", text))
