@@ -82,7 +82,7 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
     """Return a figure as an SVG element to stand in an HTML page.
 
     Colours of the palette become CSS variables such as ``var(--blue)``, identifiers start with the key (they
-    must be unique on the page), coordinates are rounded to a hundredth of a point, text stays text.
+    must be unique on the page), coordinates are rounded to a tenth of a point, text stays text.
 
     Parameters
     ----------
@@ -102,6 +102,10 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
     kept |= {str(artist.get_gid()) for artist in figure.findobj() if artist.get_gid()}
     for element in root.iter():
         _adapt(element, key, kept)
+        # Blanks that only indent what matplotlib writes are a twentieth of a page.
+        element.text, element.tail = (
+            part and (part if part.strip() else None) for part in (element.text, element.tail)
+        )
     for element in root.iter(f"{_SVG}g"):
         _share_looks(element)
     for name in ("width", "height", "version"):
@@ -241,7 +245,7 @@ def _mark_of(link: ET.Element) -> tuple[ET.Element | None, str | None]:
 
 
 def _rounded(match: re.Match[str]) -> str:
-    return f"{float(match[0]):.2f}".rstrip("0").rstrip(".") or "0"
+    return f"{float(match[0]):.1f}".rstrip("0").rstrip(".") or "0"
 
 
 _DIGITS = 5
