@@ -22,14 +22,16 @@ own: it is inferred in the same way, and stated. A delay beyond that is left for
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
+import casadi as ca
 import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
+from ....foundation.symbolic import dependence
 from ..filters import derivative
 from ..records.mapping import Column
 from ..records.measurement import Record, RecordSet
@@ -74,8 +76,9 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     # What is declared to be what it was at its stamp, a load cell for instance, is not asked, nor is what was
     # inferred before.
     inputs = [c for c in records.columns if c.sampling is None or (c.declared and c.sampling in FORMS[1:])]
-    others = [c for c in records.columns if c.signal in motions and not c.declared][1:]
-    others = [c for c in others if c.sampling is SAMPLED]
+    clock = _clock(motions, seen)
+    others = [c for c in records.columns if c.signal in motions and c.signal != clock]
+    others = [c for c in others if c.sampling is SAMPLED and not c.declared]
     read, remarks = _inputs_read(records, inputs, seen, missing)
     of_motions: list[Finding] = []
     if missing is not plain_terms:
@@ -85,6 +88,24 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
         # As the motions were read as if nothing else were missing, plain terms have no say any more.
         read, remarks = _inputs_read(unread, inputs, seen, missing, gated=False)
     return replace(read, remarks=(*records.remarks, *remarks, *of_motions))
+
+
+def _clock(motions: Collection[str], seen: Sequence[BlockNoise]) -> str:
+    """Return the motion that an input accelerates, or else any.
+
+    How that input lags is told by its balance, so a shift of its motion would be told twice; all other
+    motions are shifted against it.
+    """
+    for each in seen:
+        model, s, drives = each.block.model, each.block.model.symbols(), each.block.drives
+        acts = dependence(ca.vertcat(s.output, s.derivative), s.input).any(axis=0)
+        acting = [
+            drives[v.name] for v, does in zip(model.inputs, acts, strict=True) if does and v.name in drives
+        ]
+        accelerated = [d.signal for d in acting if d.order == 2]
+        if accelerated and not motions >= {d.signal for d in acting}:
+            return accelerated[0]
+    return min(motions, default="")
 
 
 def _inputs_read(
@@ -138,7 +159,7 @@ def _motions_read(
         way = "earlier" if shift > 0.0 else "later"
         text = (
             f"is read about {abs(shift):.2f} of a sample {way}, as where channels are sampled in turn: "
-            "so it fits the first motion that is measured; to forbid it, write between_samples = "
+            "so it fits the motion that the input drives; to forbid it, write between_samples = "
             '"sampled" in records.toml'
         )
         remarks.append(Finding(f"column '{column.name}'", text))

@@ -193,13 +193,16 @@ def held(
 
 
 def bench(
-    folder: Path, deck: str, tables: list[Array], between: str | None = None
+    folder: Path, deck: str, tables: list[Array], between: str | None = None, *, backward: bool = False
 ) -> tuple[Assembly, RecordSet]:
-    """Write a deck and its records, the last one held out, and read them as a user would."""
+    """Write a deck and its records, the last one held out, and read them as a user would.
+
+    ``backward``: list the columns from the last to the first.
+    """
     (folder / "deck.toml").write_text(deck, encoding="utf-8")
     signals = ["encoder", "load_encoder", "ammeter"] if tables[0].shape[1] == 4 else ["encoder", "ammeter"]
     lines = [f'held_out = ["run{len(tables) - 1}"]', '[time]\ncolumn = "t_s"']
-    for name in signals:
+    for name in reversed(signals) if backward else signals:
         lines += [
             f"[columns.{name}]",
             f'signal = "{name}.reading"',
@@ -274,10 +277,11 @@ def test_a_hold_declared_beside_a_lag_of_a_whole_sample_stays_declared(tmp_path:
     assert forms(deck, records)["ammeter"] is HELD
 
 
-def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path) -> None:
+@pytest.mark.parametrize("backward", [False, True])
+def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path, backward: bool) -> None:
     """The load's encoder is read 0.4 of a sample after the motor's; the machine lacks nothing."""
-    deck = _AXIS.replace("2e-5", "5e-4")
-    found = diagnose(*bench(tmp_path, deck, [axis(seed, late=0.4, count=5e-4) for seed in range(5)]))
+    deck, tables = _AXIS.replace("2e-5", "5e-4"), [axis(seed, late=0.4, count=5e-4) for seed in range(5)]
+    found = diagnose(*bench(tmp_path, deck, tables, backward=backward))
     assert found.verdict == "none"
     remark = next(text for text in found.remarks if "load_encoder" in text)
     late = re.search(r"is read about (0\.\d+) of a sample later", remark)
