@@ -22,7 +22,7 @@ own: it is inferred in the same way, and stated. A delay beyond that is left for
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
@@ -90,7 +90,7 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     return replace(read, remarks=(*records.remarks, *remarks, *of_motions))
 
 
-def _clock(motions: Collection[str], seen: Sequence[BlockNoise]) -> str:
+def _clock(motions: set[str], seen: Sequence[BlockNoise]) -> str:
     """Return the motion that an input accelerates, or else any.
 
     How that input lags is told by its balance, so a shift of its motion would be told twice; all other
@@ -98,9 +98,11 @@ def _clock(motions: Collection[str], seen: Sequence[BlockNoise]) -> str:
     """
     for each in seen:
         model, s, drives = each.block.model, each.block.model.symbols(), each.block.drives
-        acts = dependence(ca.vertcat(s.output, s.derivative), s.input).any(axis=0)
+        acts = dependence(ca.vertcat(s.output, s.derivative), s.input)
         acting = [
-            drives[v.name] for v, does in zip(model.inputs, acts, strict=True) if does and v.name in drives
+            drives[v.name]
+            for v, does in zip(model.inputs, acts.T, strict=True)
+            if does.any() and v.name in drives
         ]
         accelerated = [d.signal for d in acting if d.order == 2]
         if accelerated and not motions >= {d.signal for d in acting}:
