@@ -13,6 +13,7 @@ from math import atan, exp
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from .conditions import first_order_noise
 from .two_bodies import STEP, Missing
@@ -195,7 +196,9 @@ def logged(
             turn = np.sin(load + missing.disc_phase) - np.sin(missing.disc_phase)
             load = load + missing.eccentricity * turn
         if missing.encoder_delay:
-            load = np.interp(ticks.time - missing.encoder_delay, ticks.time, load)
+            # A straight line between ticks would be no encoder that is read earlier, but a blurred one.
+            earlier = np.maximum(ticks.time - missing.encoder_delay, ticks.time[0])
+            load = make_interp_spline(ticks.time, load, k=5)(earlier)
         columns.append(_counted(load + missing.encoder_bias, logger.load_quantum))
     current = ticks.current + missing.current_bias
     if logger.averaged:

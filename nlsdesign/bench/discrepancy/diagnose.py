@@ -133,6 +133,8 @@ def diagnose(
     return _verdict(case, base, outcome, decision, records)
 
 
+_BESIDE_SHIFTS = 4
+"""Effects, the best first, beside which a shift of two motions against each other is looked for."""
 _SAME_SAMPLING = 0.1
 """Samples by which an input may be read otherwise without a second look at everything."""
 
@@ -175,18 +177,35 @@ class _Case:
         Backlash that nobody declared, for instance, hides at first that a current is held. Where what was
         named leaves no block open, it is asked as if nothing were missing: plain terms would hide a shift.
         Where nothing may be named, it is asked so beside the best that closes every block: inputs that are
-        read half a sample early spoil the quickest record, and a right name with it. Nothing is returned
-        where the inputs are read so already.
+        read half a sample early spoil the quickest record, and a right name with it. Where motions may be
+        shifted against each other, the best is taken that closes every block with such a shift. Nothing is
+        returned where the inputs are read so already.
         """
+        if not outcome.steps and decision.verdict not in ("unknown", "undecidable"):
+            return None
         if outcome.steps:
-            return self._read_beside(outcome.last, no_terms if outcome.complete else plain_terms)
-        if decision.verdict not in ("unknown", "undecidable"):
-            return None
-        fitted = (each.hypothesis for each in outcome.tried)
+            other = self._read_beside(outcome.last, no_terms if outcome.complete else plain_terms)
+            if other or outcome.complete:
+                return other
+        fitted = [each.hypothesis for each in outcome.tried]
         closing = next((each for each in fitted if is_complete(self.excesses(each))), None)
-        if closing is None:
-            return None
-        return self._read_as(self.bench.inferred(self._blocks(closing.fitted), no_terms), _SAME_SAMPLING)
+        if closing and not outcome.steps:
+            return self._read_beside(closing, no_terms)
+        return self._read_where_one_closes(fitted[:_BESIDE_SHIFTS])
+
+    def _read_where_one_closes(self, fitted: Sequence[Hypothesis]) -> _Case | None:
+        """Return the case with a motion shifted against another, as asked by what then leaves least, if nothing."""
+        least, best = math.inf, None
+        for each in fitted if len(self.bench.motions) > 1 else ():
+            other = self._read_beside(each, no_terms)
+            if other is None:
+                continue
+            beside = other.comparison.with_effect(other.comparison.base(self.actuator), each.newest)
+            left = other.excesses(beside) if beside else {}
+            total = sum(one.chi2 for one in left.values())
+            if beside and is_complete(left) and total < least:
+                least, best = total, other
+        return best
 
     def is_read_otherwise_beside(self, hypothesis: Hypothesis) -> bool:
         """Tell whether inputs run otherwise beside what is named so far than they were read.

@@ -17,7 +17,7 @@ its rate hardly changes most of the time, and fine counts show that while coarse
 
 What a block takes from a rate in proportion, as a damped spring does, may be quicker than that pace: a mode
 that a step of the motion excites swings on. So the span is shortened until what it takes from such a rate is
-little of the noise floor.
+little of the noise floor; also where nobody declared a damping or a drag, because it may be what is missing.
 
 Where the supply of a motor is at its limit, the current follows the speed with a steep slope, and the
 speed bends where that begins. There the span of the rate is as short as the noise of the measured current
@@ -77,6 +77,8 @@ _STEP = 2.0**0.25
 _BLURRED = 0.05
 """Mean square of what the span of a rate takes from a residual, in that of its noise, up to which it is let
 pass: a block is open from a mean square of about 1.2 on."""
+_LACKED = 0.2
+"""Share of the effort of springs and inertias that a damping or drag may have that is not declared."""
 _WIDTHS = 60
 """Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""
 _ROWS_OF_SHORTEST = 200
@@ -484,8 +486,8 @@ def _true_span(block: Block, records: Sequence[Record], noise: Noise, filters: F
     shortest = _LEAST_SPAN * max(r.step for r in records)
     span = filters.span
     while span > shortest and any(drive.order == 1 for drive in block.drives.values()):
-        blur = np.concatenate([_blur(block, r, noise, filters._replace(span=span)) for r in records])
-        if not blur.size or float(np.nanmean(blur)) <= _BLURRED:
+        blur = np.hstack([_blur(block, r, noise, filters._replace(span=span)) for r in records])
+        if not blur.size or float(np.max(np.nanmean(blur, axis=1))) <= _BLURRED:
             break
         span = max(span / _STEP, shortest)
     return span
@@ -494,19 +496,31 @@ def _true_span(block: Block, records: Sequence[Record], noise: Noise, filters: F
 def _blur(block: Block, record: Record, noise: Noise, filters: Filters) -> Array:
     """Return the squares of what the span takes from the rates in each row, in those of its noise.
 
-    Less what noise alone makes of them; so they may be negative.
+    Shape (3, rows): from what the model takes of them, and from a damping beside each spring and a drag on
+    each body that it may lack. Less what noise alone makes of them; so they may be negative.
     """
     step, span, course = record.step, filters.span, _course(block, record, filters)
     floor = noise_floor(block, record, noise, filters, course)
-    taken, own = np.zeros(len(record.trace)), np.zeros(len(floor.sigma))
     of_noise = float(np.linalg.norm(blur_weights(filters.width, step, span)))
-    for i, variable in enumerate(block.model.inputs):
-        drive = block.drives.get(variable.name)
-        if drive is not None and drive.order == 1:
-            gain = course.slopes[i][course.at]
-            taken += gain * record.blur(drive.signal, span)
-            own += (gain[floor.places] * (noise.deviation(drive.signal) * of_noise)) ** 2
-    squares: Array = ((floor.filter @ taken) ** 2 - own) / floor.sigma**2
+    efforts = np.zeros((3, len(record.trace)))
+    rates, taken, own = np.zeros_like(efforts), np.zeros_like(efforts), np.zeros((3, len(floor.sigma)))
+    place = {block.drives[v.name]: i for i, v in enumerate(block.model.inputs) if v.name in block.drives}
+    for drive in (d for d in place if d.order == 1):
+        blur = record.blur(drive.signal, span)
+        for k, order in enumerate((1, 0, 2)):
+            like = place.get(drive._replace(order=order))
+            if like is not None:
+                gain, motion = course.slopes[like][course.at], course.inputs[like]
+                efforts[k] += gain * (motion - motion.mean())
+                rates[k] += gain * course.inputs[place[drive]]
+                taken[k] += gain * blur
+                own[k] += (gain[floor.places] * (noise.deviation(drive.signal) * of_noise)) ** 2
+    scale = np.ones((3, 1))
+    for k in (1, 2):
+        size = rmse(floor.filter @ rates[k])
+        scale[k] = _LACKED * rmse(floor.filter @ efforts[k]) / size if size > 0.0 else 0.0
+    seen = np.array([floor.filter @ each for each in taken])
+    squares: Array = scale**2 * (seen**2 - own) / floor.sigma**2
     return squares
 
 

@@ -285,6 +285,11 @@ class Bench:
         asked = [read[block.name].read_by(block) for block in blocks if block.name in read]
         return with_inferred_sampling(records, asked, missing)
 
+    @property
+    def motions(self) -> set[str]:
+        """Measured signals of which blocks take rates."""
+        return {d.signal for block in self._blocks for d in block.drives.values() if d.order > 0}
+
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
     ) -> DrivenBlock:
