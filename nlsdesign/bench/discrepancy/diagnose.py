@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 from ...components import Assembly
 from ...components.assembly.deck_writer import write_deck
@@ -32,6 +32,7 @@ from ..identification.records.measurement import RecordSet
 from .effects import Candidate
 from .effects import catalogue as known_effects
 from .effects.effect import EffectFunction
+from .effects.sensing import delays
 from .fitting import Key
 from .planning.experiment import Experiment, next_experiment, write_command
 from .reporting.advice import advice, more_excitation, where_they_differ
@@ -120,21 +121,22 @@ def diagnose(
     case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)
     case, base = case.read_as_declared(case.comparison.base(actuator))
     effects = known_effects() if catalogue is None else catalogue
-    outcome, decision = _decided(case, base, effects, progress)
-    again = case.read_as_inferred_beside(outcome, decision)
-    if again is not None:
+    answer = _Answer(case, base, *_decided(case, base, effects, progress))
+    other = case.read_as_inferred_beside(answer.outcome, answer.decision)
+    if other is not None:
         progress("reading inputs between their samples as they run beside what was found")
-        again = replace(again, settled=True)
-        fresh = again.comparison.base(actuator)
-        anew = _decided(again, fresh, effects, progress)
-        if outcome.steps or anew[0].steps:
-            case, base, (outcome, decision) = again, fresh, anew
+        anew = _answer_anew(other, effects, progress)
+        answer = anew if answer.outcome.steps or anew.outcome.steps else answer
+    if answer.decision.verdict in ("named", "unknown", "undecidable") and not answer.outcome.complete:
+        other = answer.case.read_in_turn(effects, progress)
+        anew = _answer_anew(other, effects, progress) if other is not None else answer
+        answer = anew if anew.outcome.complete else answer
     progress("reading the held-out records")
-    return _verdict(case, base, outcome, decision, records)
+    return _verdict(*answer, records)
 
 
-_BESIDE_SHIFTS = 4
-"""Effects, the best first, beside which a shift of two motions against each other is looked for."""
+_EARLY = 1.2
+"""Samples by which a motion is read too early where its delay is looked for: more than a shift can be."""
 _SAME_SAMPLING = 0.1
 """Samples by which an input may be read otherwise without a second look at everything."""
 
@@ -177,35 +179,38 @@ class _Case:
         Backlash that nobody declared, for instance, hides at first that a current is held. Where what was
         named leaves no block open, it is asked as if nothing were missing: plain terms would hide a shift.
         Where nothing may be named, it is asked so beside the best that closes every block: inputs that are
-        read half a sample early spoil the quickest record, and a right name with it. Where motions may be
-        shifted against each other, the best is taken that closes every block with such a shift. Nothing is
-        returned where the inputs are read so already.
+        read half a sample early spoil the quickest record, and a right name with it. Nothing is returned
+        where the inputs are read so already.
         """
-        if not outcome.steps and decision.verdict not in ("unknown", "undecidable"):
-            return None
         if outcome.steps:
-            other = self._read_beside(outcome.last, no_terms if outcome.complete else plain_terms)
-            if other or outcome.complete:
-                return other
-        fitted = [each.hypothesis for each in outcome.tried]
+            return self._read_beside(outcome.last, no_terms if outcome.complete else plain_terms)
+        if decision.verdict not in ("unknown", "undecidable"):
+            return None
+        fitted = (each.hypothesis for each in outcome.tried)
         closing = next((each for each in fitted if is_complete(self.excesses(each))), None)
-        if closing and not outcome.steps:
-            return self._read_beside(closing, no_terms)
-        return self._read_where_one_closes(fitted[:_BESIDE_SHIFTS])
+        return self._read_beside(closing, no_terms) if closing else None
 
-    def _read_where_one_closes(self, fitted: Sequence[Hypothesis]) -> _Case | None:
-        """Return the case with a motion shifted against another, as asked by what then leaves least, if nothing."""
-        least, best = math.inf, None
-        for each in fitted if len(self.bench.motions) > 1 else ():
-            other = self._read_beside(each, no_terms)
-            if other is None:
+    def read_in_turn(
+        self, effects: Sequence[EffectFunction], progress: Callable[[str], None]
+    ) -> _Case | None:
+        """Return the case with a motion read as much earlier or later as leaves nothing beside some effect.
+
+        Effects are searched for beside a delay of that motion, from as early on as two channels of one
+        recorder can be shifted. Nothing is returned where effects and shift leave something.
+        """
+        for signal in self.bench.shiftable:
+            progress(f"looking for effects beside a shift of {signal}")
+            early = self._with_records(self.bench.shifted(signal, _EARLY))
+            delay = next((c for c in delays(self.actuator) if f"{c.location}.reading" == signal), None)
+            beside = delay and early.comparison.with_effect(early.comparison.base(self.actuator), delay)
+            if not (beside and delay):
                 continue
-            beside = other.comparison.with_effect(other.comparison.base(self.actuator), each.newest)
-            left = other.excesses(beside) if beside else {}
-            total = sum(one.chi2 for one in left.values())
-            if beside and is_complete(left) and total < least:
-                least, best = total, other
-        return best
+            outcome = search(early.comparison, beside, effects, self.criteria, progress)
+            step = min(record.step for record in self.bench.records.records)
+            late = _EARLY - outcome.last.values[delay.unknowns[0].name] / step
+            if outcome.complete and outcome.steps and abs(late) > _SAME_SAMPLING:
+                return self._with_records(self.bench.shifted(signal, late))
+        return None
 
     def is_read_otherwise_beside(self, hypothesis: Hypothesis) -> bool:
         """Tell whether inputs run otherwise beside what is named so far than they were read.
@@ -229,16 +234,33 @@ class _Case:
         )
         if max(moved, default=0.0) <= least:
             return None
+        return self._with_records(records)
+
+    def _with_records(self, records: RecordSet) -> _Case:
         bench = Bench(records, self._blocks(self.actuator))
-        return _Case(
-            self.actuator,
-            bench,
-            Comparison(bench, typical_sizes(self.actuator, bench.records)),
-            self.criteria,
-        )
+        sizes = typical_sizes(self.actuator, bench.records)
+        return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
 
     def _blocks(self, assembly: Assembly) -> list[Block]:
         return blocks_of(flatten(assembly), self.bench.records.signals)
+
+
+class _Answer(NamedTuple):
+    """What was decided, and what it rests on: the case and the fit of the declared machine."""
+
+    case: _Case
+    base: Hypothesis
+    outcome: Outcome
+    decision: _Decision
+
+
+def _answer_anew(
+    case: _Case, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+) -> _Answer:
+    """Return the answer of records that are read otherwise, as they run beside what was found before."""
+    case = replace(case, settled=True)
+    base = case.comparison.base(case.actuator)
+    return _Answer(case, base, *_decided(case, base, catalogue, progress))
 
 
 def _leaves_nothing(left: Excesses) -> bool:

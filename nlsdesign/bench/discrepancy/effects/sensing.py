@@ -24,7 +24,7 @@ from ....components import (
 )
 from ....components.core.domain import Domain
 from ....foundation.quantity import Quantity
-from .effect import Edit, Effect, Form, Places, Unknown, free_name, number
+from .effect import Candidate, Edit, Effect, Form, Places, Unknown, free_name, number
 from .places import domain_of, turning_bodies, turns_per_turn
 from .sizes import LONGEST, MIDDLE, QUICKEST, SHIFT
 
@@ -253,6 +253,20 @@ angle_sensor_delay = Effect(
         ),
     ),
 )
+
+
+def delays(assembly: Assembly) -> list[Candidate]:
+    """Return the encoders that may be sampled later than they are read, by up to two shifts of channels."""
+    return [
+        replace(
+            each,
+            unknowns=(replace(each.unknowns[0], starts=(1.0,), lower=1e-3, upper=2.4, of=SHIFT, beyond=""),),
+            explains_lag=False,
+        )
+        for each in angle_sensor_delay(assembly)
+    ]
+
+
 force_sensor_nonlinearity = Effect(
     "force_sensor_nonlinearity",
     "A load cell or torque transducer whose gain changes with the load.",

@@ -30,11 +30,11 @@ from ....simulation import Trace
 from ..filters import Smoothing, derivative, every, kernel
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
-from ..records.sampling import Sampling
+from ..records.sampling import SAMPLED, Sampling, shifted
 from .block import Block, BlockNoise, Filters, NoiseFloor
 from .block_noise import noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
-from .inferred_sampling import Missing, plain_terms, with_inferred_sampling
+from .inferred_sampling import Missing, plain_terms, remark_on_shift, shiftable, with_inferred_sampling
 from .input_noise import with_colour_of_inputs
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
@@ -286,9 +286,17 @@ class Bench:
         return with_inferred_sampling(records, asked, missing)
 
     @property
-    def motions(self) -> set[str]:
-        """Measured signals of which blocks take rates."""
-        return {d.signal for block in self._blocks for d in block.drives.values() if d.order > 0}
+    def shiftable(self) -> list[str]:
+        """Measured motions that may be sampled earlier or later than the one that the inputs drive."""
+        records, read = self._as_measured
+        return [c.signal for c in shiftable(records, list(read.values())) if c.sampling is SAMPLED]
+
+    def shifted(self, signal: str, samples: float) -> RecordSet:
+        """Return the records as measured, inputs read as here, and one motion earlier, with a remark."""
+        known = {c.signal: c.sampling for c in self.records.columns if c.sampling}
+        remark = remark_on_shift(self.records.column(signal), samples)
+        read = self._as_measured[0].read_as({**known, signal: shifted(SAMPLED, samples)})
+        return replace(read, remarks=(*self.records.remarks, remark))
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None

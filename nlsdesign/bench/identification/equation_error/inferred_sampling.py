@@ -72,13 +72,10 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
     ``records``: inputs of which nothing is said have columns without a sampling. Of the motions of which
     nothing is said the first is the clock of all others. ``missing``: what the blocks may lack.
     """
-    motions = {d.signal for each in seen for d in each.block.drives.values() if d.order > 0}
     # What is declared to be what it was at its stamp, a load cell for instance, is not asked, nor is what was
     # inferred before.
     inputs = [c for c in records.columns if c.sampling is None or (c.declared and c.sampling in FORMS[1:])]
-    clock = _clock(motions, seen)
-    others = [c for c in records.columns if c.signal in motions and c.signal != clock]
-    others = [c for c in others if c.sampling is SAMPLED and not c.declared]
+    others = [c for c in shiftable(records, seen) if c.sampling is SAMPLED]
     read, remarks = _inputs_read(records, inputs, seen, missing)
     of_motions: list[Finding] = []
     if missing is not plain_terms:
@@ -88,6 +85,13 @@ def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missi
         # As the motions were read as if nothing else were missing, plain terms have no say any more.
         read, remarks = _inputs_read(unread, inputs, seen, missing, gated=False)
     return replace(read, remarks=(*records.remarks, *remarks, *of_motions))
+
+
+def shiftable(records: RecordSet, seen: Sequence[BlockNoise]) -> list[Column]:
+    """Return the columns of motions, without the clock of all and those of which something is said."""
+    motions = {d.signal for each in seen for d in each.block.drives.values() if d.order > 0}
+    clock = _clock(motions, seen)
+    return [c for c in records.columns if c.signal in motions and c.signal != clock and not c.declared]
 
 
 def _clock(motions: set[str], seen: Sequence[BlockNoise]) -> str:
@@ -158,14 +162,19 @@ def _motions_read(
         if not _SMALLEST <= abs(shift) <= _MOST or 0.5 * (shift / error) ** 2 < _NO_FORM:
             continue
         records = records.read_as({column.signal: shifted(SAMPLED, shift)})
-        way = "earlier" if shift > 0.0 else "later"
-        text = (
-            f"is read about {abs(shift):.2f} of a sample {way}, as where channels are sampled in turn: "
-            "so it fits the motion that the input drives; to forbid it, write between_samples = "
-            '"sampled" in records.toml'
-        )
-        remarks.append(Finding(f"column '{column.name}'", text))
+        remarks.append(remark_on_shift(column, shift))
     return records, remarks
+
+
+def remark_on_shift(column: Column, shift: float) -> Finding:
+    """Return the remark on a motion that is read earlier by so many samples."""
+    way = "earlier" if shift > 0.0 else "later"
+    text = (
+        f"is read about {abs(shift):.2f} of a sample {way}, as where channels are sampled in turn: "
+        "so it fits the motion that the input drives; to forbid it, write between_samples = "
+        '"sampled" in records.toml'
+    )
+    return Finding(f"column '{column.name}'", text)
 
 
 class BlockRows(NamedTuple):
