@@ -225,13 +225,9 @@ class Lazy:
 
 @dataclass(frozen=True, eq=False)
 class AngleAnswer:
-    """What holds at one angle."""
+    """What holds at one angle, besides the mechanism."""
 
     angle: float  # in rad
-    revision: int
-    mechanism: Mechanism | None  # cam, cable and rubber to scale; None where the contour has no outline
-    # readings: the columns of the design at this angle, by interpolation; each with one value
-    readings: tuple[LiveColumn, ...]
     # observability, poles, loop: each with a state of its own; the value is SeenStates, a tuple of PoleGroup,
     # and LoopResponse
     observability: Lazy
