@@ -208,18 +208,13 @@ def _wave(function: Callable[[Array], Array]) -> Callable[[Bounds], Bounds]:
     """Return the range of a function whose slope is never steeper than one and which stays within ±1."""
 
     def of(a: Bounds) -> Bounds:
-        middle, half = _middle(a)
+        middle = (a[0] + a[1]) / 2.0
+        half = np.nextafter(np.maximum(a[1] - middle, middle - a[0]), np.inf)
         at = function(middle)
         low, high = _outward(at - half, at + half, 2 * ELEMENTARY)
         return np.maximum(low, -1.0), np.minimum(high, 1.0)
 
     return of
-
-
-def _middle(a: Bounds) -> Bounds:
-    middle = (a[0] + a[1]) / 2.0
-    half = np.nextafter(np.maximum(a[1] - middle, middle - a[0]), np.inf)
-    return middle, half
 
 
 def _truth(never: Mask, always: Mask) -> Bounds:

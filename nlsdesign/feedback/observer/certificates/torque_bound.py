@@ -295,8 +295,10 @@ class _Bounding:
         largest = 0.0
         for _ in range(REFINEMENTS):
             middle = (cells[0] + cells[1]) / 2.0
-            ends = [np.concatenate([end, middle]) for end in cells]
-            slope, steep = np.split(self._steepness((ends[0], ends[1])), 2)
+            both = (np.concatenate([cells[0], middle]), np.concatenate([cells[1], middle]))
+            rest = self.view.ranges(self.view.rest, both)
+            slopes = self.view.ranges(self.view.torque, both, self._carried(rest))[1].magnitude[:, 0]
+            slope, steep = np.split(slopes + np.sum(rest[1].magnitude, axis=1), 2)
             largest = max(largest, float(np.max(steep, initial=0.0)))
             wide = (slope > 1.3 * largest) & (cells[1] - cells[0] > 1e-6)
             done.append((cells[0][~wide], cells[1][~wide]))
@@ -310,12 +312,6 @@ class _Bounding:
         low, high = (np.concatenate([each[k] for each in done]) for k in (0, 1))
         order = np.argsort(low)
         return low[order], high[order]
-
-    def _steepness(self, cells: Bounds) -> Array:
-        rest = self.view.ranges(self.view.rest, cells)
-        slope = self.view.ranges(self.view.torque, cells, self._carried(rest))[1].magnitude[:, 0]
-        steep: Array = slope + np.sum(rest[1].magnitude, axis=1)
-        return steep
 
     def _carried(self, ranges: tuple[Range, ...]) -> Array:
         """Return where the inner states can be at each angle, shape (cells, inner, 2).
