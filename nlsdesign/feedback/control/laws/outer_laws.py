@@ -16,7 +16,7 @@ import numpy as np
 
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
-from ....model import FlatModel, Table, Variable
+from ....model import Table, Variable
 from ....model.roles import contour_ends, series_spring
 from ....model.transform import named
 from ...analysis.rest import evaluate_at, rest_states
@@ -419,7 +419,12 @@ def stiffness_table(drive: KnownDrive) -> Table:
     spring, which is then an input of its own.
     """
     plant, body = drive.plant, drive.body
-    _check_held(plant, body.name)
+    free = [each.name for each in plant.bodies if not each.prescribed and each.name != body.name]
+    if free:
+        raise ArrangementError(
+            f"body '{free[0]}'", "moves freely, so the spring has no torque at rest to schedule by",
+            next_step="design the controller on the same machine with a Fixed load: names and numbers stay",
+        )  # fmt: skip
     spring, turns = series_spring(plant), drive.spring_turns_value
     end = min(contour_ends(plant, spring).values(), default=math.pi / 2.0)
     angles = np.linspace(-end, end, POINTS)
@@ -443,12 +448,3 @@ def stiffness_table(drive: KnownDrive) -> Table:
     order = np.argsort(seen)
     step = float(abs(seen[1] - seen[0]))
     return Table(body.motion, float(np.min(seen)), step, (column,), slopes[order][:, None])
-
-
-def _check_held(plant: FlatModel, motor: str) -> None:
-    free = [body.name for body in plant.bodies if not body.prescribed and body.name != motor]
-    if free:
-        raise ArrangementError(
-            f"body '{free[0]}'", "moves freely, so the spring has no torque at rest to schedule by",
-            next_step="design the controller on the same machine with a Fixed load: names and numbers stay",
-        )  # fmt: skip
