@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
+from xml.etree import ElementTree
 
 from ..foundation.errors import ExportError
 from ..foundation.text_files import draft
@@ -45,6 +46,12 @@ def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
         return "".join(f"{match['indent']}{row}\n" if row else "\n" for row in value)
 
     return _PLACEHOLDER.sub(replacement, template(name))
+
+
+def xml_text(root: ElementTree.Element) -> str:
+    """Return a tree of elements as the text of a file."""
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
 def write_all(texts: Mapping[Path, str]) -> None:
