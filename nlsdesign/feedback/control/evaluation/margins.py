@@ -224,10 +224,8 @@ def output_impedance(
         In Hz; by default 200 from 0.1 Hz to 0.4 of the sampling frequency.
     load
         Name of the load; decided from the structure of the plant if it is left out.
-    speed
-        Of the driven body, at which the slopes of the plant are taken; zero for one stuck in its friction.
-    frozen_tables
-        Whether looked-up tables are held at the angle, where they follow it in the controller.
+    speed, frozen_tables
+        As :func:`loop_margins` takes them.
 
     Raises
     ------

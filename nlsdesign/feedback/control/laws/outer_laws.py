@@ -142,9 +142,6 @@ class PidTorque(TorqueLaw):
     def command(self, writer: LawWriter, drive: KnownDrive, heard: Heard) -> SpeedCommand:
         """Return v within its limits; see :class:`TorqueLaw`."""
         time = writer.sample_time
-        before = writer.state("torque_loop.error.previous", "N*m", "torque error one sample ago")
-        old_rate = writer.state("torque_loop.error.rate", "N*m/s", "filtered rate of the torque error")
-        integral = writer.state("torque_loop.integral", "rad/s", "integral part of the speed command")
         proportional = self._proportional(drive, time) if self.proportional is None else self.proportional
         whole = SLOW_PART * proportional if self.integral is None else self.integral
         gain = writer.setting(
@@ -157,14 +154,14 @@ class PidTorque(TorqueLaw):
             self.derivative_bandwidth,
         )  # fmt: skip
         error = heard.desired - heard.torque
-        rate = writer.low_pass(old_rate, (error - before) / time, corner)
+        rate = writer.filtered_rate(
+            "torque_loop.error", error, corner=corner, of="torque error", unit="N*m", rate_unit="N*m/s"
+        )
+        integral = writer.state("torque_loop.integral", "rad/s", "integral part of the speed command")
         asked = gain * error + integral + fast * rate
         speed = held_speed(writer, asked, self.speed_limit, self.acceleration_limit)
 
         def finish(held: HeldBack) -> None:
-            writer.begin("torque_loop.error.previous", error)
-            writer.follow("torque_loop.error.previous", error)
-            writer.follow("torque_loop.error.rate", rate)
             one = Integration(
                 "torque", integral, error, slow * error, (held.speed, held.current),
                 held.speed + held.current * held.speed_per_current,
@@ -265,13 +262,14 @@ class FilteredDifference(DesiredRate):
             "rate_bandwidth", "Hz", "torque loop: corner of the filter on the rate of the desired torque",
             self.bandwidth,
         )  # fmt: skip
-        before = writer.state("torque_loop.desired.previous", "N*m", "desired torque one sample ago")
-        old = writer.state("torque_loop.desired.rate", "N*m/s", "filtered rate of the desired torque")
-        rate = writer.low_pass(old, (heard.desired - before) / writer.sample_time, corner)
-        writer.begin("torque_loop.desired.previous", heard.desired)
-        writer.follow("torque_loop.desired.previous", heard.desired)
-        writer.follow("torque_loop.desired.rate", rate)
-        return rate
+        return writer.filtered_rate(
+            "torque_loop.desired",
+            heard.desired,
+            corner=corner,
+            of="desired torque",
+            unit="N*m",
+            rate_unit="N*m/s",
+        )
 
 
 @dataclass(frozen=True)
@@ -401,13 +399,14 @@ class ScheduledTorque(TorqueLaw):
             "acceleration_bandwidth", "Hz", "torque loop: corner of the filter on that acceleration",
             self.acceleration_bandwidth,
         )  # fmt: skip
-        before = writer.state("torque_loop.feedforward.previous", "rad/s", "feedforward one sample ago")
-        old = writer.state("torque_loop.feedforward.rate", "rad/s^2", "filtered rate of the feedforward")
-        rate = writer.low_pass(old, (ahead - before) / writer.sample_time, corner)
-        writer.begin("torque_loop.feedforward.previous", ahead)
-        writer.follow("torque_loop.feedforward.previous", ahead)
-        writer.follow("torque_loop.feedforward.rate", rate)
-        return share * rate
+        return share * writer.filtered_rate(
+            "torque_loop.feedforward",
+            ahead,
+            corner=corner,
+            of="feedforward",
+            unit="rad/s",
+            rate_unit="rad/s^2",
+        )
 
 
 def stiffness_table(drive: KnownDrive) -> Table:

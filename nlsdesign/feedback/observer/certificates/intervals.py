@@ -42,6 +42,12 @@ class Range:
         return np.maximum(np.abs(self.lower), np.abs(self.upper))
 
 
+def halved(cells: Bounds, middle: Array, wide: Mask) -> Bounds:
+    """Return both halves of the cells that are too wide."""
+    low, high = cells
+    return np.concatenate([low[wide], middle[wide]]), np.concatenate([middle[wide], high[wide]])
+
+
 @dataclass(frozen=True, eq=False)
 class Enclosure:
     """Ranges of the outputs of a function over many boxes."""

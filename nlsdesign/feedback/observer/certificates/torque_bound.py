@@ -23,7 +23,7 @@ from ....foundation.errors import ArrangementError, ValueRangeError, unknown_nam
 from ....model import FlatModel
 from ....model.transform import with_outputs, without_idle_states
 from ..scheduling.scheduled import ObserverDesign
-from .intervals import Bounds, Range, enclose
+from .intervals import Bounds, Range, enclose, halved
 
 NARROWEST = 1e-7
 """Width in rad below which a range of angles around the knot of a contour is not divided further."""
@@ -302,10 +302,7 @@ class _Bounding:
             largest = max(largest, float(np.max(steep, initial=0.0)))
             wide = (slope > 1.3 * largest) & (cells[1] - cells[0] > 1e-6)
             done.append((cells[0][~wide], cells[1][~wide]))
-            cells = (
-                np.concatenate([cells[0][wide], middle[wide]]),
-                np.concatenate([middle[wide], cells[1][wide]]),
-            )
+            cells = halved(cells, middle, wide)
             if not len(cells[0]):
                 break
         done.append(cells)
