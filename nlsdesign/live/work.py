@@ -158,9 +158,9 @@ class Work(StrEnum):
     """The kinds of long work, by the names that messages of the page give them."""
 
     SETTLE = "SettleDesign"  # the whole design of the question: FullDesign
-    TOLERANCE = "ToleranceCloud"  # torque of made springs around the design: CloudAnswer
+    TOLERANCE = "ToleranceCloud"  # torque of made springs around the design
     LOOP = "TorqueLoop"  # the torque loop over the angle: angles, and a LoopResponse at each
-    DIAGNOSIS = "DiagnoseRecords"  # what records say that the declared machine lacks: DiagnosisAnswer
+    DIAGNOSIS = "DiagnoseRecords"  # what records say that the declared machine lacks
     EXPORT = "ExportDesign"  # the design as a file: ExportedDesign
 
 
@@ -271,39 +271,24 @@ class LiveWork:
         return Lazy(WorkStage.DONE, revision, responses[nearest], words)
 
 
-@dataclass(frozen=True, eq=False)
-class CloudAnswer:
-    """What the spreads of all numbers do to the torque."""
+def tolerance_cloud(stage: Stage, machine: Assembly, target: Target, draws: int, seed: int) -> dict[str, Any]:
+    """Return what the spreads of all numbers do to the torque of a design.
 
-    angles: Array  # in rad
-    nominal: Array  # torque without deviations in N·m
-    band: Array  # torque below which 5, 50 and 95 % of the springs lie, shape (3, angles)
-    errors: Array  # rms error of each draw in N·m
-    rows: tuple[tuple[str, str], ...]  # summary: pairs of text
-
-
-def tolerance_cloud(stage: Stage, machine: Assembly, target: Target, draws: int, seed: int) -> CloudAnswer:
-    """Return the tolerance analysis of a design."""
+    ``band``: torque below which 5, 50 and 95 % of the springs lie, shape (3, angles); ``errors``: rms error
+    of each draw in N·m; ``rows``: summary, pairs of text.
+    """
     stage(f"computes {draws} made springs")
     result: ToleranceResult = tolerance_analysis(machine, target=target, draws=draws, seed=seed)
-    return CloudAnswer(result.angles, result.nominal, result.band, result.errors, tuple(result.rows()))
+    numbers = {name: getattr(result, name) for name in ("angles", "nominal", "band", "errors")}
+    return {**numbers, "rows": tuple(result.rows())}
 
 
-@dataclass(frozen=True, eq=False)
-class DiagnosisAnswer:
-    """What a diagnosis came to."""
+def diagnosis(stage: Stage, actuator: Assembly, folder: Path) -> dict[str, Any]:
+    """Return what the records of a folder say: verdict, effects in words, gap, a course, words, better deck.
 
-    verdict: str  # none, named, unknown, undecidable or data_suspect
-    effects: tuple[str, ...]  # what was named, in words
-    # gap: block, role of the records, and error before and after with noise floor and signal, in the unit
-    gap: dict[str, Any]
-    course: dict[str, Any]  # a held-out record over time: name, quantity, unit, time, measured, before, after
-    words: str  # the whole verdict as text
-    deck: str  # the better model as a deck
-
-
-def diagnosis(stage: Stage, actuator: Assembly, folder: Path) -> DiagnosisAnswer:
-    """Return what the records of a folder say."""
+    ``gap``: block, role of the records, and error before and after with noise floor and signal, in the unit;
+    ``course``: a held-out record over time.
+    """
     from ..bench.discrepancy import diagnose
     from ..bench.identification import load_records
     from ..components.assembly.deck_writer import deck_text
@@ -314,18 +299,18 @@ def diagnosis(stage: Stage, actuator: Assembly, folder: Path) -> DiagnosisAnswer
     verdict = diagnose(actuator, records, progress=stage)
     course = verdict.course
     every = max(1, len(course.time) // 1000)
-    return DiagnosisAnswer(
-        verdict=verdict.verdict,
-        effects=tuple(each.headline(verdict.actuator) for each in verdict.effects),
-        gap=verdict.gap()._asdict(),
-        course={
+    return {
+        "verdict": verdict.verdict,
+        "effects": [each.headline(verdict.actuator) for each in verdict.effects],
+        "gap": verdict.gap()._asdict(),
+        "course": {
             "record": course.record, "quantity": course.quantity, "unit": course.unit, "role": course.role,
             "time": course.time[::every], "measured": course.measured[::every],
             "before": course.before[::every], "after": course.after[::every],
         },
-        words=str(verdict),
-        deck=deck_text(verdict.actuator),
-    )  # fmt: skip
+        "words": str(verdict),
+        "deck": deck_text(verdict.actuator),
+    }  # fmt: skip
 
 
 def _designed(shown: AngleView | None) -> AngleView:
