@@ -253,9 +253,12 @@ def rolled(
     )
     slopes, step = [v.value for v in variables], end / INTERVALS
     begin = {"lever_arm": ca.SX(0), "way": ca.SX(0)}
-    (arms, taken), held, states = _course(
-        begin, slopes, lambda state, left, right: _next_way(state, left, right, step), arm
-    )
+
+    def further(state: State, left: Expression, right: Expression) -> State:
+        at, way = state
+        return at + step * (left + right) / 2, way + step * at + step**2 * (2 * left + right) / 6
+
+    (arms, taken), held, states = _course(begin, slopes, further, arm)
     angles = step * ca.SX(np.arange(INTERVALS + 1))
     edge = RollerEdge(angles, base + taken, arms, ca.vertcat(*slopes), radius)
     clear = Rows((edge.centre_radii - 1.01 * radius) / arm, 0.0, ca.inf)
@@ -273,12 +276,6 @@ def _rolling(
         edge.bearings, edge.bearings, edge.lever_arms, edge.radii, edge.radii_of_curvature, taken,
         edge.lever_arm_slopes, rows, True, *states, edge,
     )  # fmt: skip
-
-
-def _next_way(state: State, left: Expression, right: Expression, step: Expression) -> State:
-    """Return h and x one interval further."""
-    arm, taken = state
-    return arm + step * (left + right) / 2, taken + step * arm + step**2 * (2 * left + right) / 6
 
 
 def free_shape(

@@ -411,7 +411,12 @@ def _sides(drive: KnownDrive) -> list[tuple[float, float]]:
             next_step="fix the load, or prescribe its motion",
         )  # fmt: skip
     by_current = _by_current(drive)
-    return [(by_current(way), _by_contour(drive, way)) for way in (1.0, -1.0)]
+    # The torque at rest at the end of the contour; without a cam there is no end.
+    ends = contour_ends(drive.plant, series_spring(drive.plant)).values()
+    return [
+        (by_current(way), abs(torque_at_rest(drive, way * min(ends))) if ends else math.inf)
+        for way in (1.0, -1.0)
+    ]
 
 
 def _by_current(drive: KnownDrive) -> Callable[[float], float]:
@@ -446,12 +451,6 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
         return low
 
     return largest
-
-
-def _by_contour(drive: KnownDrive, way: float) -> float:
-    """Return the size of the torque at rest at the end of the contour; infinite without a cam."""
-    ends = contour_ends(drive.plant, series_spring(drive.plant)).values()
-    return abs(torque_at_rest(drive, way * min(ends))) if ends else math.inf
 
 
 def torque_at_rest(drive: KnownDrive, angle: float) -> float:

@@ -70,7 +70,12 @@ class ObserverDesign:
             return self.compact.torque_error
         grid = self.compact.angles
         fine = FineEntries.of(self.step.entries, float(grid[0]), float(grid[-1]), RESOLUTION)
-        return TableTrial(Draft(self.step.plant, lambda c: _written(self, c)), fine).error(self.compact)
+
+        def written(compact: Compact) -> ObserverDesign:
+            model = replace(_Writer(self.step, compact).model(), bodies=self.model.bodies)
+            return ObserverDesign(model, self.step, compact)
+
+        return TableTrial(Draft(self.step.plant, written), fine).error(self.compact)
 
     def start(self, angle: float) -> dict[str, float]:
         """Return the start values of an observer that begins while the actuator rests at an angle.
@@ -100,12 +105,6 @@ class ObserverDesign:
             f"  table error of {row}: {error:.2g}" for row, error in self.compact.error.items() if error
         ]
         return "\n".join(lines)
-
-
-def _written(design: ObserverDesign, compact: Compact) -> ObserverDesign:
-    """Return the observer with another table."""
-    model = replace(_Writer(design.step, compact).model(), bodies=design.model.bodies)
-    return ObserverDesign(model, design.step, compact)
 
 
 @remembered(16)
