@@ -32,12 +32,6 @@ _MOST_POINTS = 140
 """Of a line in the picture of the mechanism."""
 
 
-def answer_data(answer: LiveAnswer) -> dict[str, Any]:
-    """Return an answer as plain data."""
-    data: dict[str, Any] = to_json(dataclasses.replace(answer, design=None))
-    return {**data, "design": design_data(answer.design), "stale": answer.stale}
-
-
 def design_data(design: DesignView | None) -> dict[str, Any] | None:
     """Return a design as plain data, without the contour, which the mechanism shows.
 
@@ -261,7 +255,11 @@ class SessionNews:
             self._angle = min(0.6 * last if wanted is None else wanted, last)
             at = mechanism_data(self.live.shown, self._angle)
             self._look_due = True
-        self._outbox.page({"what": "answer", "number": number, "answer": answer_data(answer), "at": at})
+        data = {
+            **to_json(dataclasses.replace(answer, design=None)),
+            "design": design_data(answer.design), "stale": answer.stale,
+        }  # fmt: skip
+        self._outbox.page({"what": "answer", "number": number, "answer": data, "at": at})
 
     def turn(self, angle: float, number: int | None) -> None:
         """Show the mechanism at another angle."""

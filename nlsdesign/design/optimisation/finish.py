@@ -65,13 +65,6 @@ class SolvedSearch:
         """Torque error in N·m that the optimiser saw."""
         return self.search.problem.rms(self.best.point)
 
-    def start_outcome(self, outcome: Solution) -> StartOutcome:
-        """Return where a start came to, beside the one that was taken."""
-        problem = self.search.problem
-        same = same_design(problem, self.outcomes[self.taken], outcome)
-        error = problem.rms(outcome.point)
-        return StartOutcome(outcome.solved, outcome.status, outcome.iterations, outcome.cost, error, same)
-
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
         """Contour, and the declared cam made for it; none where the contour was given."""
@@ -203,7 +196,17 @@ def finished(solved: SolvedSearch) -> CamDesign:
         tolerance=tolerance,
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
-        starts=tuple(solved.start_outcome(outcome) for outcome in solved.outcomes),
+        starts=tuple(
+            StartOutcome(
+                each.solved,
+                each.status,
+                each.iterations,
+                each.cost,
+                problem.rms(each.point),
+                same_design(problem, solved.outcomes[solved.taken], each),
+            )
+            for each in solved.outcomes
+        ),
         taken=solved.taken,
         cam=cam,
         size_ranges=size_ranges(search, best.point, solved.predicted_rms)
