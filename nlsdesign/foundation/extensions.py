@@ -59,12 +59,7 @@ def extension_files(name: str) -> tuple[Path, ...]:
 
 def extension_names() -> tuple[str, ...]:
     """Return the names by which another process loads the packages that are there: :func:`load_extension`."""
-    return tuple(
-        str(Path(str(package.__file__)).absolute())
-        if package.__name__.startswith(_OF_A_FILE)
-        else package.__name__
-        for package in _PRESENT.get()
-    )
+    return tuple(_name_of(package) for package in _PRESENT.get())
 
 
 def load_extension(name: str) -> ModuleType:
@@ -80,6 +75,11 @@ def load_extension(name: str) -> ModuleType:
         raise _failed(name, error) from error
     except Exception as error:
         raise _failed(name, error) from error
+
+
+def _name_of(module: ModuleType) -> str:
+    of_a_file = module.__name__.startswith(_OF_A_FILE)
+    return str(Path(str(module.__file__)).absolute()) if of_a_file else module.__name__
 
 
 def _failed(name: str, error: Exception) -> NlsError:

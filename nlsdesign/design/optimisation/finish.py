@@ -60,6 +60,13 @@ class SolvedSearch:
     taken: int  # number of the best of them
     best: Solution  # that one, or what followed from it with knots rounded less
 
+    def start_outcome(self, outcome: Solution) -> StartOutcome:
+        """Return where a start came to, beside the one that was taken."""
+        problem = self.search.problem
+        same = same_design(problem, self.outcomes[self.taken], outcome)
+        error = problem.rms(outcome.point)
+        return StartOutcome(outcome.solved, outcome.status, outcome.iterations, outcome.cost, error, same)
+
     @cached_property
     def predicted_rms(self) -> float:
         """Torque error in N·m that the optimiser saw."""
@@ -196,17 +203,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         tolerance=tolerance,
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
-        starts=tuple(
-            StartOutcome(
-                each.solved,
-                each.status,
-                each.iterations,
-                each.cost,
-                problem.rms(each.point),
-                same_design(problem, solved.outcomes[solved.taken], each),
-            )
-            for each in solved.outcomes
-        ),
+        starts=tuple(solved.start_outcome(outcome) for outcome in solved.outcomes),
         taken=solved.taken,
         cam=cam,
         size_ranges=size_ranges(search, best.point, solved.predicted_rms)

@@ -134,18 +134,6 @@ class LawWriter:
         keep = ca.exp(-2.0 * math.pi * bandwidth * self.sample_time)
         return keep * old + (1 - keep) * new
 
-    def filtered_rate(
-        self, name: str, value: Expression, *, corner: Expression, of: str, unit: str, rate_unit: str
-    ) -> Expression:
-        """Return the filtered rate of a value; ``name``: what its states begin with, ``of``: what it is."""
-        before = self.state(f"{name}.previous", unit, f"{of} one sample ago")
-        old = self.state(f"{name}.rate", rate_unit, f"filtered rate of the {of}")
-        rate = self.low_pass(old, (value - before) / self.sample_time, corner)
-        self.begin(f"{name}.previous", value)
-        self.follow(f"{name}.previous", value)
-        self.follow(f"{name}.rate", rate)
-        return rate
-
     def model(self, name: str, description: str, output: tuple[Variable, Expression]) -> FlatModel:
         """Return the controller."""
         x, u, p = (
@@ -187,6 +175,19 @@ class LawWriter:
         for _ in range(_DEPTH):
             begun = ca.substitute(first, ca.SX(x), begun)
         return ca.Function("begin", [x, u, p, w], [ca.densify(begun), ca.densify(ca.vertcat(*again))])
+
+
+def filtered_rate(
+    writer: LawWriter, name: str, *, value: Expression, corner: Expression, of: str, unit: str, rate_unit: str
+) -> Expression:
+    """Return the filtered rate of a value; ``name``: what its states begin with, ``of``: what it is."""
+    before = writer.state(f"{name}.previous", unit, f"{of} one sample ago")
+    old = writer.state(f"{name}.rate", rate_unit, f"filtered rate of the {of}")
+    rate = writer.low_pass(old, (value - before) / writer.sample_time, corner)
+    writer.begin(f"{name}.previous", value)
+    writer.follow(f"{name}.previous", value)
+    writer.follow(f"{name}.rate", rate)
+    return rate
 
 
 def limited(value: Expression, limit: Expression) -> Expression:

@@ -21,7 +21,15 @@ from ....model.roles import contour_ends, series_spring
 from ....model.transform import named
 from ...analysis.rest import evaluate_at, rest_states
 from .known_drive import KnownDrive
-from .law_writer import GAIN, AntiWindup, ConditionalIntegration, Integration, LawWriter, limited
+from .law_writer import (
+    GAIN,
+    AntiWindup,
+    ConditionalIntegration,
+    Integration,
+    LawWriter,
+    filtered_rate,
+    limited,
+)
 
 
 class Heard(NamedTuple):
@@ -154,8 +162,14 @@ class PidTorque(TorqueLaw):
             self.derivative_bandwidth,
         )  # fmt: skip
         error = heard.desired - heard.torque
-        rate = writer.filtered_rate(
-            "torque_loop.error", error, corner=corner, of="torque error", unit="N*m", rate_unit="N*m/s"
+        rate = filtered_rate(
+            writer,
+            "torque_loop.error",
+            value=error,
+            corner=corner,
+            of="torque error",
+            unit="N*m",
+            rate_unit="N*m/s",
         )
         integral = writer.state("torque_loop.integral", "rad/s", "integral part of the speed command")
         asked = gain * error + integral + fast * rate
@@ -262,9 +276,10 @@ class FilteredDifference(DesiredRate):
             "rate_bandwidth", "Hz", "torque loop: corner of the filter on the rate of the desired torque",
             self.bandwidth,
         )  # fmt: skip
-        return writer.filtered_rate(
+        return filtered_rate(
+            writer,
             "torque_loop.desired",
-            heard.desired,
+            value=heard.desired,
             corner=corner,
             of="desired torque",
             unit="N*m",
@@ -399,9 +414,10 @@ class ScheduledTorque(TorqueLaw):
             "acceleration_bandwidth", "Hz", "torque loop: corner of the filter on that acceleration",
             self.acceleration_bandwidth,
         )  # fmt: skip
-        return share * writer.filtered_rate(
+        return share * filtered_rate(
+            writer,
             "torque_loop.feedforward",
-            ahead,
+            value=ahead,
             corner=corner,
             of="feedforward",
             unit="rad/s",
