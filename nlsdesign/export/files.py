@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 from ..foundation.errors import ExportError
 from ..foundation.text_files import draft
+from ..model import FlatModel
 
 BROKEN_ARCHIVE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,
@@ -46,6 +47,18 @@ def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
         return "".join(f"{match['indent']}{row}\n" if row else "\n" for row in value)
 
     return _PLACEHOLDER.sub(replacement, template(name))
+
+
+def check_continuous(model: FlatModel, *, sampled: str, step: str, sharp: str) -> None:
+    """Refuse a sampled model, with what to do instead, and one with sharp laws; the words say why."""
+    if model.sample_time is not None or model.tables:
+        raise ExportError(f"model '{model.name}'", sampled, next_step=step)
+    if model.switching is not None and model.switching.jumps:
+        raise ExportError(
+            f"model '{model.name}': '{model.switching.jumps[0]}'", sharp,
+            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as "
+            "FMU, which holds the sharp form",
+        )  # fmt: skip
 
 
 def xml_text(root: ElementTree.Element) -> str:
