@@ -39,11 +39,9 @@ from nlsdesign.presentation.figures.cam_motion import CamMotion, cam_motion
 from nlsdesign.presentation.figures.loop_evaluation import coupled_stability_map
 from nlsdesign.presentation.figures.over_time import ClosedLoopRun
 from nlsdesign.presentation.figures.sweep_figures import (
-    MarkedQuantile,
     PointKinds,
     ShownColumn,
     SurfacePanel,
-    VarianceShare,
     answer_histograms,
     answers_against,
     response_surfaces,
@@ -241,7 +239,7 @@ def surfaces() -> figures.Figure:
 
 def distributions() -> figures.Figure:
     columns = sweep_points()[0][2:]
-    marks = [MarkedQuantile(0.5, 1.1, 0.9, 1.3), MarkedQuantile(0.95, 1.4, 1.2, math.nan)]
+    marks = [(0.5, 1.1, 0.9, 1.3), (0.95, 1.4, 1.2, math.nan)]
     return answer_histograms(
         columns, [marks, marks], words="Error and mass of 40 points, two quantiles each."
     )
@@ -249,8 +247,8 @@ def distributions() -> figures.Figure:
 
 def shares() -> figures.Figure:
     rows = [
-        VarianceShare("area", 0.6, 0.1, 0.7, 0.1),
-        VarianceShare("inertia", 0.2, 0.1, 0.3, 0.1),
+        ("area", 0.6, 0.1, 0.7, 0.1),
+        ("inertia", 0.2, 0.1, 0.3, 0.1),
     ]
     return sensitivity_bars({"error": rows}, words="Area causes 60 % of the variance of the error.")
 

@@ -10,9 +10,11 @@ import zlib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
+from xml.etree import ElementTree
 
 from ..foundation.errors import ExportError
 from ..foundation.text_files import draft
+from ..model import FlatModel
 
 BROKEN_ARCHIVE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,
@@ -45,6 +47,24 @@ def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
         return "".join(f"{match['indent']}{row}\n" if row else "\n" for row in value)
 
     return _PLACEHOLDER.sub(replacement, template(name))
+
+
+def check_continuous(model: FlatModel, *, sampled: str, step: str, sharp: str) -> None:
+    """Refuse a sampled model, with what to do instead, and one with sharp laws; the words say why."""
+    if model.sample_time is not None or model.tables:
+        raise ExportError(f"model '{model.name}'", sampled, next_step=step)
+    if model.switching is not None and model.switching.jumps:
+        raise ExportError(
+            f"model '{model.name}': '{model.switching.jumps[0]}'", sharp,
+            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as "
+            "FMU, which holds the sharp form",
+        )  # fmt: skip
+
+
+def xml_text(root: ElementTree.Element) -> str:
+    """Return a tree of elements as the text of a file."""
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
 def write_all(texts: Mapping[Path, str]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..design.parametric.cam_question import NumberState
 from ..foundation.arrays import Array
 from ..foundation.quantity import parse_unit, with_unit
 
@@ -74,17 +75,6 @@ class LimitMargin:
         return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
 
 
-@dataclass(frozen=True)
-class ShownNumber:
-    """A number of the design in SI."""
-
-    name: str
-    value: float
-    unit: str
-    shown_unit: str
-    free: bool  # whether the design chose it
-
-
 @dataclass(frozen=True, eq=False)
 class LiveControls:
     """What a designer can move, as it stands now; numbers in SI."""
@@ -124,7 +114,7 @@ class DesignView:
     met: bool  # whether that is within the 1 % that a design may miss
     margins: tuple[LimitMargin, ...]  # to each limit
     active: tuple[str, ...]  # names of the limits that the design sits on
-    numbers: tuple[ShownNumber, ...]  # that the design chose or was given
+    numbers: tuple[NumberState, ...]  # that the design chose or was given
     contour: Array  # points of the lip in the frame of the cam, shape (n, 2), in m
     rubber_volume: float  # in m³
     strain_end: float = math.inf  # strain to which the rubber may be believed; infinite without rubber
@@ -225,13 +215,9 @@ class Lazy:
 
 @dataclass(frozen=True, eq=False)
 class AngleAnswer:
-    """What holds at one angle."""
+    """What holds at one angle, besides the mechanism."""
 
     angle: float  # in rad
-    revision: int
-    mechanism: Mechanism | None  # cam, cable and rubber to scale; None where the contour has no outline
-    # readings: the columns of the design at this angle, by interpolation; each with one value
-    readings: tuple[LiveColumn, ...]
     # observability, poles, loop: each with a state of its own; the value is SeenStates, a tuple of PoleGroup,
     # and LoopResponse
     observability: Lazy

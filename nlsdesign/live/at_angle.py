@@ -23,7 +23,6 @@ from .answers import (
     AngleAnswer,
     DesignView,
     Lazy,
-    LiveColumn,
     LoopResponse,
     Mechanism,
     PoleGroup,
@@ -132,19 +131,8 @@ class AngleView:
         extensions = (float(column[0]), now, float(column[-1]))
         return mechanism_at(self.contour, angle, extensions=extensions, rest_length=self.rest_length)
 
-    def readings(self, angle: float) -> tuple[LiveColumn, ...]:
-        """Return the columns of the design at one angle, by interpolation.
-
-        ``angle``: in rad; the curves are those of the positive side.
-        """
-        at = self.view.columns[0].values
-        return tuple(
-            LiveColumn(c.name, c.unit, c.description, np.array([np.interp(abs(angle), at, c.values)]))
-            for c in self.view.columns
-        )
-
     def answer(self, angle: float, loop: Lazy) -> AngleAnswer:
-        """Return all that holds at one angle."""
+        """Return what holds at one angle besides the mechanism."""
         points: list[RestPoints] = []
 
         def rest() -> RestPoints:
@@ -153,22 +141,8 @@ class AngleView:
                 points.append(rest_points(self.model, here, angle=self._grid.angle, consistent=None))
             return points[0]
 
-        return AngleAnswer(
-            angle=angle,
-            revision=self.view.revision,
-            mechanism=self._picture(angle),
-            readings=self.readings(angle),
-            observability=self._lazily(lambda: seen_states(rest())),
-            poles=self._lazily(lambda: pole_groups(rest())),
-            loop=loop,
-        )
-
-    def _picture(self, angle: float) -> Mechanism | None:
-        """Return the mechanism; a contour without an outline has poles and torque all the same."""
-        try:
-            return self.mechanism(angle)
-        except NlsError:
-            return None
+        observability = self._lazily(lambda: seen_states(rest()))
+        return AngleAnswer(angle, observability, self._lazily(lambda: pole_groups(rest())), loop)
 
     def _lazily(self, make: Callable[[], object]) -> Lazy:
         try:

@@ -14,7 +14,7 @@ from .edits import LiveEdit
 from .question import LiveQuestion, finite_in
 from .saved import SavedDesign, saved
 from .views import controls_of, holding, not_kept, quick_view_of
-from .work import FullDesign, LiveTask, LiveWork, ToleranceCloud, full_answer
+from .work import FullDesign, LiveWork, Work, full_answer
 
 MOST_SNAPSHOTS = 8
 """Designs that are kept side by side."""
@@ -205,7 +205,7 @@ class LiveDesign:
     """State, edits and answers of one designer; one thread at a time.
 
     Each edit gives an answer at once, from the previous design. :meth:`start` begins the whole design
-    (``SettleDesign()``) in a process of its own; its answer replaces the quick one when
+    (``Work.SETTLE``) in a process of its own; its answer replaces the quick one when
     :meth:`poll` finds it done.
 
     ``question``: with which it begins, for instance ``gallery_question("cam-actuator")``. ``values``: numbers
@@ -258,14 +258,14 @@ class LiveDesign:
             raise ValueRangeError("angle", "there is no design yet", next_step="widen a limit first")
         return self.shown.answer(angle, self.work.loop_at(angle, self.shown))
 
-    def start(self, task: LiveTask) -> WorkState:
-        """Start a piece of long work on the design as it stands; one of its kind that runs is cancelled."""
-        if isinstance(task, ToleranceCloud) and self.answer.stale:
+    def start(self, name: Work, *settings: object) -> WorkState:
+        """Start long work of a kind on the design as it stands; one of its kind that runs is cancelled."""
+        if name is Work.TOLERANCE and self.answer.stale:
             raise ValueRangeError(
                 "tolerance cloud", "would hold an earlier design against the target of now",
                 next_step="widen a limit until there is a design",
             )  # fmt: skip
-        return self.work.start(task, self.question, self.answer.revision, self.shown)
+        return self.work.start(name, self.question, self.answer.revision, self.shown, *settings)
 
     def poll(self) -> tuple[WorkState, ...]:
         """Return how far all work is; a whole design that is done replaces the quick answer."""

@@ -245,7 +245,14 @@ def serve(
 
     async def run() -> None:
         async with _kept_in_bounds(sessions):
-            await Server(_settings(application(sessions, access))).serve(sockets=[listener])
+            settings = uvicorn.Config(
+                application(sessions, access), loop="asyncio", http="h11", ws="websockets-sansio",
+                lifespan="off", log_level="critical", access_log=False, server_header=False,
+                date_header=False, proxy_headers=False, ws_max_size=LONGEST_MESSAGE,
+                ws_per_message_deflate=False, h11_max_incomplete_event_size=1 << 15,
+                timeout_graceful_shutdown=0, limit_concurrency=200,
+            )  # fmt: skip
+            await Server(settings).serve(sockets=[listener])
         # An interrupt that came when there was nothing to wait for cancels this task at its next pause.
         await asyncio.sleep(0)
 
@@ -281,17 +288,6 @@ def _require_libraries() -> None:
     except ImportError as error:
         raise missing_library("the live page", error.name or "starlette", "live") from None
     del starlette, uvicorn, websockets
-
-
-def _settings(app: Any) -> Any:
-    import uvicorn
-
-    return uvicorn.Config(
-        app, loop="asyncio", http="h11", ws="websockets-sansio", lifespan="off", log_level="critical",
-        access_log=False, server_header=False, date_header=False, proxy_headers=False,
-        ws_max_size=LONGEST_MESSAGE, ws_per_message_deflate=False, h11_max_incomplete_event_size=1 << 15,
-        timeout_graceful_shutdown=0, limit_concurrency=200,
-    )  # fmt: skip
 
 
 def _listener(host: str, port: int) -> socket.socket:

@@ -21,7 +21,7 @@ from .saved import archived, reopened, unarchived
 from .session_news import TASKS, SessionNews, choices
 from .sessions import plain_letters
 from .views import in_words
-from .work import ExportDesign
+from .work import Work
 
 Asked = Mapping[str, Any]
 
@@ -196,7 +196,7 @@ class SessionDesign:
         self._refuse_file("another file was asked for meanwhile")
         answer = self._news.live.answer
         self._file_note = _EARLIER.format(answer.state) if answer.stale else ""
-        self._news.live.start(ExportDesign(str(asked["kind"]), self._file_note))
+        self._news.live.start(Work.EXPORT, str(asked["kind"]), self._file_note)
         self._file_for = asked["number"]
         return None
 

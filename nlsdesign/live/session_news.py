@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,25 +25,11 @@ from .live_design import LiveDesign
 from .messages import Outbox
 from .tasks import motor_over_tasks
 from .views import in_words
-from .work import (
-    DiagnoseRecords,
-    ExportDesign,
-    FullDesign,
-    LiveTask,
-    SettleDesign,
-    ToleranceCloud,
-    TorqueLoop,
-)
+from .work import FullDesign, Work
 
 _DIGITS = 7
 _MOST_POINTS = 140
 """Of a line in the picture of the mechanism."""
-
-
-def answer_data(answer: LiveAnswer) -> dict[str, Any]:
-    """Return an answer as plain data."""
-    data: dict[str, Any] = to_json(dataclasses.replace(answer, design=None))
-    return {**data, "design": design_data(answer.design), "stale": answer.stale}
 
 
 def design_data(design: DesignView | None) -> dict[str, Any] | None:
@@ -107,13 +92,8 @@ def _fewer(points: Array) -> Array:
     return fewer
 
 
-TASKS: Final[Mapping[str, Callable[[Path], LiveTask]]] = {
-    SettleDesign.__name__: lambda _: SettleDesign(),
-    ToleranceCloud.__name__: lambda _: ToleranceCloud(),
-    TorqueLoop.__name__: lambda _: TorqueLoop(),
-    DiagnoseRecords.__name__: DiagnoseRecords,
-}
-"""The kinds of work that a page may ask for, each made for a folder of records."""
+TASKS: Final = (Work.SETTLE, Work.TOLERANCE, Work.LOOP, Work.DIAGNOSIS)
+"""The kinds of work that a page may ask for."""
 _MOST_STAGES = 60
 
 
@@ -138,10 +118,10 @@ class WorkNews:
 
     def start(self, name: str) -> None:
         """Start work of a kind."""
-        task = TASKS[name](self._records)
-        if isinstance(task, DiagnoseRecords):
+        diagnosis = name == Work.DIAGNOSIS
+        if diagnosis:
             self._records.mkdir(parents=True, exist_ok=True)
-        state = self._live.start(task)
+        state = self._live.start(Work(name), *([self._records] if diagnosis else []))
         self._stages[name] = []
         self._began_with[name] = self._basis(name)
         self._noted(state)
@@ -155,7 +135,7 @@ class WorkNews:
     @property
     def export(self) -> WorkState | None:
         """How far the file is that was asked for last."""
-        return next((each for each in self._live.work.states() if each.name == ExportDesign.__name__), None)
+        return next((each for each in self._live.work.states() if each.name == Work.EXPORT), None)
 
     def changed(self) -> list[dict[str, Any]]:
         """Return the news of all work that has changed; a whole design that is done has become the answer."""
@@ -180,7 +160,7 @@ class WorkNews:
             return {"name": name, "state": WorkStage.NOT_BEGUN, "message": "", "revision": 0, "seconds": 0.0,
                     "stages": [], "value": None, "old": False, **self._files(name)}  # fmt: skip
         # The whole design becomes the answer, and the loop is asked for angle by angle.
-        shown = not isinstance(state.value, FullDesign) and name != TorqueLoop.__name__
+        shown = not isinstance(state.value, FullDesign) and name != Work.LOOP
         return {
             "name": name, "state": state.state, "message": state.message, "revision": state.revision,
             "seconds": state.seconds, "stages": self._stages.get(name, []),
@@ -203,14 +183,14 @@ class WorkNews:
     def _basis(self, name: str) -> tuple[Any, ...]:
         """Return what work of a kind is about: a diagnosis the records and the machine as it is declared."""
         live = self._live
-        if name == DiagnoseRecords.__name__:
+        if name == Work.DIAGNOSIS:
             # Points and limits belong to the design, not to the machine.
             return (_listed(self._records), live.question.machine, dict(live.question.given))
         design = live.answer.design
         return live.answer.revision, design is not None and design.checked
 
     def _files(self, name: str) -> dict[str, Any]:
-        if name != DiagnoseRecords.__name__:
+        if name != Work.DIAGNOSIS:
             return {}
         return {"files": [each[0] for each in _listed(self._records)]}
 
@@ -275,7 +255,11 @@ class SessionNews:
             self._angle = min(0.6 * last if wanted is None else wanted, last)
             at = mechanism_data(self.live.shown, self._angle)
             self._look_due = True
-        self._outbox.page({"what": "answer", "number": number, "answer": answer_data(answer), "at": at})
+        data = {
+            **to_json(dataclasses.replace(answer, design=None)),
+            "design": design_data(answer.design), "stale": answer.stale,
+        }  # fmt: skip
+        self._outbox.page({"what": "answer", "number": number, "answer": data, "at": at})
 
     def turn(self, angle: float, number: int | None) -> None:
         """Show the mechanism at another angle."""
@@ -308,7 +292,7 @@ class SessionNews:
         """Begin the whole design once the hand rests; one that runs is of no use any more."""
         quick = self.live.answer.source is AnswerSource.QUICK
         self._settle_at = time.monotonic() + _REST if quick else None
-        self.live.work.cancel(SettleDesign.__name__)
+        self.live.work.cancel(Work.SETTLE)
 
     def pause(self) -> None:
         """Do what may wait while a hand moves: what holds at the angle, the whole design, news of work."""
@@ -316,19 +300,12 @@ class SessionNews:
             if self._look_due:
                 self._look_due = False
                 if self.live.shown is not None and self._angle is not None:
-                    # What holds at an angle as plain data, without the mechanism, which is sent before.
-                    answer = self.live.at(self._angle)
-                    at = {
-                        "angle": answer.angle,
-                        "observability": to_json(answer.observability),
-                        "poles": to_json(answer.poles),
-                        "loop": to_json(answer.loop),
-                    }
+                    at = to_json(self.live.at(self._angle))
                     self._outbox.page({"what": "at", "number": None, "at": at})
                 self.paid()
             if self._settle_at is not None and time.monotonic() >= self._settle_at:
                 self._settle_at = None
-                self.live.start(SettleDesign())
+                self.live.start(Work.SETTLE)
         except NlsError as error:
             self.refuse(str(error), None)
         self.news()
@@ -348,7 +325,7 @@ class SessionNews:
         before = self.live.answer
         for each in self.work.changed():
             self._outbox.page({"what": "work", "work": each})
-            if each["name"] == TorqueLoop.__name__:
+            if each["name"] == Work.LOOP:
                 self._look_due = True
         if self.live.answer is not before:
             self.answer(self.live.answer, None, None)

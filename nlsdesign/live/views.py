@@ -12,12 +12,12 @@ from ..design import CamDesign, LimitState
 from ..design.optimisation.defaults import StrainEnd
 from ..design.optimisation.limits import limit_kinds
 from ..design.optimisation.result import DesignCurves
-from ..design.parametric.cam_question import LimitNumber
+from ..design.parametric.cam_question import LimitNumber, NumberState
 from ..design.parametric.parametric_solver import ParametricDesign
 from ..design.statics.equilibrium import cam_function, elastic_law
 from ..foundation.arrays import Array
 from ..model import FlatModel
-from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
+from .answers import DesignView, LimitMargin, LiveColumn, LiveControls
 from .question import LiveQuestion
 
 _OTHERS = {
@@ -172,12 +172,9 @@ def margins_of(states: Iterable[LimitState]) -> tuple[LimitMargin, ...]:
     )  # fmt: skip
 
 
-def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[ShownNumber, ...]:
+def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[NumberState, ...]:
     """Return the numbers of a design."""
-    return tuple(
-        ShownNumber(n.name, values.get(n.name, n.value), n.unit, n.shown_unit, n.free)
-        for n in question.numbers.values()
-    )
+    return tuple(n._replace(value=values.get(n.name, n.value)) for n in question.numbers.values())
 
 
 def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignView:

@@ -8,9 +8,9 @@ from __future__ import annotations
 import io
 import tempfile
 import zipfile
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -56,6 +56,9 @@ from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
 from .question import LiveQuestion
 from .views import in_words, not_kept, unkept, view_of
+
+Stage = Callable[[str], None]
+"""Told in words what is done now."""
 
 _LARGEST_ERROR = 0.05
 """Assumed: part of the largest torque by which a made spring may err, and its torque may be unknown, rms."""
@@ -146,90 +149,69 @@ def will_be_known(model: FlatModel, largest: float) -> tuple[str, str]:
     return (YES if least <= _LARGEST_ERROR * largest else NO), words
 
 
-MOST_DRAWS = 2000
-_FEWEST_DRAWS = 20
+_CLOUD_DRAWS = 200
 _MOST_FILES = 60
 _MOST_BYTES = 200_000_000
 
 
-@dataclass(frozen=True)
-class LiveTask(ABC):
-    """Base of the kinds of long work; of each kind one runs at a time."""
+class Work(StrEnum):
+    """The kinds of long work, by the names that messages of the page give them."""
 
-    @abstractmethod
-    def call(
-        self, question: LiveQuestion, shown: AngleView | None
-    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the function that does it and its arguments, picklable."""
-
-
-@dataclass(frozen=True)
-class SettleDesign(LiveTask):
-    """The whole design of the question: :class:`~.work.FullDesign`."""
-
-    def call(
-        self, question: LiveQuestion, shown: AngleView | None
-    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the whole design."""
-        asked = (question.actuator, question.target, question.free, question.keep)
-        return whole_design, (*asked, question.held_contour)
+    SETTLE = "SettleDesign"  # the whole design of the question: FullDesign
+    TOLERANCE = "ToleranceCloud"  # torque of made springs around the design
+    LOOP = "TorqueLoop"  # the torque loop over the angle: angles, and a LoopResponse at each
+    DIAGNOSIS = "DiagnoseRecords"  # what records say that the declared machine lacks
+    EXPORT = "ExportDesign"  # the design as a file: ExportedDesign
 
 
-@dataclass(frozen=True)
-class ToleranceCloud(LiveTask):
-    """Torque of made springs around the design: :class:`CloudAnswer`."""
-
-    draws: int = 200
-    seed: int = 1
-
-    def call(
-        self, question: LiveQuestion, shown: AngleView | None
-    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the analysis on the finished assembly."""
-        for what, number, least, most in (
-            ("draws", self.draws, _FEWEST_DRAWS, MOST_DRAWS),
-            ("seed", self.seed, 0, 2**31 - 1),
-        ):
-            if isinstance(number, bool) or not isinstance(number, int) or not least <= number <= most:
-                raise ValueRangeError(
-                    f"{what} = {number!r:.40}", f"must be a whole number from {least} to {most}",
-                    next_step="take 200 draws",
-                )  # fmt: skip
-        view = _designed(shown)
-        return tolerance_cloud, (view.machine, question.target, self.draws, self.seed)
+Call = tuple[Callable[..., Any], tuple[Any, ...]]
+"""The function that does long work and its arguments, picklable."""
 
 
-@dataclass(frozen=True)
-class TorqueLoop(LiveTask):
-    """The torque loop over the angle: angles, and a :class:`~.answers.LoopResponse` at each."""
-
-    def call(
-        self, question: LiveQuestion, shown: AngleView | None
-    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the responses of the loop."""
-        view = _designed(shown)
-        return loop_responses, (view.machine, float(view.view.columns[0].values[-1]))
+def _settled(question: LiveQuestion, _: AngleView | None) -> Call:
+    asked = (question.actuator, question.target, question.free, question.keep)
+    return whole_design, (*asked, question.held_contour)
 
 
-@dataclass(frozen=True)
-class DiagnoseRecords(LiveTask):
-    """What bench records say that the declared machine lacks: :class:`DiagnosisAnswer`."""
+def _tolerance(question: LiveQuestion, shown: AngleView | None) -> Call:
+    return tolerance_cloud, (_designed(shown).machine, question.target, _CLOUD_DRAWS, 1)
 
-    folder: Path  # of the records, as for load_records; bounded in number and size of files
 
-    def call(
-        self, question: LiveQuestion, shown: AngleView | None
-    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the diagnosis of the machine as it is declared, not as it is designed."""
-        files = [file for file in Path(self.folder).iterdir() if file.is_file()]
-        size = sum(file.stat().st_size for file in files)
-        if not 1 <= len(files) <= _MOST_FILES or size > _MOST_BYTES:
-            raise ValueRangeError(
-                f"{len(files)} files of records, {size / 1e6:.1f} MB",
-                f"must be 1 to {_MOST_FILES} files and at most {_MOST_BYTES / 1e6:.0f} MB",
-                next_step="take some records out, or use nlsdesign diagnose",
-            )
-        return diagnosis, (question.actuator, Path(self.folder))
+def _loop(_: LiveQuestion, shown: AngleView | None) -> Call:
+    view = _designed(shown)
+    return loop_responses, (view.machine, float(view.view.columns[0].values[-1]))
+
+
+def _diagnosis(question: LiveQuestion, _: AngleView | None, folder: Path) -> Call:
+    """Return the diagnosis of the machine as it is declared, not as it is designed."""
+    files = [file for file in folder.iterdir() if file.is_file()]
+    size = sum(file.stat().st_size for file in files)
+    if not 1 <= len(files) <= _MOST_FILES or size > _MOST_BYTES:
+        raise ValueRangeError(
+            f"{len(files)} files of records, {size / 1e6:.1f} MB",
+            f"must be 1 to {_MOST_FILES} files and at most {_MOST_BYTES / 1e6:.0f} MB",
+            next_step="take some records out, or use nlsdesign diagnose",
+        )
+    return diagnosis, (question.actuator, folder)
+
+
+def _export(_: LiveQuestion, shown: AngleView | None, what: str, note: str) -> Call:
+    """Return the export of the last good design; ``note``: what the head of the file says."""
+    if what not in EXPORTS:
+        raise unknown_name("export", what[:80], EXPORTS)
+    if shown is None:
+        raise ValueRangeError("export", "there is no design yet", next_step="widen a limit first")
+    return EXPORTS[what], (shown.machine, shown.contour, note)
+
+
+_CALLS: Mapping[Work, Callable[..., Call]] = {
+    Work.SETTLE: _settled,
+    Work.TOLERANCE: _tolerance,
+    Work.LOOP: _loop,
+    Work.DIAGNOSIS: _diagnosis,
+    Work.EXPORT: _export,
+}
+"""How each kind of work is called for a question and the design that is shown, with its settings."""
 
 
 class LiveWork:
@@ -240,11 +222,10 @@ class LiveWork:
         self._designs: dict[str, AngleView | None] = {}
 
     def start(
-        self, task: LiveTask, question: LiveQuestion, revision: int, shown: AngleView | None
+        self, name: Work, question: LiveQuestion, revision: int, shown: AngleView | None, *settings: object
     ) -> WorkState:
-        """Start a task; one of its kind that runs is cancelled."""
-        work, arguments = task.call(question, shown)
-        name = type(task).__name__
+        """Start work of a kind with its settings; one of its kind that runs is cancelled."""
+        work, arguments = _CALLS[name](question, shown, *settings)
         self.cancel(name)
         self._running[name] = BackgroundWork(name, revision, work, arguments)
         self._designs[name] = shown
@@ -275,9 +256,9 @@ class LiveWork:
 
     def loop_at(self, angle: float, shown: AngleView) -> Lazy:
         """Return the torque loop at one angle, where it was asked for and computed for this design."""
-        work, revision = self._running.get(TorqueLoop.__name__), shown.view.revision
+        work, revision = self._running.get(Work.LOOP), shown.view.revision
         state = None if work is None else work.state()
-        begun = self._designs.get(TorqueLoop.__name__)
+        begun = self._designs.get(Work.LOOP)
         # A checked design has the revision of the quick one whose place it takes, but not its contour.
         if state is None or begun is None or begun.contour is not shown.contour:
             return Lazy(WorkStage.LATER, revision)
@@ -290,41 +271,24 @@ class LiveWork:
         return Lazy(WorkStage.DONE, revision, responses[nearest], words)
 
 
-@dataclass(frozen=True, eq=False)
-class CloudAnswer:
-    """What the spreads of all numbers do to the torque."""
+def tolerance_cloud(stage: Stage, machine: Assembly, target: Target, draws: int, seed: int) -> dict[str, Any]:
+    """Return what the spreads of all numbers do to the torque of a design.
 
-    angles: Array  # in rad
-    nominal: Array  # torque without deviations in N·m
-    band: Array  # torque below which 5, 50 and 95 % of the springs lie, shape (3, angles)
-    errors: Array  # rms error of each draw in N·m
-    rows: tuple[tuple[str, str], ...]  # summary: pairs of text
-
-
-def tolerance_cloud(
-    stage: Callable[[str], None], machine: Assembly, target: Target, draws: int, seed: int
-) -> CloudAnswer:
-    """Return the tolerance analysis of a design."""
+    ``band``: torque below which 5, 50 and 95 % of the springs lie, shape (3, angles); ``errors``: rms error
+    of each draw in N·m; ``rows``: summary, pairs of text.
+    """
     stage(f"computes {draws} made springs")
     result: ToleranceResult = tolerance_analysis(machine, target=target, draws=draws, seed=seed)
-    return CloudAnswer(result.angles, result.nominal, result.band, result.errors, tuple(result.rows()))
+    numbers = {name: getattr(result, name) for name in ("angles", "nominal", "band", "errors")}
+    return {**numbers, "rows": tuple(result.rows())}
 
 
-@dataclass(frozen=True, eq=False)
-class DiagnosisAnswer:
-    """What a diagnosis came to."""
+def diagnosis(stage: Stage, actuator: Assembly, folder: Path) -> dict[str, Any]:
+    """Return what the records of a folder say: verdict, effects in words, gap, a course, words, better deck.
 
-    verdict: str  # none, named, unknown, undecidable or data_suspect
-    effects: tuple[str, ...]  # what was named, in words
-    # gap: block, role of the records, and error before and after with noise floor and signal, in the unit
-    gap: dict[str, Any]
-    course: dict[str, Any]  # a held-out record over time: name, quantity, unit, time, measured, before, after
-    words: str  # the whole verdict as text
-    deck: str  # the better model as a deck
-
-
-def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) -> DiagnosisAnswer:
-    """Return what the records of a folder say."""
+    ``gap``: block, role of the records, and error before and after with noise floor and signal, in the unit;
+    ``course``: a held-out record over time.
+    """
     from ..bench.discrepancy import diagnose
     from ..bench.identification import load_records
     from ..components.assembly.deck_writer import deck_text
@@ -335,18 +299,18 @@ def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) ->
     verdict = diagnose(actuator, records, progress=stage)
     course = verdict.course
     every = max(1, len(course.time) // 1000)
-    return DiagnosisAnswer(
-        verdict=verdict.verdict,
-        effects=tuple(each.headline(verdict.actuator) for each in verdict.effects),
-        gap=verdict.gap()._asdict(),
-        course={
+    return {
+        "verdict": verdict.verdict,
+        "effects": [each.headline(verdict.actuator) for each in verdict.effects],
+        "gap": verdict.gap()._asdict(),
+        "course": {
             "record": course.record, "quantity": course.quantity, "unit": course.unit, "role": course.role,
             "time": course.time[::every], "measured": course.measured[::every],
             "before": course.before[::every], "after": course.after[::every],
         },
-        words=str(verdict),
-        deck=deck_text(verdict.actuator),
-    )  # fmt: skip
+        "words": str(verdict),
+        "deck": deck_text(verdict.actuator),
+    }  # fmt: skip
 
 
 def _designed(shown: AngleView | None) -> AngleView:
@@ -376,7 +340,7 @@ class FullDesign:
 
 
 def whole_design(
-    stage: Callable[[str], None],
+    stage: Stage,
     actuator: Assembly,
     target: Target,
     free: tuple[str, ...],
@@ -482,46 +446,19 @@ class ExportedDesign:
     content: bytes
 
 
-@dataclass(frozen=True, eq=False)
-class ShownDesign:
-    """The design that is exported: the changed machine, the contour of its cam, and a note for the files."""
-
-    machine: Assembly
-    contour: Contour
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class ExportDesign(LiveTask):
-    """The design as a file: :class:`ExportedDesign`."""
-
-    what: str  # "deck", "svg", "dxf", "c" or "fmu"
-    note: str = ""  # what the head of the file says; empty for nothing
-
-    def call(
-        self, question: LiveQuestion, shown: AngleView | None
-    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the export of the last good design."""
-        if self.what not in EXPORTS:
-            raise unknown_name("export", self.what[:80], EXPORTS)
-        if shown is None:
-            raise ValueRangeError("export", "there is no design yet", next_step="widen a limit first")
-        return EXPORTS[self.what], (ShownDesign(shown.machine, shown.contour, self.note),)
-
-
-def exported_deck(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+def exported_deck(_: Stage, machine: Assembly, __: Contour, note: str) -> ExportedDesign:
     """Return the machine as a deck."""
-    text = f"# {design.note}\n{deck_text(design.machine)}" if design.note else deck_text(design.machine)
-    return ExportedDesign(f"{design.machine.name}.toml", text.encode())
+    text = f"# {note}\n{deck_text(machine)}" if note else deck_text(machine)
+    return ExportedDesign(f"{machine.name}.toml", text.encode())
 
 
-def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+def exported_c(stage: Stage, machine: Assembly, _: Contour, note: str) -> ExportedDesign:
     """Return cascade observer and torque controller as C, in an archive."""
     from ..export import export_c
     from ..feedback.control import joined, torque_controller
     from ..feedback.observer import CascadeGain, design_observer
 
-    whole = flatten(design.machine)
+    whole = flatten(machine)
     plant = with_outputs(whole, [measured_motion(whole), series_spring(whole).effort])
     stage("designs observer and controller")
     observer = design_observer(plant, sample_time=_SAMPLE_TIME, gain=CascadeGain())
@@ -529,7 +466,7 @@ def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDes
     stage("writes C")
     with tempfile.TemporaryDirectory() as folder:
         files = export_c(both, folder, name="observer_and_controller")
-        head = f"/* {design.note} */\n" if design.note else ""
+        head = f"/* {note} */\n" if note else ""
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
             for file in [files.header, files.source, files.selftest]:
@@ -538,32 +475,34 @@ def exported_c(stage: Callable[[str], None], design: ShownDesign) -> ExportedDes
     return ExportedDesign("observer_and_controller.zip", content)
 
 
-def exported_fmu(stage: Callable[[str], None], design: ShownDesign) -> ExportedDesign:
+def exported_fmu(stage: Stage, machine: Assembly, _: Contour, note: str) -> ExportedDesign:
     """Return the plant as an FMU for co-simulation."""
     from ..export import export_fmu
 
     stage("compiles the plant")
     with tempfile.TemporaryDirectory() as folder:
-        plant = flatten(design.machine)
-        if design.note:
-            plant = replace(plant, description=f"{design.note}. {plant.description}")
+        plant = flatten(machine)
+        if note:
+            plant = replace(plant, description=f"{note}. {plant.description}")
         file = export_fmu(plant, Path(folder) / "plant.fmu")
         return ExportedDesign("plant.fmu", file.read_bytes())
 
 
-def exported_drawing(stage: Callable[[str], None], design: ShownDesign, *, ending: str) -> ExportedDesign:
+def exported_drawing(
+    _: Stage, machine: Assembly, contour: Contour, remark: str, *, ending: str
+) -> ExportedDesign:
     """Return the drawing of the cam, without the edge where the cable is not declared."""
-    kind, radius = declared_edge(design.machine, series_cam(flatten(design.machine)))
+    kind, radius = declared_edge(machine, series_cam(flatten(machine)))
     machined = None if radius is None else kind(**{"cable_radius": radius})  # type: ignore[arg-type]
     centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
-    note = "; ".join(filter(None, (design.note, centre)))
+    note = "; ".join(filter(None, (remark, centre)))
     with tempfile.TemporaryDirectory() as folder:
-        files = write_drawings(Path(folder), design.contour, machined=machined, note=note, formats=(ending,))
+        files = write_drawings(Path(folder), contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
     return ExportedDesign(f"cam.{ending}", content)
 
 
-EXPORTS: dict[str, Callable[[Callable[[str], None], ShownDesign], ExportedDesign]] = {
+EXPORTS: dict[str, Callable[[Stage, Assembly, Contour, str], ExportedDesign]] = {
     "deck": exported_deck,
     "svg": partial(exported_drawing, ending="svg"),
     "dxf": partial(exported_drawing, ending="dxf"),

@@ -95,15 +95,16 @@ def linearise(model: FlatModel, state: Sequence[float], inputs: Sequence[float] 
     return LinearModel(a, b, c, d, names[0], names[1], names[2], model.sample_time)
 
 
-def rest_state(
-    model: FlatModel, held: dict[str, float], inputs: Sequence[float] = (), *, tolerance: float = 1e-9
-) -> Array:
+_RESTS = 1e-9
+"""Rate relative to its typical size below which a state rests."""
+
+
+def rest_state(model: FlatModel, held: dict[str, float]) -> Array:
     """Return the state in which all states but the held ones rest."""
     for name in held:
         if name not in (names := [v.name for v in model.states]):
             raise unknown_name("state", name, names)
-    u = np.asarray(inputs if len(inputs) else model.start(model.inputs), dtype=float)
-    x = model.start(model.states)
+    u, x = model.start(model.inputs), model.start(model.states)
     for i, v in enumerate(model.states):
         x[i] = held.get(v.name, x[i])
     free = [i for i, v in enumerate(model.states) if v.name not in held]
@@ -111,7 +112,7 @@ def rest_state(
     for _ in range(100):
         w = model.look_up(list(x), list(u))
         rate = np.array(model.equations(0.0, x, u, p, w)[0]).ravel()[free]
-        if np.all(np.abs(rate) <= tolerance * np.array([model.states[i].nominal for i in free])):
+        if np.all(np.abs(rate) <= _RESTS * np.array([model.states[i].nominal for i in free])):
             return x
         slope = np.array(jac(0.0, x, u, p, w)[0])[np.ix_(free, free)]
         x[free] -= np.linalg.lstsq(slope, rate, rcond=None)[0]

@@ -58,14 +58,9 @@ def series_cam(model: FlatModel, name: str | None = None) -> CamNames:
     )
 
 
-def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
-    """Return the body that the drive moves: the only one with a motor, or else the only one free to move.
-
-    ``name``: path of the body; decided from the structure if it is left out.
-    """
+def driven_body(model: FlatModel) -> MovingBody:
+    """Return the body that the drive moves: the only one with a motor, or else the only one free to move."""
     free = [body for body in model.bodies if not body.prescribed]
-    if name is not None:
-        return _named("body", name, {body.name: body for body in free})
     motors = [body for body in free if body.motor]
     candidates, which = (motors, "with a motor") if motors else (free, "free to move")
     if len(candidates) == 1:

@@ -26,16 +26,12 @@ MANY = 200
 """Columns from which on NumPy is quicker than CasADi."""
 
 
-class ColumnRun(Protocol):
-    """Runs samples of many columns."""
+ColumnRun = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""Runs samples of many columns.
 
-    def __call__(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
-        """Return the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
-
-        ``state``: shape (states, columns). ``given``: shape (T, given, columns). ``parameter``: shape
-        (parameters, columns).
-        """
-        ...
+Takes states (states, columns), what is given (T, given, columns) and parameters (parameters, columns).
+Returns the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
+"""
 
 
 @runtime_checkable

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, combinations_with_replacement
+from itertools import combinations, combinations_with_replacement, product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -229,7 +229,8 @@ def dependent_axes(axes: Mapping[str, NDArray[Any]]) -> str:
     ranks = {name: rankdata(codes(values)) for name, values in axes.items()}
     worst, words = 0.0, ""
     for one, other in combinations(ranks, 2):
-        for first, second in _views(ranks[one], ranks[other]):
+        wide = [np.abs(each - np.median(each)) for each in (ranks[one], ranks[other])]
+        for first, second in product(*zip((ranks[one], ranks[other]), wide, strict=True)):
             constant = np.ptp(first) == 0.0 or np.ptp(second) == 0.0
             size = 0.0 if constant else float(abs(np.corrcoef(first, second)[0, 1]))
             limit = max(LEAST_CORRELATION, _DEVIATIONS / np.sqrt(len(first)))
@@ -239,8 +240,3 @@ def dependent_axes(axes: Mapping[str, NDArray[Any]]) -> str:
                     f"axes {one} and {other} depend on each other (rank correlation {size:.2f})",
                 )
     return words
-
-
-def _views(first: Any, second: Any) -> list[tuple[Any, Any]]:
-    wide = [np.abs(each - np.median(each)) for each in (first, second)]
-    return [(first, second), (wide[0], wide[1]), (wide[0], second), (first, wide[1])]

@@ -126,10 +126,8 @@ class Requirement:
 
         Parameters
         ----------
-        answer
-            Full name of the column.
-        value
-            In SI.
+        answer, value
+            Column by its full name, and number in SI.
         """
         return cls(answer, value, -1.0)
 

@@ -220,7 +220,14 @@ class LoopQuestion(SweepQuestion):
 
     def ask(self, assembly: Assembly) -> Mapping[str, float]:
         """Return the figures; margins and bandwidth are not numbers where the loop is not stable."""
-        loop = self._loop(assembly)
+        plant, _, _ = _plant(assembly, "", "")
+        _require_contour(plant, self.first, self.last)
+        observer = design_observer(plant, sample_time=self.sample_time, gain=CascadeGain())
+        controller = torque_controller(plant, sample_time=self.sample_time, gains=self.gains)
+        substeps = max(1, round(10 * self.sample_time / 1e-3))
+        loop = encoder_loop(
+            plant, observer=observer, controller=controller, delay=self.delay, substeps=substeps
+        )
         margins = loop_margins(loop, np.linspace(self.first, self.last, self.count))
         values = {
             "stable": float(np.all(margins.linear.stable())),
@@ -238,16 +245,6 @@ class LoopQuestion(SweepQuestion):
             values["sine.decibel"] = float(response.decibel[0]) if verdict.holds else math.nan
             values["sine.saturated"] = verdict.saturated
         return values
-
-    def _loop(self, assembly: Assembly) -> ClosedLoop:
-        plant, _, _ = _plant(assembly, "", "")
-        _require_contour(plant, self.first, self.last)
-        observer = design_observer(plant, sample_time=self.sample_time, gain=CascadeGain())
-        controller = torque_controller(plant, sample_time=self.sample_time, gains=self.gains)
-        substeps = max(1, round(10 * self.sample_time / 1e-3))
-        return encoder_loop(
-            plant, observer=observer, controller=controller, delay=self.delay, substeps=substeps
-        )
 
     def _bandwidth(self, loop: ClosedLoop, linear: LinearLoop) -> float:
         """Return the least frequency at which the torque falls below -3 dB, over all angles."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,7 @@ _NO_PLAN: Final = (
 _MOST_LEVELS, _DRAWS, _SEED = 20, 100, 1
 
 
-@dataclass(frozen=True)
-class SensitivityIndex:
+class SensitivityIndex(NamedTuple):
     """Share of the variance of one answer that one axis causes."""
 
     axis: str  # its name

@@ -224,10 +224,7 @@ def opened(
                 next_step="name another folder, or throw it away by --again (in Python again=True)",
             )  # fmt: skip
         return Parts(folder, columns)
-    old = _standing(folder)
-    _require_same(folder, old[0], about)
-    if _names(old[1]) != _names(columns):
-        raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
+    old = _standing(folder, about, columns)
     parts = Parts(folder, columns)
     if old[0].get("plan") != about["plan"]:
         (folder / RESULTS_FILE).unlink(missing_ok=True)
@@ -237,13 +234,20 @@ def opened(
     return parts
 
 
-def _standing(folder: Path) -> tuple[dict[str, Any], tuple[SweepColumn, ...]]:
+def _standing(
+    folder: Path, about: Mapping[str, Any], columns: tuple[SweepColumn, ...]
+) -> tuple[dict[str, Any], tuple[SweepColumn, ...]]:
+    """Return what a folder says of its sweep, which has to be the same one."""
     try:
-        return read_about(folder)
+        old = read_about(folder)
     except MeasurementError as error:
         raise ExportError(
             error.thing, error.rule, next_step="name another folder, or throw it away by --again"
         ) from None
+    _require_same(folder, old[0], about)
+    if _names(old[1]) != _names(columns):
+        raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
+    return old
 
 
 def written_about(
@@ -346,10 +350,7 @@ def standing_points(
     """
     if not (folder / ABOUT_FILE).exists():
         return 0
-    old = _standing(folder)
-    _require_same(folder, old[0], about)
-    if _names(old[1]) != _names(columns):
-        raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
+    old = _standing(folder, about, columns)
     if old[0].get("plan") != about["plan"]:
         names = [c.name for c in columns if c.role == "axis"]
         taken = (table.column("point").to_pylist() for table in _adopted(folder, names, plan))

@@ -14,19 +14,17 @@ from ..sensing.sensors import Encoder
 from .named_parts import Assembly
 
 
-def with_moved_load(actuator: Assembly, load: str | None = None) -> Assembly:
+def with_moved_load(actuator: Assembly) -> Assembly:
     """Return a copy in which the fixed load is moved, with an encoder like that of the motor.
 
     Where an encoder reads another body, one with the same count reads the load. An assembly whose load is
     moved already comes back as it is.
-
-    ``load``: name of that body; the only one if it is left out.
     """
     parts = dict(actuator.parts)
-    if load is None and any(isinstance(part, Driven) for part in parts.values()):
+    if any(isinstance(part, Driven) for part in parts.values()):
         return actuator
     ends = [end for part in parts.values() if isinstance(part, Tie) for end in part.between]
-    fixed = [n for n, p in parts.items() if isinstance(p, Fixed) and n in ends and load in (None, n)]
+    fixed = [n for n, p in parts.items() if isinstance(p, Fixed) and n in ends]
     if len(fixed) != 1:
         result = ", ".join(f"'{name}'" for name in fixed) or "none"
         raise ArrangementError(

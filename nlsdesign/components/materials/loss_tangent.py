@@ -300,23 +300,20 @@ def loss_of(
     return KnownLoss(chosen, owner.name, min(values), max(values))
 
 
-def relaxation_of(loss: KnownLoss, loss_tangent: float | None = None) -> Relaxation:
+def relaxation_of(loss: KnownLoss) -> Relaxation:
     """Return the relaxation that the library's knowledge of a loss gives.
 
     A measured curve over the frequency is followed; one number at one frequency gives the standard linear
     solid with its peak there; a range, or a number without a frequency, gives a flat loss tangent from 0.1 to
     10 Hz.
-
-    ``loss_tangent``: of a range, which value; the middle if it is left out. A curve is scaled to this mean.
     """
     values = loss.known.quantity.values
     frequency = loss.known.conditions.get("frequency")
     if loss.known.evidence == "range" or frequency is None:
-        return flat_relaxation(loss.middle if loss_tangent is None else loss_tangent)
+        return flat_relaxation(loss.middle)
     if len(values) == 1:
-        return peaked_relaxation(values[0] if loss_tangent is None else loss_tangent, frequency.values[0])
-    scale = 1.0 if loss_tangent is None else loss_tangent / float(np.mean(values))
-    return measured_relaxation(frequency.values, [scale * value for value in values])
+        return peaked_relaxation(values[0], frequency.values[0])
+    return measured_relaxation(frequency.values, values)
 
 
 def _losses(material: Material) -> dict[str, Property]:

@@ -116,11 +116,15 @@ class LoadFriction(WithFriction, Combination):
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return T_in and the friction."""
         inside = self.inside(scope, motion, rate)
-        load = self.rubbing.size(scope, inside, ("is loaded forward", "is loaded backward"), "load")
+        return inside + self.under_load(scope, inside, rate)
+
+    def under_load(self, scope: Scope, effort: Expression, rate: Expression) -> Expression:
+        """Return the friction under an effort that is carried."""
+        load = self.rubbing.size(scope, effort, ("is loaded forward", "is loaded backward"), "load")
         level = scope.parameter("ratio") * load
         friction = self.rubbing.against(scope, rate, lambda speed: level, level)
         scope.loss(friction * rate)
-        return inside + friction
+        return friction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,11 +149,7 @@ class GearFriction(LoadFriction):
 
     def at_first_end(self, scope: Scope, effort: Expression, rate: Expression) -> Expression:
         """Return the friction."""
-        load = self.rubbing.size(scope, effort, ("is loaded forward", "is loaded backward"), "load")
-        level = scope.parameter("ratio") * load
-        friction = self.rubbing.against(scope, rate, lambda speed: level, level)
-        scope.loss(friction * rate)
-        return friction
+        return self.under_load(scope, effort, rate)
 
 
 @dataclass(frozen=True, kw_only=True)

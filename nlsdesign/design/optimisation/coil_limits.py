@@ -42,13 +42,10 @@ class MaximumTravel(Limit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "travel", "travel of the coil", unit="m", shown_unit="mm", upper=True
+        "travel", "travel of the coil", unit="m", shown_unit="mm", upper=True, within=(1e-5, 2.0)
     )
 
     travel: Quantity | float
-
-    def __post_init__(self) -> None:
-        self.number("travel", "m", 1e-5, 2.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound for each coil."""
@@ -142,15 +139,16 @@ class GoodmanSafety(Limit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "safety", "safety of the wire against fatigue", unit="1", shown_unit="1", upper=False
-    )
+        "safety", "safety of the wire against fatigue", unit="1", shown_unit="1",
+        upper=False, within=(1.0, 20.0),
+    )  # fmt: skip
 
     safety: Quantity | float
     amplitude: Quantity | float = 241e6
     mean: Quantity | float = 379e6
 
     def __post_init__(self) -> None:
-        self.number("safety", "1", 1.0, 20.0)
+        super().__post_init__()
         self.number("amplitude", "Pa", 1e6, 2e9)
         self.number("mean", "Pa", 1e6, 2e9)
 

@@ -60,17 +60,17 @@ class SolvedSearch:
     taken: int  # number of the best of them
     best: Solution  # that one, or what followed from it with knots rounded less
 
-    @cached_property
-    def predicted_rms(self) -> float:
-        """Torque error in N·m that the optimiser saw."""
-        return self.search.problem.rms(self.best.point)
-
     def start_outcome(self, outcome: Solution) -> StartOutcome:
         """Return where a start came to, beside the one that was taken."""
         problem = self.search.problem
         same = same_design(problem, self.outcomes[self.taken], outcome)
         error = problem.rms(outcome.point)
         return StartOutcome(outcome.solved, outcome.status, outcome.iterations, outcome.cost, error, same)
+
+    @cached_property
+    def predicted_rms(self) -> float:
+        """Torque error in N·m that the optimiser saw."""
+        return self.search.problem.rms(self.best.point)
 
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
@@ -96,7 +96,12 @@ class SolvedSearch:
         if pretension in values:
             most = min(b.value for b in _upper(self.search, pretension))
             values[pretension] = min(values[pretension] + self.lost_travel, max(values[pretension], most))
-        changes = {n: _designed(known[n], value, source) for n, value in values.items() if n in known}
+        changes = {}
+        for name in (name for name in values if name in known):
+            (rounded,), unit = significant([values[name]]), known[name].unit
+            # In millimetres where only metres were stated.
+            shown = {"m": "mm", "m^2": "mm^2"}.get(unit, unit)
+            changes[name] = replace(known[name].with_value(rounded, source), unit=shown)
         return changes | self.cam_changes
 
     @cached_property
@@ -358,12 +363,6 @@ def _upper(search: Search, name: str) -> Iterator[Bound]:
     variable = search.question.model.variable(name)
     yield Bound("", name, ca.SX(0), variable.maximum, True, variable.unit, 1.0)
     yield from (each for each in search.bounds if each.upper and each.of in (name, "pretension"))
-
-
-def _designed(old: Quantity, value: float, source: str) -> Quantity:
-    """Return a designed number, shown in millimetres where only metres were stated."""
-    (rounded,) = significant([value])
-    return replace(old.with_value(rounded, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
 
 
 def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitState:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -66,6 +67,8 @@ class OneNumber:
         Whether the number is the largest that is allowed, or the least.
     of_shape
         Whether the contour alone decides it.
+    within
+        Least and largest number that may be given, in SI.
     """
 
     field: str
@@ -74,6 +77,7 @@ class OneNumber:
     shown_unit: str
     upper: bool
     of_shape: bool = False
+    within: tuple[float, float] = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,10 @@ class Limit(ABC):
     """
 
     described: ClassVar[OneNumber | None] = None
+
+    def __post_init__(self) -> None:
+        if (one := self.described) is not None:
+            self.number(one.field, one.unit, *one.within)
 
     @abstractmethod
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
@@ -169,13 +177,11 @@ class MinimumRadiusOfCurvature(Limit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "radius", "radius of curvature", unit="m", shown_unit="mm", upper=False, of_shape=True
-    )
+        "radius", "radius of curvature", unit="m", shown_unit="mm",
+        upper=False, of_shape=True, within=(0.0, 0.5),
+    )  # fmt: skip
 
     radius: Quantity | float
-
-    def __post_init__(self) -> None:
-        self.number("radius", "m", 0.0, 0.5)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the contour."""
@@ -193,13 +199,10 @@ class MaximumCamRadius(Limit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "radius", "cam radius", unit="m", shown_unit="mm", upper=True, of_shape=True
+        "radius", "cam radius", unit="m", shown_unit="mm", upper=True, of_shape=True, within=(1e-5, 0.5)
     )
 
     radius: Quantity | float
-
-    def __post_init__(self) -> None:
-        self.number("radius", "m", 1e-5, 0.5)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the contour."""
@@ -207,23 +210,7 @@ class MaximumCamRadius(Limit):
 
 
 @dataclass(frozen=True)
-class StrainLimit(Limit):
-    """Base of the limits on the nominal strain of rubber.
-
-    Parameters
-    ----------
-    strain
-        Largest nominal strain, a pure number; 1 means twice the rest length.
-    """
-
-    strain: Quantity | float
-
-    def __post_init__(self) -> None:
-        self.number("strain", "1", 1e-4, 10.0)
-
-
-@dataclass(frozen=True)
-class MaximumStrain(StrainLimit):
+class MaximumStrain(Limit):
     """Nominal strain of each piece of rubber ≤ strain; 1 means twice the rest length.
 
     Parameters
@@ -233,7 +220,7 @@ class MaximumStrain(StrainLimit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "strain", "strain of the rubber", unit="1", shown_unit="%", upper=True
+        "strain", "strain of the rubber", unit="1", shown_unit="%", upper=True, within=(1e-4, 10.0)
     )
 
     strain: Quantity | float
@@ -246,7 +233,7 @@ class MaximumStrain(StrainLimit):
 
 
 @dataclass(frozen=True)
-class MaximumLastingStrain(StrainLimit):
+class MaximumLastingStrain(Limit):
     """Nominal strain of each piece of rubber at angle zero, where a machine rests for good, ≤ strain.
 
     Rubber that stays stretched creeps and keeps a part of its strain as set; see :func:`safe_limits`.
@@ -264,7 +251,7 @@ class MaximumLastingStrain(StrainLimit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "strain", "strain of the rubber at rest", unit="1", shown_unit="%", upper=True
+        "strain", "strain of the rubber at rest", unit="1", shown_unit="%", upper=True, within=(1e-4, 10.0)
     )
 
     strain: Quantity | float
@@ -290,14 +277,14 @@ class MaximumStress(Limit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "stress", "nominal stress of the rubber", unit="Pa", shown_unit="MPa", upper=True
+        "stress", "nominal stress of the rubber", unit="Pa", shown_unit="MPa", upper=True, within=(1e3, 1e11)
     )
 
     stress: Quantity | float
     safety_factor: float = 1.0
 
     def __post_init__(self) -> None:
-        self.number("stress", "Pa", 1e3, 1e11)
+        super().__post_init__()
         self.number("safety_factor", "1", 1.0, 100.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
@@ -319,13 +306,10 @@ class MaximumCableTension(Limit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "tension", "tension of a cable", unit="N", shown_unit="N", upper=True
+        "tension", "tension of a cable", unit="N", shown_unit="N", upper=True, within=(1e-3, 1e7)
     )
 
     tension: Quantity | float
-
-    def __post_init__(self) -> None:
-        self.number("tension", "N", 1e-3, 1e7)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the angle."""
@@ -343,13 +327,10 @@ class PositiveStiffness(Limit):
     """
 
     described: ClassVar[OneNumber | None] = OneNumber(
-        "minimum", "slope of the torque", unit="N*m/rad", shown_unit="N*m/rad", upper=False
+        "minimum", "slope of the torque", unit="N*m/rad", shown_unit="N*m/rad", upper=False, within=(0.0, 1e7)
     )
 
     minimum: Quantity | float = 0.0
-
-    def __post_init__(self) -> None:
-        self.number("minimum", "N*m/rad", 0.0, 1e7)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the angle."""
@@ -702,7 +683,7 @@ class LimitKind(OneNumber):
 
     def limit(self, value: float) -> Limit:
         """Return the limit."""
-        if not abs(value) < float("inf"):
+        if not abs(value) < math.inf:
             raise ValueRangeError(f"{self.title} = {value:g}", "is no finite number")
         return self.kind(**{self.field: value})
 

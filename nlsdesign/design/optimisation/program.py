@@ -64,7 +64,8 @@ def scaled(variable: DesignVariable, value: float, scale: VariableScale | None =
     return min(max(position, variable.lower), variable.upper)
 
 
-_SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+"""States of IPOPT that count as solved."""
 PROVED_INFEASIBLE = "Infeasible_Problem_Detected"
 """IPOPT's status where it has found that no point near keeps all rows."""
 _OPTIONS: dict[str, Any] = {
@@ -192,7 +193,7 @@ class Program:
         groups = np.split(np.abs(multipliers[1]), np.cumsum(sizes)[:-1])
         finite = bool(np.all(np.isfinite(np.array(answer["x"]))) and np.isfinite(float(answer["f"])))
         return Solution(
-            finite and stats["return_status"] in _SOLVED,
+            finite and stats["return_status"] in SOLVED,
             str(stats["return_status"]),
             np.array(answer["x"]).ravel(),
             float(answer["f"]),

@@ -173,6 +173,10 @@ class RollerVariables(FreeContour):
         )
 
 
+State = tuple[Expression, ...]
+"""What is carried from node to node along a contour."""
+
+
 class _Support(NamedTuple):
     """Columns of p, p' and ∫ρ over the nodes; the unknowns that they are, with what ties these down."""
 
@@ -247,26 +251,18 @@ def rolled(
         DesignVariable(name, symbol, arm * symbol, -_STEEPEST, _STEEPEST, 0.0)
         for name, symbol in zip(names, symbols, strict=True)
     )
-    slopes = [v.value for v in variables]
-    step, ways = end / INTERVALS, ca.SX.sym("way", 2, INTERVALS)
-    begin = (ca.SX(0), ca.SX(0))
-    states = [begin, *[(arm * ways[0, i], arm * ways[1, i]) for i in range(INTERVALS)]]
-    explicit, rows = [begin], []
-    for i, (left, right) in enumerate(itertools.pairwise(slopes)):
-        explicit.append(_next_way(explicit[-1], left, right, step))
-        there = _next_way(states[i], left, right, step)
-        rows += [(a - b) / arm for a, b in zip(there, states[i + 1], strict=True)]
-    arms, taken = (ca.vertcat(*column) for column in zip(*states, strict=True))
-    lifted = tuple(
-        DesignVariable(f"{name}[{i + 1}]", ways[k, i], arm * ways[k, i], -np.inf, np.inf, 0.0)
-        for i in range(INTERVALS)
-        for k, name in enumerate(("lever_arm", "way"))
-    )
-    values = ca.vertcat(*[each for state in explicit[1:] for each in state]) / arm
+    slopes, step = [v.value for v in variables], end / INTERVALS
+    begin = {"lever_arm": ca.SX(0), "way": ca.SX(0)}
+
+    def further(state: State, left: Expression, right: Expression) -> State:
+        at, way = state
+        return at + step * (left + right) / 2, way + step * at + step**2 * (2 * left + right) / 6
+
+    (arms, taken), held, states = _course(begin, slopes, further, arm)
     angles = step * ca.SX(np.arange(INTERVALS + 1))
     edge = RollerEdge(angles, base + taken, arms, ca.vertcat(*slopes), radius)
     clear = Rows((edge.centre_radii - 1.01 * radius) / arm, 0.0, ca.inf)
-    shape = _rolling(edge, taken, (Rows(ca.vertcat(*rows), 0.0, 0.0), clear), (lifted, values))
+    shape = _rolling(edge, taken, (held, clear), states)
     return RollerVariables((), variables, radius, INTERVALS / last_angle), shape
 
 
@@ -280,14 +276,6 @@ def _rolling(
         edge.bearings, edge.bearings, edge.lever_arms, edge.radii, edge.radii_of_curvature, taken,
         edge.lever_arm_slopes, rows, True, *states, edge,
     )  # fmt: skip
-
-
-def _next_way(
-    state: tuple[Expression, Expression], left: Expression, right: Expression, step: Expression
-) -> tuple[Expression, Expression]:
-    """Return h and x one interval further."""
-    arm, taken = state
-    return arm + step * (left + right) / 2, taken + step * arm + step**2 * (2 * left + right) / 6
 
 
 def free_shape(
@@ -348,31 +336,41 @@ def _length(name: str, size: float, *, start: float) -> DesignVariable:
 
 
 def _support(variables: ContourVariables, first: Expression, last: Expression, size: float) -> _Support:
-    rho = [u.value for u in variables.radii_of_curvature]
-    step = last / INTERVALS
-    begin = (first, variables.first_slope.value, ca.SX(0))
-    symbols = ca.SX.sym("support", 3, INTERVALS)
-    columns = [[size * symbols[k, i] for i in range(INTERVALS)] for k in range(3)]
-    states = [begin, *zip(*columns, strict=True)]
-    explicit, rows = [begin], []
-    for i, (left, right) in enumerate(itertools.pairwise(rho)):
-        explicit.append(_next(explicit[-1], left, right, step))
-        there = _next(states[i], left, right, step)
+    rho, step = [u.value for u in variables.radii_of_curvature], last / INTERVALS
+    begin = {"support": first, "support_slope": variables.first_slope.value, "arc": ca.SX(0)}
+    (p, slopes, arcs), held, states = _course(
+        begin, rho, lambda state, left, right: _next(state, left, right, step), size
+    )
+    return _Support(p, slopes, arcs, step * ca.SX(np.arange(INTERVALS + 1)), held, *states)
+
+
+def _course(
+    begin: Mapping[str, Expression], rates: Sequence[Expression], following: Callable[..., State], size: float
+) -> tuple[list[Expression], Rows, tuple[tuple[DesignVariable, ...], Expression]]:
+    """Return states over the nodes as unknowns of their own, what ties them down, and what they become.
+
+    ``begin``: at the first node, by name; ``following``: gives those one interval further from state and rate
+    on the left and the rate on the right; ``size``: of all of them.
+    """
+    symbols = ca.SX.sym("state", len(begin), INTERVALS)
+    first: State = tuple(begin.values())
+    states = [first, *[tuple(size * symbols[k, i] for k in range(len(begin))) for i in range(INTERVALS)]]
+    explicit, rows = [first], []
+    for i, (left, right) in enumerate(itertools.pairwise(rates)):
+        explicit.append(following(explicit[-1], left, right))
+        there = following(states[i], left, right)
         rows += [(a - b) / size for a, b in zip(there, states[i + 1], strict=True)]
-    directions = step * ca.SX(np.arange(INTERVALS + 1))
-    p, slopes, arcs = (ca.vertcat(*column) for column in zip(*states, strict=True))
     lifted = tuple(
         DesignVariable(f"{name}[{i + 1}]", symbols[k, i], size * symbols[k, i], -np.inf, np.inf, 0.0)
         for i in range(INTERVALS)
-        for k, name in enumerate(("support", "support_slope", "arc"))
+        for k, name in enumerate(begin)
     )
     values = ca.vertcat(*[each for state in explicit[1:] for each in state]) / size
-    return _Support(p, slopes, arcs, directions, Rows(ca.vertcat(*rows), 0.0, 0.0), lifted, values)
+    columns = [ca.vertcat(*column) for column in zip(*states, strict=True)]
+    return columns, Rows(ca.vertcat(*rows), 0.0, 0.0), (lifted, values)
 
 
-def _next(
-    state: tuple[Expression, Expression, Expression], left: Expression, right: Expression, step: Expression
-) -> tuple[Expression, Expression, Expression]:
+def _next(state: State, left: Expression, right: Expression, step: Expression) -> State:
     """Return p, p' and ∫ρ one interval further."""
     cosine, sine = ca.cos(step), ca.sin(step)
     growth = (right - left) / step

@@ -26,6 +26,7 @@ from ..optimisation.limits import Bound, limit_kinds
 from ..optimisation.problem import SymbolicTarget, design_problem
 from ..optimisation.program import (
     PROVED_INFEASIBLE,
+    SOLVED,
     DesignVariable,
     VariableScale,
     interior_point,
@@ -78,14 +79,13 @@ class MovableTarget:
         """Return one: the error counts alike everywhere."""
         return 0.0 * angle + 1.0
 
-    def numbers(self, target: TabulatedTorque) -> Array:
-        """Return the numbers of the symbols for a curve with as many pieces."""
-        return _numbers_of(target)
-
 
 @functools.lru_cache(maxsize=8)
 def _numbers_of(target: TabulatedTorque) -> Array:
-    """Return the numbers of a curve; the same array where it is asked for again, so it cannot be changed."""
+    """Return the numbers of the symbols for a curve with as many pieces.
+
+    It is the same array where it is asked for again, so it cannot be changed.
+    """
     curve = PchipInterpolator(target.angles, target.torques)
     # The curve is monotone between its points, so the largest torque is that of a point.
     ends = [max(target.torques), float(curve.integrate(0.0, target.last_angle))]
@@ -135,7 +135,7 @@ class ProgramRows:
         self.bounds: tuple[Bound, ...] = tuple(kept)
         self.shown_bounds: tuple[Bound, ...] = (*kept, *watched)
         self.cost = sum((goal.cost(design) for goal in GOALS), start=ca.SX(0))
-        parameters = self.target.numbers(question.target)
+        parameters = self.numbers_of(question)
         scales = ca.vertcat(*[bound.scale for bound in self.bounds])
         self.scales = np.array(ca.Function("scales", [self.target.symbols], [scales])(parameters)).ravel()
         self._names = [v.name for v in self.problem.variables]
@@ -210,7 +210,7 @@ class ProgramRows:
 
     def numbers_of(self, question: CamQuestion) -> Array:
         """Return the numbers of the target."""
-        return self.target.numbers(question.target)
+        return _numbers_of(question.target)
 
     def completed(self, question: CamQuestion, values: Mapping[str, float]) -> Array:
         """Return the unknowns that follow from some of them, with held numbers as the question has them."""
@@ -245,8 +245,6 @@ def structure_of(question: CamQuestion) -> tuple[Any, ...]:
     )
 
 
-SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-"""States of the solver that count as solved."""
 MOST_ITERATIONS = 120
 """Iterations at most of a search from a start."""
 _LOOSE: dict[str, Any] = {"tol": 1e-9, "acceptable_tol": 1e-7}

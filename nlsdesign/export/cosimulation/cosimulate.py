@@ -32,13 +32,12 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
 from ...simulation.input_signals import Sine
 from ...simulation.trace import Trace
-from .coupling import Stepping
+from .coupling import GivenFeed, Stepping
 from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description, unpack
 from .fmu_instance import FmuInstance
 from .isolation import IsolatedWork, Watch
 from .master import Master
 from .run_plan import (
-    Given,
     Link,
     Plan,
     Wire,
@@ -400,7 +399,7 @@ def check_signals(
             )
 
 
-def _sampled_signal(signal: Signal, points: Array) -> Given:
+def _sampled_signal(signal: Signal, points: Array) -> GivenFeed:
     """Return a signal at the points, just before them, and in the middle of the steps."""
     lengths = np.diff(points)
     left = points - np.concatenate([lengths[:1], lengths]) * _JUST_BEFORE
@@ -408,9 +407,9 @@ def _sampled_signal(signal: Signal, points: Array) -> Given:
     middle = np.append(points[:-1] + 0.5 * lengths, points[-1])
     courses = (points, left, middle)
     if callable(signal):
-        return Given(*(np.array([float(signal(time)) for time in times.tolist()]) for times in courses))
+        return GivenFeed(*(np.array([float(signal(time)) for time in times.tolist()]) for times in courses))
     given, values = (np.asarray(each, dtype=float) for each in signal)
-    return Given(*(np.asarray(np.interp(times, given, values), dtype=float) for times in courses))
+    return GivenFeed(*(np.asarray(np.interp(times, given, values), dtype=float) for times in courses))
 
 
 _EXACT = 1e-9

@@ -50,8 +50,7 @@ class Feed(Protocol):
 class GivenFeed:
     """A signal from outside."""
 
-    # values, left, middle: value at each communication point, just before it, and to be held over the step
-    # from it
+    # values, left, middle: at each communication point, just before it, and in the middle of the step from it
     values: Array
     left: Array
     middle: Array

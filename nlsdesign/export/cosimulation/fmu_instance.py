@@ -37,7 +37,24 @@ class LoadedFmu:
         self.fmu = self._load()
         self.watch(self.number, Activity.INSTANTIATING)
         try:
-            self._instantiate()
+
+            def log(status: int, message: bytes) -> None:
+                if status > 0:
+                    self.messages.append(message.decode("utf-8", errors="replace"))
+
+            if self.two:
+                callbacks = fmpy.fmi2.fmi2CallbackFunctions()
+                ctypes.memmove(
+                    ctypes.byref(callbacks),
+                    ctypes.byref(fmpy.fmi2.defaultCallbacks),
+                    ctypes.sizeof(callbacks),
+                )
+                callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
+                    lambda _e, _n, status, _c, text: log(status, text)
+                )
+                self.fmu.instantiate(callbacks=callbacks)
+            else:
+                self.fmu.instantiate(logMessage=lambda _e, status, _c, text: log(status, text))
         except Exception as error:
             self.fmu.freeLibrary()
             raise ExportError(
@@ -61,25 +78,6 @@ class LoadedFmu:
             ) from error
         finally:
             os.chdir(here)  # fmpy does not restore it where loading fails
-
-    def _instantiate(self) -> None:
-        def log(status: int, message: bytes) -> None:
-            if status > 0:
-                self.messages.append(message.decode("utf-8", errors="replace"))
-
-        if self.two:
-            callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-            ctypes.memmove(
-                ctypes.byref(callbacks),
-                ctypes.byref(fmpy.fmi2.defaultCallbacks),
-                ctypes.sizeof(callbacks),
-            )
-            callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
-                lambda _e, _n, status, _c, text: log(status, text)
-            )
-            self.fmu.instantiate(callbacks=callbacks)
-        else:
-            self.fmu.instantiate(logMessage=lambda _e, status, _c, text: log(status, text))
 
     @contextmanager
     def explained(

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError
-from .coupling import Curve, CurveFeed, Feed, GivenFeed, HeldFeed, LateFeed
+from .coupling import Curve, CurveFeed, Feed, HeldFeed, LateFeed
 from .fmu_instance import FmuInstance
 from .isolation import Watch
 from .run_plan import Link, Plan, rows_of, sample_times, split_name
@@ -108,8 +108,8 @@ class ConnectedInputs:
         for target, given in self._plan.signals.items():
             instance, variable = split_name(target)
             if instance == name:
-                middle = given.values if self._plan.coupling.order < 2 else given.middle
-                feeds[variable] = GivenFeed(given.values, given.left, middle)
+                first = self._plan.coupling.order < 2
+                feeds[variable] = replace(given, middle=given.values) if first else given
         return feeds
 
     def _feed(self, name: str, variable: str, link: Link) -> Feed:

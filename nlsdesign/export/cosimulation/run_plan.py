@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...foundation.arrays import Array
 from ...foundation.errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ...foundation.quantity import Quantity, parse_unit
-from .coupling import Coupling
+from .coupling import Coupling, GivenFeed
 from .fmu_description import FmuDescription
 
 
@@ -257,22 +257,12 @@ class Link:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
-    """A signal from outside at the communication points."""
-
-    # values, left, middle: at each point, just before it, and in the middle of the step from it
-    values: Array
-    left: Array
-    middle: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Plan:
     """Everything that a run needs to know."""
 
     descriptions: Mapping[str, FmuDescription]
     links: tuple[Link, ...]
-    signals: Mapping[str, Given]
+    signals: Mapping[str, GivenFeed]
     parameters: Mapping[str, float]
     order: tuple[str, ...]
     points: Array

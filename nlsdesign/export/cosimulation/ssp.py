@@ -20,6 +20,7 @@ from ...foundation.errors import ExportError, UnitError, ValueRangeError
 from ...foundation.locations import version as package_version
 from ...foundation.quantity import BASE, Quantity, Unit, parse_unit
 from ...foundation.text_files import draft
+from ..files import xml_text
 from .cosimulate import FmuSystem, check_order, check_signals, unpacked_fmus
 from .fmu_description import FmuDescription, FmuScalar, fit_to_show, unpack
 from .run_plan import Wire, as_wire, check_wires, delay_of, gain_to, split_name
@@ -369,7 +370,7 @@ class _Structure:
             self._annotate(system, "Order", {"instances": " ".join(self._order)})
             self.notes.append(f"the order in which sampled instances compute: {', '.join(self._order)}")
         self._units(root)
-        return _text(root)
+        return xml_text(root).encode()
 
     def values(self) -> dict[str, bytes]:
         """Return a file of parameter values for each instance that has some."""
@@ -391,7 +392,7 @@ class _Structure:
                 unit = unit if described.kind == "real" else {}
                 ElementTree.SubElement(row, tag(f"ssv:{kind}"), {"value": shown, **unit})
             self._units(root, [description.variables[each] for each in own], "ssv:Units")
-            files[_values_file(name)] = _text(root)
+            files[_values_file(name)] = xml_text(root).encode()
         return files
 
     def _own_parameters(self, name: str) -> dict[str, float]:
@@ -506,9 +507,3 @@ class _Structure:
 
 def _values_file(name: str) -> str:
     return f"{RESOURCES}/{name}.ssv"
-
-
-def _text(root: ElementTree.Element) -> bytes:
-    ElementTree.indent(root)
-    text: str = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

@@ -195,7 +195,14 @@ def export_fmu(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
         binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
     with draft(target) as file:
-        _write_archive(file, with_origin(model, contents | binaries))
+        parts = with_origin(model, contents | binaries)
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            # The description first, the rest in alphabetical order; no time stamps and no local permissions.
+            for name in sorted(parts, key=lambda name: (name != "modelDescription.xml", name)):
+                entry = zipfile.ZipInfo(name, _EPOCH)
+                entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                archive.writestr(entry, parts[name])
     return target
 
 
@@ -264,14 +271,3 @@ def universal_binary(parts: Mapping[str, bytes]) -> bytes:
         header += struct.pack(">IIIII", *processors[name], offset, len(parts[name]), align)
         offset = -(-(offset + len(parts[name])) // (1 << align)) * (1 << align)
     return header + bytes((1 << align) - len(header)) + body
-
-
-def _write_archive(file: Path, contents: Mapping[str, bytes]) -> None:
-    # The description first, the rest in alphabetical order; no time stamps and no local permissions.
-    names = sorted(contents, key=lambda name: (name != "modelDescription.xml", name))
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name in names:
-            entry = zipfile.ZipInfo(name, _EPOCH)
-            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, contents[name])

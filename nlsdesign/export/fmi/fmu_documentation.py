@@ -140,19 +140,8 @@ ORIGIN_FORMAT = "nlsdesign origin 1"
 
 def with_origin(model: FlatModel, contents: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return the contents of an FMU with one file more, which says where they come from."""
-    record = {
-        "format": ORIGIN_FORMAT,
-        "generator": f"nlsdesign {version()}",
-        "model": model.name,
-        "deck": _deck(model.origin) if model.origin else None,
-        "files": {path: hashlib.sha256(contents[path]).hexdigest() for path in sorted(contents)},
-    }
-    text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
-    return {**contents, ORIGIN_FILE: text.encode()}
-
-
-def _deck(origin: Origin) -> dict[str, Any]:
-    return {
+    origin = model.origin
+    deck = origin and {
         "name": origin.deck,
         "sha256": origin.digest,
         "changed": list(origin.changed),
@@ -162,6 +151,15 @@ def _deck(origin: Origin) -> dict[str, Any]:
             for name, q in origin.numbers.items()
         },
     }
+    record = {
+        "format": ORIGIN_FORMAT,
+        "generator": f"nlsdesign {version()}",
+        "model": model.name,
+        "deck": deck,
+        "files": {path: hashlib.sha256(contents[path]).hexdigest() for path in sorted(contents)},
+    }
+    text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
+    return {**contents, ORIGIN_FILE: text.encode()}
 
 
 def _parent(parent: ParentDeck | None) -> dict[str, Any] | None:
@@ -248,9 +246,9 @@ def _table_row(each: FmuVariable) -> str:
 
 
 @cache
-def icon(name: str = "icon", size: int = 96) -> bytes:
+def icon(name: str = "icon") -> bytes:
     """Return a PNG: the model as a spiral cam with its cable, or one of its terminals."""
-    pixel = {LOOP: _of_loop, FLANGE: _of_flange}.get(name, _of_model)
+    size, pixel = 96, {LOOP: _of_loop, FLANGE: _of_flange}.get(name, _of_model)
     axis = [(i + 0.5) / size * 2 - 1 for i in range(size)]
     rows = b"".join(b"\0" + bytes(v for x in axis for v in pixel(x, -y)) for y in axis)
     header = struct.pack(">IIBBBBB", size, size, 8, 6, 0, 0, 0)

@@ -16,6 +16,7 @@ from ...foundation.locations import version as own_version
 from ...foundation.quantity import BASE, parse_unit
 from ...model.flat import Symbols
 from ..c.c_text import identifier
+from ..files import xml_text
 from .fmu_documentation import Authorship, described
 from .fmu_sources import main_source
 from .fmu_variables import (
@@ -24,7 +25,6 @@ from .fmu_variables import (
     Dependence,
     FmuLayout,
     FmuVariable,
-    Terminal,
     dependences,
     terminals,
 )
@@ -163,7 +163,7 @@ def model_description(
         notes = ElementTree.SubElement(root, "Annotations")
         note = _element(notes, "Annotation", type="nlsdesign.deck")
         _element(note, "deck", name=model.origin.deck, sha256=model.origin.digest)
-    return _written(root)
+    return xml_text(root)
 
 
 def build_description(layout: FmuLayout) -> str:
@@ -172,7 +172,7 @@ def build_description(layout: FmuLayout) -> str:
     configuration = _element(root, "BuildConfiguration", modelIdentifier=identifier(layout.model.name))
     files = _element(configuration, "SourceFileSet", language="C99")
     _element(files, "SourceFile", name=main_source("3.0"))
-    return _written(root)
+    return xml_text(root)
 
 
 def terminals_and_icons(layout: FmuLayout) -> str:
@@ -190,24 +190,16 @@ def terminals_and_icons(layout: FmuLayout) -> str:
         right = each in beside
         x = 100.0 if right else -100.0
         y = 100.0 - 200.0 * (beside.index(each) + 1) / (len(beside) + 1) if right else 0.0
-        _terminal(group, each, (x, y))
-    return _written(root)
-
-
-def _terminal(parent: ElementTree.Element, each: Terminal, place: tuple[float, float]) -> None:
-    names = {"name": each.name, "matchingRule": each.rule, "terminalKind": each.kind}
-    terminal = _element(parent, "Terminal", **names, description=each.description)
-    for member in each.members:
-        _element(
-            terminal,
-            "TerminalMemberVariable",
-            variableName=member.variable,
-            memberName=member.name,
-            variableKind=member.kind,
-        )
-    x, y = place
-    corners = {"x1": x - 10.0, "y1": y - 10.0, "x2": x + 10.0, "y2": y + 10.0}
-    _element(terminal, "TerminalGraphicalRepresentation", **corners, iconBaseName=each.picture)
+        names = {"name": each.name, "matchingRule": each.rule, "terminalKind": each.kind}
+        terminal = _element(group, "Terminal", **names, description=each.description)
+        for member in each.members:
+            _element(
+                terminal, "TerminalMemberVariable", variableName=member.variable, memberName=member.name,
+                variableKind=member.kind,
+            )  # fmt: skip
+        edges = {"x1": x - 10.0, "y1": y - 10.0, "x2": x + 10.0, "y2": y + 10.0}
+        _element(terminal, "TerminalGraphicalRepresentation", **edges, iconBaseName=each.picture)
+    return xml_text(root)
 
 
 def _model_exchange(root: ElementTree.Element, layout: FmuLayout, two: bool) -> None:
@@ -358,8 +350,3 @@ def _text(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(float(value)) if isinstance(value, float) else str(value)
-
-
-def _written(root: ElementTree.Element) -> str:
-    ElementTree.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

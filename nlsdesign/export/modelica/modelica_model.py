@@ -22,6 +22,7 @@ from ...foundation.text_files import write_text
 from ...model import FlatModel, Variable
 from ...model.graph import Instruction, read_graph
 from ..c.c_text import comment, identifier, origin_lines, stamped
+from ..files import check_continuous
 from .modelica_terms import ATOM, SERIES, SIGNED, WRITTEN_TWICE, Term, kept, term
 
 LONGEST = 16
@@ -225,19 +226,11 @@ def export_modelica(model: FlatModel, path: str | Path) -> Path:
 
 def modelica_text(model: FlatModel) -> str:
     """Return a continuous model as Modelica text."""
-    if model.sample_time is not None or model.tables:
-        raise ExportError(
-            f"model '{model.name}'",
-            "is sampled, and Modelica text is written of continuous models",
-            next_step="export it as C or FMU: nlsdesign export c, nlsdesign export fmu",
-        )
-    if model.switching is not None and model.switching.jumps:
-        raise ExportError(
-            f"model '{model.name}': '{model.switching.jumps[0]}'",
-            "is sharp, and its sticking and impacts have no plain Modelica text",
-            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as "
-            "FMU, which holds the sharp form",
-        )
+    check_continuous(
+        model, sampled="is sampled, and Modelica text is written of continuous models",
+        step="export it as C or FMU: nlsdesign export c, nlsdesign export fmu",
+        sharp="is sharp, and its sticking and impacts have no plain Modelica text",
+    )  # fmt: skip
     groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
     names = quoted_names(v.name for group in groups for v in group)
     equations = modelica_equations(model, names)

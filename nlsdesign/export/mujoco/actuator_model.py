@@ -31,7 +31,7 @@ from ..c.c_text import (
     string,
 )
 from ..c.instructions import print_statements
-from ..files import filled, write_all
+from ..files import check_continuous, filled, write_all
 
 HOLDER = "inner_states"
 """Name of the actuator whose activations are the inner states; it drives nothing."""
@@ -94,18 +94,11 @@ def export_mujoco(model: FlatModel, folder: str | Path) -> MujocoModel:
     ['dfki_pendulum.xml', 'dfki_pendulum_plugin.xml']
     """
     where = f"model '{model.name}'"
-    if model.sample_time is not None or model.tables:
-        raise ExportError(
-            where, "is sampled, and MuJoCo integrates a continuous plant",
-            next_step="export the sampled part as C (nlsdesign export c) and call its step between mj_step",
-        )  # fmt: skip
-    if model.switching is not None and model.switching.jumps:
-        raise ExportError(
-            f"{where}: '{model.switching.jumps[0]}'",
-            "is sharp, and MuJoCo, which locates no events, cannot carry it",
-            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as "
-            "FMU, which holds the sharp form",
-        )
+    check_continuous(
+        model, sampled="is sampled, and MuJoCo integrates a continuous plant",
+        step="export the sampled part as C (nlsdesign export c) and call its step between mj_step",
+        sharp="is sharp, and MuJoCo, which locates no events, cannot carry it",
+    )  # fmt: skip
     held = [body for body in model.bodies if body.prescribed]
     if held:
         raise ExportError(

@@ -42,7 +42,6 @@ def rest_states(
     angle: str | None = None,
     consistent: Mapping[str, str] | None = None,
     unmoved: bool = False,
-    tolerance: float = 1e-9,
 ) -> Array:
     """Return the states in which everything rests while the angle is held, at many angles at once.
 
@@ -52,7 +51,7 @@ def rest_states(
     state name to signal name. ``unmoved``: whether states that no state moves at standstill, as those of
     hysteresis that the speed leads, stay as they start; else they are an error.
     """
-    return RestSolver(model, angle=angle, consistent=consistent, unmoved=unmoved)(model, angles, tolerance)
+    return RestSolver(model, angle=angle, consistent=consistent, unmoved=unmoved)(model, angles)
 
 
 def unmoved_states(model: FlatModel, rate: str) -> list[str]:
@@ -97,7 +96,7 @@ class RestSolver:
         slope = ca.jacobian(rate, ca.vertcat(*[s.state[i] for i in free])) if free else ca.SX(0, 0)
         self._newton = ca.Function("rate", arguments, [rate, ca.densify(slope)])
 
-    def __call__(self, model: FlatModel, angles: Array, tolerance: float = 1e-9) -> Array:
+    def __call__(self, model: FlatModel, angles: Array) -> Array:
         """Return rest states, shape (n, states)."""
         x = np.tile(model.start(model.states), (len(angles), 1))
         x[:, self._angle] = angles
@@ -105,7 +104,7 @@ class RestSolver:
         p, u = model.start(model.parameters), model.start(model.inputs)
         for place, follow in self._tied:
             x[:, place] = evaluate_rows(follow, x, u, p)[0][:, 0]
-        return _newton(self._newton, x, (u, p), self._free, (tolerance, model.name))
+        return _newton(self._newton, x, (u, p), self._free, model.name)
 
 
 def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) -> dict[str, float]:
@@ -170,13 +169,14 @@ def _mapped(function: ca.Function, count: int, shared: tuple[int, ...]) -> ca.Fu
     return function.map("rows", "serial", count, list(shared), [])
 
 
-def _newton(
-    function: ca.Function, x: Array, fixed: tuple[Array, Array], free: list[int], limit: tuple[float, str]
-) -> Array:
+_RESTS = 1e-9
+"""Last step relative to the size of a state."""
+
+
+def _newton(function: ca.Function, x: Array, fixed: tuple[Array, Array], free: list[int], name: str) -> Array:
     """Solve for the free states of all rows at once; done when the steps are small or down to rounding."""
     if not free or not len(x):
         return x
-    tolerance, name = limit
     last = np.full(len(free), np.inf)
     for _ in range(60):
         rate, slope = evaluate_rows(function, x, *fixed)
@@ -193,8 +193,8 @@ def _newton(
         x[:, free] -= step
         largest = np.max(np.abs(step), axis=0)
         size = np.maximum(np.max(np.abs(x[:, free]), axis=0), 1e-3)
-        rounding = (largest > 0.5 * last) & (largest <= 1e3 * tolerance * size)
-        if np.all((largest <= tolerance * size) | rounding):
+        rounding = (largest > 0.5 * last) & (largest <= 1e3 * _RESTS * size)
+        if np.all((largest <= _RESTS * size) | rounding):
             return x
         last = largest
     raise ConvergenceError(

@@ -317,10 +317,8 @@ def rest_points(
     ----------
     model
         Continuous.
-    angles
-        Shape (N,), in rad.
-    angle
-        State that is swept.
+    angles, angle
+        N angles in rad, shape (N,), and the state that takes them.
     consistent
         States that have to agree with a signal, as for :func:`~nlsdesign.feedback.analysis.rest.rest_states`.
     like

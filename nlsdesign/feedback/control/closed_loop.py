@@ -480,10 +480,8 @@ def encoder_loop(
         Continuous.
     observer, controller
         Discrete, designed on the plant with its load fixed.
-    delay
-        Samples between a current's computation and its effect.
-    substeps
-        Integration steps of the plant per sample.
+    delay, substeps
+        As :class:`ClosedLoop` has them.
 
     Raises
     ------

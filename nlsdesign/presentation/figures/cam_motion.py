@@ -239,7 +239,10 @@ def _draw(axes: Axes, motion: CamMotion, index: int) -> None:
         axes.plot([side * wall] * 2, [-6.5, 6.5], color=MUTED.light, linewidth=2.0)
         axes.plot([side * motion.guide * MM], [side * y], marker="o", color=MUTED.light, markersize=4)
         axes.plot(*(side * cable[-2]), marker="o", color=VERMILLION.light, markersize=5)
-    _lever_arm(axes, cable[-2], cable[-1])
+    contact, guide = cable[-2], cable[-1]
+    along = (guide - contact) / float(np.hypot(*(guide - contact)))
+    foot = contact - along * float(contact @ along)
+    axes.plot([0.0, foot[0]], [0.0, foot[1]], color=GREEN.light, linewidth=1.4, linestyle=(0, (2, 1)))
     axes.plot([0], [0], marker="o", color=INK.light, markersize=4, markerfacecolor=SURFACE.light)
     degrees = float(np.degrees(motion.angles[index]))
     if abs(degrees) > 1.0:
@@ -255,12 +258,6 @@ def _draw(axes: Axes, motion: CamMotion, index: int) -> None:
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     axes.margins(0.02, 0.06)
-
-
-def _lever_arm(axes: Axes, contact: Array, guide: Array) -> None:
-    along = (guide - contact) / float(np.hypot(*(guide - contact)))
-    foot = contact - along * float(contact @ along)
-    axes.plot([0.0, foot[0]], [0.0, foot[1]], color=GREEN.light, linewidth=1.4, linestyle=(0, (2, 1)))
 
 
 _POINTS = 24

@@ -70,9 +70,12 @@ def design_picture(design: CamDesign) -> Figure:
         panel.set_xlim(left * MM, wide * MM)
         panel.set_ylim(low, high + 2.0)
     figure.set_figheight(2.0 * (WIDTH - 0.8) * (high + 2.0 - low) / ((wide - left) * MM) + 1.2)
-    _dimension_radius(axes[0], design, low + 0.02 * (wide - left) * MM)
+    radius, y = float(design.contour.radii.max()) * MM, low + 0.02 * (wide - left) * MM
+    anchor = float(_end_of_cable(design.contour, radius / MM)[0]) * MM
+    _dimension(axes[0], 0.0, radius, y, f"R {radius:.1f}")
+    if design.contour.anchor_distance * MM == anchor:
+        _dimension(axes[0], 0.0, -anchor, y, f"anchor {anchor:.1f}")
     axes[1].set_xlabel(f"distance from the centre in mm{piece.note}")
-    radius = float(design.contour.radii.max()) * MM
     return described(
         figure,
         f"The designed cam at 0° and {np.degrees(last):.0f}°, to scale: radius {radius:.1f} mm, lever arm up "
@@ -210,15 +213,6 @@ def _piece(design: CamDesign) -> _Piece:
         size = f"{length * MM:.1f} mm long without load, {outside * MM:.1f} mm outside"
         return _Piece(length, outside, f"; coil {size}", f"the coil is {size}")
     return _Piece()
-
-
-def _dimension_radius(axes: Axes, design: CamDesign, y: float) -> None:
-    """Dimension the largest radius of the cam and the distance of the anchor."""
-    contour, radius = design.contour, float(design.contour.radii.max()) * MM
-    anchor = float(_end_of_cable(contour, radius / MM)[0]) * MM
-    _dimension(axes, 0.0, radius, y, f"R {radius:.1f}")
-    if contour.anchor_distance * MM == anchor:
-        _dimension(axes, 0.0, -anchor, y, f"anchor {anchor:.1f}")
 
 
 def _dimension(axes: Axes, left: float, right: float, y: float, text: str) -> None:

@@ -98,7 +98,12 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
                 parent.remove(child)
-    kept = {name for element in root.iter() for name in _references(element)}
+    kept = {
+        name
+        for element in root.iter()
+        for attribute in (_LINK, "clip-path", "style")
+        for name in _REFERENCE.findall(element.get(attribute, ""))
+    }
     kept |= {str(artist.get_gid()) for artist in figure.findobj() if artist.get_gid()}
     for element in root.iter():
         _adapt(element, key, kept)
@@ -173,11 +178,6 @@ def _content(figure: Figure, suffix: str) -> bytes:
         else:
             figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
     return stream.getvalue()
-
-
-def _references(element: ET.Element) -> set[str]:
-    links = [element.get(_LINK, ""), element.get("clip-path", ""), element.get("style", "")]
-    return {name for text in links for name in _REFERENCE.findall(text)}
 
 
 def _adapt(element: ET.Element, key: str, kept: set[str]) -> None:

@@ -155,14 +155,8 @@ def in_lines(name: str, letters: int = 15) -> str:
 _MOST_BARS = 40
 
 
-class MarkedQuantile(NamedTuple):
-    """A quantile in a histogram."""
-
-    share: float  # of the values below it
-    # value, lower, upper: in the unit of the column; bounds that are not a number are not drawn
-    value: float
-    lower: float
-    upper: float
+MarkedQuantile = tuple[float, float, float, float]
+"""Share of the values below it, value, and bounds in the unit of the column, drawn where they are numbers."""
 
 
 @styled
@@ -213,23 +207,21 @@ def _bars(panel: Axes, column: ShownColumn) -> None:
 def _marks(panel: Axes, marks: Sequence[MarkedQuantile]) -> None:
     top = panel.get_ylim()[1]
     panel.set_ylim(0.0, top * (1.12 + 0.09 * len(marks)))
-    for number, mark in enumerate(marks):
+    for number, (share, value, *limits) in enumerate(marks):
         height = top * (1.06 + 0.09 * number)
-        if not np.isfinite(mark.value):
+        if not np.isfinite(value):
             continue
-        known = [b if np.isfinite(b) else mark.value for b in (mark.lower, mark.upper)]
+        known = [b if np.isfinite(b) else value for b in limits]
         bounds = known
-        if np.isfinite(mark.lower) or np.isfinite(mark.upper):
+        if any(np.isfinite(limits)):
             # A side without a bound is open: it goes on to the edge, dotted.
             ends = panel.get_xlim()
-            bounds = [
-                b if np.isfinite(b) else end for b, end in zip((mark.lower, mark.upper), ends, strict=True)
-            ]
+            bounds = [b if np.isfinite(b) else end for b, end in zip(limits, ends, strict=True)]
             panel.plot(bounds, [height, height], color=BEFORE.light, linewidth=1.2, linestyle=(0, (1, 1.5)))
         panel.plot(known, [height, height], color=BEFORE.light, linewidth=2.4, solid_capstyle="butt")
-        panel.plot([mark.value], [height], color=INK.light, marker="|", markersize=7.0)
+        panel.plot([value], [height], color=INK.light, marker="|", markersize=7.0)
         panel.annotate(
-            f"{100 * mark.share:g} %", (bounds[1], height), xytext=(4, 0), textcoords="offset points",
+            f"{100 * share:g} %", (bounds[1], height), xytext=(4, 0), textcoords="offset points",
             va="center", fontsize=7.5,
         )  # fmt: skip
 
@@ -425,16 +417,8 @@ def _contours(panel: Axes, across: Array, up: Array, values: Array) -> None:
     panel.clabel(lines, fmt=lambda value: compact(float(value), 3), fontsize=7.5, colors=INK.light, zorder=5)
 
 
-class VarianceShare(NamedTuple):
-    """Share of one axis."""
-
-    axis: str  # its name
-    # first, first_error: share of the axis alone, and half of its interval
-    first: float
-    first_error: float
-    # total, total_error: the same with its interactions; not a number where there is none
-    total: float
-    total_error: float
+VarianceShare = tuple[str, float, float, float, float]
+"""Axis, and the share of the variance that it causes alone and with others, each with half its interval."""
 
 
 @styled
@@ -473,7 +457,7 @@ def _draw(panel: Axes, shares: Sequence[VarianceShare]) -> None:
             edgecolor=SURFACE.light if hatch else "none", label=label,
         )  # fmt: skip
         panel.hlines(places + moved, values - errors, values + errors, color=INK.light, linewidth=1.4)
-    panel.set_yticks(places, [shortened(each.axis, 34) for each in shares])
+    panel.set_yticks(places, [shortened(axis, 34) for axis, *_ in shares])
     panel.set_ylim(places[-1] - 0.6, 0.6)
     panel.set_xlim(min(0.0, float(np.nanmin(first - first_error))) - 1.0, None)
     panel.axvline(0.0, color=INK.light, linewidth=0.8)

@@ -42,18 +42,15 @@ def _row(left: str, right: Any) -> list[Html]:
     """Return an equation as pieces between which the line may break."""
     pieces = [f"{left}<mo form='infix'>=</mo>"]
     if isinstance(right, AppliedUndef):
-        pieces += _dependence(right)
+        # f(a, b, …); of a row of numbers a[1], a[2], … the name alone.
+        names = list(dict.fromkeys(_INDEXED.sub(r"\g<name>", str(argument)) for argument in right.args))
+        inside = [f"<mi>{escape(name)}</mi><mo>,</mo>" for name in names]
+        pieces.append(f"<mi>{escape(str(right.func))}</mi><mo>(</mo>{inside[0]}")
+        pieces += [*inside[1:], "<mo>…</mo><mo>)</mo>"]
     else:
         for number, (sign, term) in enumerate(_terms(right)):
             pieces.append(_signed(sign, first=number == 0) + _layout(term))
     return [_math(piece) for piece in pieces]
-
-
-def _dependence(e: Any) -> list[str]:
-    """Return f(a, b, …) in pieces; of a row of numbers a[1], a[2], … the name alone."""
-    names = list(dict.fromkeys(_INDEXED.sub(r"\g<name>", str(argument)) for argument in e.args))
-    pieces = [f"<mi>{escape(name)}</mi><mo>,</mo>" for name in names]
-    return [f"<mi>{escape(str(e.func))}</mi><mo>(</mo>{pieces[0]}", *pieces[1:], "<mo>…</mo><mo>)</mo>"]
 
 
 def _signed(sign: str, *, first: bool) -> str:

@@ -15,10 +15,8 @@ from ...sweeps.preferences import RankedPoints
 from ..figures.sweep_figures import (
     MOST_COORDINATES,
     MOST_PANELS,
-    MarkedQuantile,
     ShownColumn,
     SurfacePanel,
-    VarianceShare,
     answer_histograms,
     answers_against,
     parallel_coordinates,
@@ -275,9 +273,10 @@ def histogram_sections(content: PageContent) -> list[Section]:
     )))  # fmt: skip
     if not drawn:
         return [TextSection("How the answers are distributed", " ".join(remarks))] if remarks else []
-    marks = [[MarkedQuantile(*each) for each in one.quantiles] for one in drawn]
     words = "Histograms of " + ", ".join(each.column.name for each in drawn) + " with their quantiles."
-    figure = answer_histograms([each.column for each in drawn], marks, words=words)
+    figure = answer_histograms(
+        [each.column for each in drawn], [each.quantiles for each in drawn], words=words
+    )
     rows = tuple(row for each in drawn for row in _quantile_rows(each))
     heads = ("answer", "share below", "quantile", "lower bound", "upper bound", "unit")
     return [
@@ -334,15 +333,9 @@ def sensitivity_sections(content: PageContent) -> list[Section]:
             error for each in shown.values() for i in each.indices for error in (i.first_error, i.total_error)
         ]
         have_intervals = any(np.isfinite(error) and error > 0.0 for error in errors)
-        shares = {
-            name: [
-                VarianceShare(i.axis, i.first, i.first_error, i.total, i.total_error) for i in each.indices
-            ]
-            for name, each in shown.items()
-        }
         leading = "; ".join(f"{name}: {each.indices[0].axis}" for name, each in shown.items())
         shares_figure = sensitivity_bars(
-            {name: rows[:_MOST_SHARES] for name, rows in shares.items()},
+            {name: each.indices[:_MOST_SHARES] for name, each in shown.items()},
             words=f"Shares of the variance of the answers by axis. Largest, {leading}.",
         )
         groups: dict[tuple[str, int], list[str]] = {}

@@ -276,20 +276,6 @@ class _Assembler:
         self, *, at_rest: bool
     ) -> tuple[dict[str, Array], dict[str, Array], dict[str, tuple[Array, Array]]]:
         """Return values and rows of all signals, and what the states of the blocks become."""
-        values, rows = self._open(at_rest)
-        self._read(values, rows)
-        following = self._pass(values, rows)
-        if self.system.delay == 0 and self.driven not in self.cut:
-            rows[self.driven] = rows[self._computed]
-            following = self._pass(values, rows)
-        return values, rows, following
-
-    @property
-    def _computed(self) -> str:
-        last = list(self.system.blocks)[-1]
-        return f"{last}.{self.system.blocks[last].outputs[0].name}"
-
-    def _open(self, at_rest: bool) -> tuple[dict[str, Array], dict[str, Array]]:
         values, rows = dict(self.open_values), {}
         for i, name in enumerate(self.inputs):
             rows[name] = np.zeros((self.n, self.width))
@@ -300,9 +286,6 @@ class _Assembler:
             rows[self.driven] = np.zeros((self.n, self.width))
             if self.system.delay:
                 rows[self.driven][:, len(self.states) - self.system.delay] = 1.0
-        return values, rows
-
-    def _read(self, values: dict[str, Array], rows: dict[str, Array]) -> None:
         plant, states = self.plant, len(self.plant.states)
         given = np.stack([rows[f"{PLANT}.{name}"] for name in plant.inputs], axis=1)
         for i, name in enumerate(plant.signals):
@@ -311,6 +294,16 @@ class _Assembler:
             full = f"{PLANT}.{name}"
             if full not in rows:
                 values[full], rows[full] = plant.values[:, i], row
+        following = self._pass(values, rows)
+        if self.system.delay == 0 and self.driven not in self.cut:
+            rows[self.driven] = rows[self._computed]
+            following = self._pass(values, rows)
+        return values, rows, following
+
+    @property
+    def _computed(self) -> str:
+        last = list(self.system.blocks)[-1]
+        return f"{last}.{self.system.blocks[last].outputs[0].name}"
 
     def _pass(self, values: dict[str, Array], rows: dict[str, Array]) -> dict[str, tuple[Array, Array]]:
         following = {}

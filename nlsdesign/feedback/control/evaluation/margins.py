@@ -224,10 +224,8 @@ def output_impedance(
         In Hz; by default 200 from 0.1 Hz to 0.4 of the sampling frequency.
     load
         Name of the load; decided from the structure of the plant if it is left out.
-    speed
-        Of the driven body, at which the slopes of the plant are taken; zero for one stuck in its friction.
-    frozen_tables
-        Whether looked-up tables are held at the angle, where they follow it in the controller.
+    speed, frozen_tables
+        As :func:`loop_margins` takes them.
 
     Raises
     ------
@@ -279,33 +277,27 @@ def coupled_stability(
     angle: float,
     inertias: Sequence[float] | Array,
     stiffnesses: Sequence[float] | Array,
-    damping: float = 0.0,
-    load: str | None = None,
-    speed: float = SLIDING,
 ) -> CoupledStability:
     """Return whether the loop is stable on each load of a range, at rest at one angle of the spring.
 
     ``loop``: its plant has a load whose motion is prescribed; here it moves freely instead. ``angle``: of the
     driven body in rad; the load rests at zero. ``inertias``: of the load in kg·m², shape (i,).
     ``stiffnesses``: of a spring between load and frame in N·m/rad, shape (s,); zero is a free load. A
-    constant torque balances that of the actuator, so that the load rests. ``damping``: between load and frame
-    in N·m·s/rad. ``load``: name of the load; decided from the structure of the plant if it is left out.
-    ``speed``: of the driven body, at which the slopes of the plant are taken; zero for one stuck in its
-    friction.
+    constant torque balances that of the actuator, so that the load rests. Nothing but the actuator damps it,
+    and the driven body slides.
     """
-    moved = moved_load(loop.plant, load)
+    moved = moved_load(loop.plant)
     j, k = np.asarray(inertias, dtype=float), np.asarray(stiffnesses, dtype=float)
-    if not np.all(j > 0.0) or not np.all(k >= 0.0) or not damping >= 0.0:
-        raise ValueRangeError(
-            "load", "needs positive inertias, and stiffnesses and a damping that are not negative"
-        )
+    if not np.all(j > 0.0) or not np.all(k >= 0.0):
+        raise ValueRangeError("load", "needs positive inertias, and stiffnesses that are not negative")
     fine = replace(loop, plant=with_fine_counts(loop.plant))
     system = fine.system([loop.desired])
-    plant = plant_of(system, np.array([angle]), speed)
+    plant = plant_of(system, np.array([angle]), SLIDING)
     masses, springs = (grid.ravel() for grid in np.meshgrid(j, k, indexing="ij"))
     names = (moved.motion, moved.rate, series_spring(loop.plant).effort)
-    free = _on_load(plant, names, masses, springs, damping)
-    whole = assembled(system, free, np.full(len(masses), angle), cut=(), frozen_tables=False, speed=speed)
+    free = _on_load(plant, names, masses, springs)
+    at = np.full(len(masses), angle)
+    whole = assembled(system, free, at, cut=(), frozen_tables=False, speed=SLIDING)
     z = np.linalg.eigvals(whole.a)
     largest = np.take_along_axis(z, np.argmax(np.abs(z), axis=1)[:, None], axis=1)[:, 0]
     shape = (len(j), len(k))
@@ -315,9 +307,9 @@ def coupled_stability(
 
 
 def _on_load(
-    plant: LinearPlant, names: tuple[str, str, str], inertias: Array, stiffnesses: Array, damping: float
+    plant: LinearPlant, names: tuple[str, str, str], inertias: Array, stiffnesses: Array
 ) -> LinearPlant:
-    """Return the plant with the load's motion as states: J·ω̇ = T − k·θ − b·ω."""
+    """Return the plant with the load's motion as states: J·ω̇ = T − k·θ."""
     n, states = len(inertias), len(plant.states)
     motion, rate = (plant.inputs.index(name) for name in names[:2])
     torque = plant.signals.index(names[2])
@@ -328,7 +320,7 @@ def _on_load(
     a[:, states, states + 1] = 1.0
     a[:, states + 1, :states] = plant.c[0][torque] / inertias[:, None]
     a[:, states + 1, states] = (plant.d[0][torque, motion] - stiffnesses) / inertias
-    a[:, states + 1, states + 1] = (plant.d[0][torque, rate] - damping) / inertias
+    a[:, states + 1, states + 1] = plant.d[0][torque, rate] / inertias
     b = np.zeros((n, states + 2, len(kept)))
     b[:, :states] = plant.b[0][:, kept]
     c = np.zeros((n, len(plant.signals), states + 2))

@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from ....foundation.errors import ValueRangeError
 from ....model.roles import moved_load
 from ....simulation import Trace
 from ....simulation.buffered import Translate, as_it_is
+from ....simulation.sample_writer import SampledSystem
 from ....simulation.sampled_batch import PLANT, run_batch
 from ..closed_loop import ClosedLoop
 from ..laws.known_drive import check_torque
@@ -103,42 +105,32 @@ def run_periodic(
     """Run a loop on periodic drives until it repeats itself, or diverges, or time is up."""
     samples, cycles, used = drive.windows(loop.sample_time)
     order, runs = np.argsort(samples), {}
-    setup = _Setup(loop, drive, keep)
+    judge, system = LoopJudge(loop), loop.system(drive.drives(np.zeros(1), np.zeros(1, dtype=np.intp)))
+    shown = tuple(dict.fromkeys([*judge.keep, *keep]))
     while len(order):
         group = order[samples[order] <= _SIMILAR * samples[order[0]]]
-        runs.update(_Group(setup, group).run(samples, cycles, used, translate))
+        runs.update(_Group(judge, drive, shown, system, group).run(samples, cycles, used, translate))
         order = order[len(group) :]
     return [runs[i] for i in range(len(samples))]
 
 
-class _Setup:
-    """What all runs share."""
-
-    def __init__(self, loop: ClosedLoop, drive: PeriodicDrive, keep: Sequence[str]) -> None:
-        self.drive, self.judge = drive, LoopJudge(loop)
-        self.keep = tuple(dict.fromkeys([*self.judge.keep, *keep]))
-        self.system = loop.system(drive.drives(np.zeros(1), np.zeros(1, dtype=np.intp)))
-
-
-class _Group:
+class _Group(NamedTuple):
     """Runs of similar length, advanced together."""
 
-    def __init__(self, setup: _Setup, group: Indices) -> None:
-        self.loop, self.drive, self.group, self.judge = setup.judge.loop, setup.drive, group, setup.judge
-        self.keep, self.system = setup.keep, setup.system
-        self.parameters = {
-            n: v[group] if isinstance(v, np.ndarray) and v.ndim else v
-            for n, v in setup.drive.parameters.items()
-        }
+    judge: LoopJudge
+    drive: PeriodicDrive
+    keep: tuple[str, ...]
+    system: SampledSystem
+    group: Indices
 
     def run(
-        self,
-        samples: Indices,
-        cycles: Indices,
-        used: Array,
-        translate: Translate,
+        self, samples: Indices, cycles: Indices, used: Array, translate: Translate
     ) -> dict[int, PeriodicRun]:
-        step, group = self.loop.sample_time, self.group
+        step, group = self.judge.loop.sample_time, self.group
+        parameters = {
+            n: v[group] if isinstance(v, np.ndarray) and v.ndim else v
+            for n, v in self.drive.parameters.items()
+        }
         length = int(np.max(samples[group]))
         begin, state = 0, None
         shown = {name: np.zeros((len(group), 0)) for name in self.keep}
@@ -149,7 +141,7 @@ class _Group:
             time = step * (begin + np.arange(more + 1.0))
             batch = run_batch(
                 self.system, (more - 1) * step, inputs=self.drive.drives(time, group),
-                parameters=self.parameters, start=state, keep=self.keep, translate=translate,
+                parameters=parameters, start=state, keep=self.keep, translate=translate,
             )  # fmt: skip
             state = {name: batch.final[:, i] for i, name in enumerate(self.system.states)}
             begin += more
@@ -168,10 +160,10 @@ class _Group:
     def _evaluated(
         self, signals: Mapping[str, Array], cycles: int, frequency: float, end: float
     ) -> PeriodicRun:
-        length = len(signals[self.loop.torque])
-        steady = self._steady(signals[self.loop.torque], signals[self.judge.angle], 2 * cycles)
+        length = len(signals[self.judge.loop.torque])
+        steady = self._steady(signals[self.judge.loop.torque], signals[self.judge.angle], 2 * cycles)
         verdict = self.judge.judged(signals, cycles=2 * cycles, steady=steady)
-        time = end + self.loop.sample_time * np.arange(-float(length), 0.0)
+        time = end + self.judge.loop.sample_time * np.arange(-float(length), 0.0)
         return PeriodicRun(frequency, 2 * cycles, time, signals, verdict)
 
     def _steady(self, torque: Array, angle: Array, cycles: int) -> bool:
@@ -391,7 +383,11 @@ def sine_response(
     runs = [
         _unless_silent(run, loop.torque, amplitude) for run in run_periodic(loop, drive, translate=translate)
     ]
-    response = [_answer(run, loop.torque, amplitude) for run in runs]
+    # sin(ωt) = Im e^(iωt): the fundamental of the drive is −i times the amplitude.
+    response = [
+        run.fundamental(loop.torque) / (-1j * amplitude) if run.verdict.holds else complex(math.nan, math.nan)
+        for run in runs
+    ]
     return SineResponse(
         amplitude,
         np.array([run.frequency for run in runs]),
@@ -534,11 +530,6 @@ def _unless_silent(run: PeriodicRun, torque: str, amplitude: float) -> PeriodicR
     if not run.verdict.holds or abs(run.fundamental(torque)) > _SILENT * amplitude:
         return run
     return replace(run, verdict=replace(run.verdict, state=NO_ANSWER))
-
-
-def _answer(run: PeriodicRun, torque: str, amplitude: float) -> complex:
-    # sin(ωt) = Im e^(iωt): its fundamental is −i times the amplitude.
-    return run.fundamental(torque) / (-1j * amplitude) if run.verdict.holds else complex(math.nan, math.nan)
 
 
 def _distortion(run: PeriodicRun, torque: str) -> float:

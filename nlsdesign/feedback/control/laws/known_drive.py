@@ -84,7 +84,9 @@ class KnownDrive:
         """Whether the angle of the motor alone tells that of the spring, as with a fixed load."""
         known, s = self.named
         motion = known[series_spring(self.plant).motion]
-        return not depends(motion, ca.vertcat(all_but(s.state, known[self.body.motion]), s.input))
+        own = known[self.body.motion]
+        others = [each for each in ca.vertsplit(s.state) if not ca.is_equal(each, own)]
+        return not depends(motion, ca.vertcat(*others, s.input))
 
     def inertia(self, writer: LawWriter) -> Expression:
         """Return J in kg·m²: of all that turns with the motor, seen from it.
@@ -137,11 +139,6 @@ class KnownDrive:
             *(self.current_limit(writer) if v.name == limit else writer.number(v) for v, _ in used)
         )
         return ca.SX(ca.substitute(expression, ca.vertcat(*(symbol for _, symbol in used)), new))
-
-
-def all_but(column: Expression, one: Expression) -> Expression:
-    """Return the items of a column without one of them."""
-    return ca.vertcat(*(each for each in ca.vertsplit(column) if not ca.is_equal(each, one)))
 
 
 def voltage_is_limited(drive: KnownDrive) -> bool:
@@ -411,7 +408,12 @@ def _sides(drive: KnownDrive) -> list[tuple[float, float]]:
             next_step="fix the load, or prescribe its motion",
         )  # fmt: skip
     by_current = _by_current(drive)
-    return [(by_current(way), _by_contour(drive, way)) for way in (1.0, -1.0)]
+    # The torque at rest at the end of the contour; without a cam there is no end.
+    ends = contour_ends(drive.plant, series_spring(drive.plant)).values()
+    return [
+        (by_current(way), abs(torque_at_rest(drive, way * min(ends))) if ends else math.inf)
+        for way in (1.0, -1.0)
+    ]
 
 
 def _by_current(drive: KnownDrive) -> Callable[[float], float]:
@@ -446,12 +448,6 @@ def _by_current(drive: KnownDrive) -> Callable[[float], float]:
         return low
 
     return largest
-
-
-def _by_contour(drive: KnownDrive, way: float) -> float:
-    """Return the size of the torque at rest at the end of the contour; infinite without a cam."""
-    ends = contour_ends(drive.plant, series_spring(drive.plant)).values()
-    return abs(torque_at_rest(drive, way * min(ends))) if ends else math.inf
 
 
 def torque_at_rest(drive: KnownDrive, angle: float) -> float:

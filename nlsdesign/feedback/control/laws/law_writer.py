@@ -177,6 +177,19 @@ class LawWriter:
         return ca.Function("begin", [x, u, p, w], [ca.densify(begun), ca.densify(ca.vertcat(*again))])
 
 
+def filtered_rate(
+    writer: LawWriter, name: str, *, value: Expression, corner: Expression, of: str, unit: str, rate_unit: str
+) -> Expression:
+    """Return the filtered rate of a value; ``name``: what its states begin with, ``of``: what it is."""
+    before = writer.state(f"{name}.previous", unit, f"{of} one sample ago")
+    old = writer.state(f"{name}.rate", rate_unit, f"filtered rate of the {of}")
+    rate = writer.low_pass(old, (value - before) / writer.sample_time, corner)
+    writer.begin(f"{name}.previous", value)
+    writer.follow(f"{name}.previous", value)
+    writer.follow(f"{name}.rate", rate)
+    return rate
+
+
 def limited(value: Expression, limit: Expression) -> Expression:
     """Return a value within ±limit."""
     return ca.fmin(ca.fmax(value, -limit), limit)

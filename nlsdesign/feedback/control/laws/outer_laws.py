@@ -16,12 +16,20 @@ import numpy as np
 
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import Expression
-from ....model import FlatModel, Table, Variable
+from ....model import Table, Variable
 from ....model.roles import contour_ends, series_spring
 from ....model.transform import named
 from ...analysis.rest import evaluate_at, rest_states
 from .known_drive import KnownDrive
-from .law_writer import GAIN, AntiWindup, ConditionalIntegration, Integration, LawWriter, limited
+from .law_writer import (
+    GAIN,
+    AntiWindup,
+    ConditionalIntegration,
+    Integration,
+    LawWriter,
+    filtered_rate,
+    limited,
+)
 
 
 class Heard(NamedTuple):
@@ -142,9 +150,6 @@ class PidTorque(TorqueLaw):
     def command(self, writer: LawWriter, drive: KnownDrive, heard: Heard) -> SpeedCommand:
         """Return v within its limits; see :class:`TorqueLaw`."""
         time = writer.sample_time
-        before = writer.state("torque_loop.error.previous", "N*m", "torque error one sample ago")
-        old_rate = writer.state("torque_loop.error.rate", "N*m/s", "filtered rate of the torque error")
-        integral = writer.state("torque_loop.integral", "rad/s", "integral part of the speed command")
         proportional = self._proportional(drive, time) if self.proportional is None else self.proportional
         whole = SLOW_PART * proportional if self.integral is None else self.integral
         gain = writer.setting(
@@ -157,14 +162,20 @@ class PidTorque(TorqueLaw):
             self.derivative_bandwidth,
         )  # fmt: skip
         error = heard.desired - heard.torque
-        rate = writer.low_pass(old_rate, (error - before) / time, corner)
+        rate = filtered_rate(
+            writer,
+            "torque_loop.error",
+            value=error,
+            corner=corner,
+            of="torque error",
+            unit="N*m",
+            rate_unit="N*m/s",
+        )
+        integral = writer.state("torque_loop.integral", "rad/s", "integral part of the speed command")
         asked = gain * error + integral + fast * rate
         speed = held_speed(writer, asked, self.speed_limit, self.acceleration_limit)
 
         def finish(held: HeldBack) -> None:
-            writer.begin("torque_loop.error.previous", error)
-            writer.follow("torque_loop.error.previous", error)
-            writer.follow("torque_loop.error.rate", rate)
             one = Integration(
                 "torque", integral, error, slow * error, (held.speed, held.current),
                 held.speed + held.current * held.speed_per_current,
@@ -265,13 +276,15 @@ class FilteredDifference(DesiredRate):
             "rate_bandwidth", "Hz", "torque loop: corner of the filter on the rate of the desired torque",
             self.bandwidth,
         )  # fmt: skip
-        before = writer.state("torque_loop.desired.previous", "N*m", "desired torque one sample ago")
-        old = writer.state("torque_loop.desired.rate", "N*m/s", "filtered rate of the desired torque")
-        rate = writer.low_pass(old, (heard.desired - before) / writer.sample_time, corner)
-        writer.begin("torque_loop.desired.previous", heard.desired)
-        writer.follow("torque_loop.desired.previous", heard.desired)
-        writer.follow("torque_loop.desired.rate", rate)
-        return rate
+        return filtered_rate(
+            writer,
+            "torque_loop.desired",
+            value=heard.desired,
+            corner=corner,
+            of="desired torque",
+            unit="N*m",
+            rate_unit="N*m/s",
+        )
 
 
 @dataclass(frozen=True)
@@ -401,13 +414,15 @@ class ScheduledTorque(TorqueLaw):
             "acceleration_bandwidth", "Hz", "torque loop: corner of the filter on that acceleration",
             self.acceleration_bandwidth,
         )  # fmt: skip
-        before = writer.state("torque_loop.feedforward.previous", "rad/s", "feedforward one sample ago")
-        old = writer.state("torque_loop.feedforward.rate", "rad/s^2", "filtered rate of the feedforward")
-        rate = writer.low_pass(old, (ahead - before) / writer.sample_time, corner)
-        writer.begin("torque_loop.feedforward.previous", ahead)
-        writer.follow("torque_loop.feedforward.previous", ahead)
-        writer.follow("torque_loop.feedforward.rate", rate)
-        return share * rate
+        return share * filtered_rate(
+            writer,
+            "torque_loop.feedforward",
+            value=ahead,
+            corner=corner,
+            of="feedforward",
+            unit="rad/s",
+            rate_unit="rad/s^2",
+        )
 
 
 def stiffness_table(drive: KnownDrive) -> Table:
@@ -419,7 +434,12 @@ def stiffness_table(drive: KnownDrive) -> Table:
     spring, which is then an input of its own.
     """
     plant, body = drive.plant, drive.body
-    _check_held(plant, body.name)
+    free = [each.name for each in plant.bodies if not each.prescribed and each.name != body.name]
+    if free:
+        raise ArrangementError(
+            f"body '{free[0]}'", "moves freely, so the spring has no torque at rest to schedule by",
+            next_step="design the controller on the same machine with a Fixed load: names and numbers stay",
+        )  # fmt: skip
     spring, turns = series_spring(plant), drive.spring_turns_value
     end = min(contour_ends(plant, spring).values(), default=math.pi / 2.0)
     angles = np.linspace(-end, end, POINTS)
@@ -443,12 +463,3 @@ def stiffness_table(drive: KnownDrive) -> Table:
     order = np.argsort(seen)
     step = float(abs(seen[1] - seen[0]))
     return Table(body.motion, float(np.min(seen)), step, (column,), slopes[order][:, None])
-
-
-def _check_held(plant: FlatModel, motor: str) -> None:
-    free = [body.name for body in plant.bodies if not body.prescribed and body.name != motor]
-    if free:
-        raise ArrangementError(
-            f"body '{free[0]}'", "moves freely, so the spring has no torque at rest to schedule by",
-            next_step="design the controller on the same machine with a Fixed load: names and numbers stay",
-        )  # fmt: skip

@@ -159,12 +159,8 @@ class FrictionCompensation:
 
         Parameters
         ----------
-        writer
-            Of the controller.
-        drive
-            What is known of the plant.
-        heard
-            Inputs of the controller.
+        writer, drive, heard
+            As a :class:`TorqueLaw` gets them.
         speed
             Of the motor in rad/s.
         gain

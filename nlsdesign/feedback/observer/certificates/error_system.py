@@ -23,7 +23,7 @@ from ....model.paper_form import GEOMETRIC, paper_form
 from ....model.transform import named, with_outputs, without_idle_states
 from ..scheduling.angle_form import AngleScheduledPlant, Minimal, PaperForm, plant_over
 from .exact import Matrix, corners
-from .intervals import Bounds, enclose
+from .intervals import Bounds, enclose, halved
 from .polytope import SPEED_LIMIT, scaling
 from .torque_bound import NARROWEST
 
@@ -180,10 +180,7 @@ def hull(ranges: Callable[[Bounds], tuple[Array, Array, Mask]], edges: Array) ->
         high = np.maximum(high, np.max(greatest[taken], axis=0, initial=-np.inf))
         if not np.any(wide):
             break
-        cells = (
-            np.concatenate([cells[0][wide], middle[wide]]),
-            np.concatenate([middle[wide], cells[1][wide]]),
-        )
+        cells = halved(cells, middle, wide)
     return low, high
 
 

@@ -42,6 +42,12 @@ class Range:
         return np.maximum(np.abs(self.lower), np.abs(self.upper))
 
 
+def halved(cells: Bounds, middle: Array, wide: Mask) -> Bounds:
+    """Return both halves of the cells that are too wide."""
+    low, high = cells
+    return np.concatenate([low[wide], middle[wide]]), np.concatenate([middle[wide], high[wide]])
+
+
 @dataclass(frozen=True, eq=False)
 class Enclosure:
     """Ranges of the outputs of a function over many boxes."""
@@ -208,18 +214,13 @@ def _wave(function: Callable[[Array], Array]) -> Callable[[Bounds], Bounds]:
     """Return the range of a function whose slope is never steeper than one and which stays within ±1."""
 
     def of(a: Bounds) -> Bounds:
-        middle, half = _middle(a)
+        middle = (a[0] + a[1]) / 2.0
+        half = np.nextafter(np.maximum(a[1] - middle, middle - a[0]), np.inf)
         at = function(middle)
         low, high = _outward(at - half, at + half, 2 * ELEMENTARY)
         return np.maximum(low, -1.0), np.minimum(high, 1.0)
 
     return of
-
-
-def _middle(a: Bounds) -> Bounds:
-    middle = (a[0] + a[1]) / 2.0
-    half = np.nextafter(np.maximum(a[1] - middle, middle - a[0]), np.inf)
-    return middle, half
 
 
 def _truth(never: Mask, always: Mask) -> Bounds:

@@ -58,14 +58,17 @@ class ErrorPolytope:
 
     def exact_corners(self) -> Iterator[Matrix]:
         """Yield every corner of (I − MC)·F(q)·Φ in scaled states, in fractions."""
-        n = len(self.states)
+        n, (angle, speed) = len(self.states), self.moving
         scale = [Fraction(s) for s in self.sizes]
         for m, q, phi in product(
             self._read(self.correction), sorted(set(self.friction)), self._read(self.transition)
         ):
             output = [[Fraction(int(j == place)) for j in range(n)] for place in self.seen]
             seen = combined(identity(n), times(m, output), first=Fraction(1), second=Fraction(-1))
-            error = times(times(seen, self._braked(Fraction(q))), phi)
+            braked = identity(n)
+            braked[speed][speed] = Fraction(q)
+            braked[angle][speed] = Fraction(self.sample_time) / 2 * (Fraction(q) - 1)
+            error = times(times(seen, braked), phi)
             yield [[error[i][j] * scale[j] / scale[i] for j in range(n)] for i in range(n)]
 
     def corners(self) -> Array:
@@ -84,13 +87,6 @@ class ErrorPolytope:
                 ]
             )
         return result
-
-    def _braked(self, q: Fraction) -> Matrix:
-        angle, speed = self.moving
-        matrix = identity(len(self.states))
-        matrix[speed][speed] = q
-        matrix[angle][speed] = Fraction(self.sample_time) / 2 * (q - 1)
-        return matrix
 
 
 def error_polytope(design: ObserverDesign) -> ErrorPolytope:

@@ -23,7 +23,7 @@ from ....foundation.errors import ArrangementError, ValueRangeError, unknown_nam
 from ....model import FlatModel
 from ....model.transform import with_outputs, without_idle_states
 from ..scheduling.scheduled import ObserverDesign
-from .intervals import Bounds, Range, enclose
+from .intervals import Bounds, Range, enclose, halved
 
 NARROWEST = 1e-7
 """Width in rad below which a range of angles around the knot of a contour is not divided further."""
@@ -295,27 +295,20 @@ class _Bounding:
         largest = 0.0
         for _ in range(REFINEMENTS):
             middle = (cells[0] + cells[1]) / 2.0
-            ends = [np.concatenate([end, middle]) for end in cells]
-            slope, steep = np.split(self._steepness((ends[0], ends[1])), 2)
+            both = (np.concatenate([cells[0], middle]), np.concatenate([cells[1], middle]))
+            rest = self.view.ranges(self.view.rest, both)
+            slopes = self.view.ranges(self.view.torque, both, self._carried(rest))[1].magnitude[:, 0]
+            slope, steep = np.split(slopes + np.sum(rest[1].magnitude, axis=1), 2)
             largest = max(largest, float(np.max(steep, initial=0.0)))
             wide = (slope > 1.3 * largest) & (cells[1] - cells[0] > 1e-6)
             done.append((cells[0][~wide], cells[1][~wide]))
-            cells = (
-                np.concatenate([cells[0][wide], middle[wide]]),
-                np.concatenate([middle[wide], cells[1][wide]]),
-            )
+            cells = halved(cells, middle, wide)
             if not len(cells[0]):
                 break
         done.append(cells)
         low, high = (np.concatenate([each[k] for each in done]) for k in (0, 1))
         order = np.argsort(low)
         return low[order], high[order]
-
-    def _steepness(self, cells: Bounds) -> Array:
-        rest = self.view.ranges(self.view.rest, cells)
-        slope = self.view.ranges(self.view.torque, cells, self._carried(rest))[1].magnitude[:, 0]
-        steep: Array = slope + np.sum(rest[1].magnitude, axis=1)
-        return steep
 
     def _carried(self, ranges: tuple[Range, ...]) -> Array:
         """Return where the inner states can be at each angle, shape (cells, inner, 2).

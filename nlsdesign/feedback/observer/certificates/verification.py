@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Protocol, TypeAlias, cast
+from typing import TypeAlias, cast
 
 import numpy as np
 
@@ -102,14 +103,6 @@ def read_certificate(path: str | Path) -> tuple[Certificate[AnyProof], bool]:
     return certificate, certificate_text(certificate) == text
 
 
-class WritesCode(Protocol):
-    """Writes an observer as C."""
-
-    def __call__(self, observer: FlatModel, folder: Path, /, *, real: str, name: str) -> object:
-        """Write ``<name>.c`` and ``<name>.h``."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class CodeToCompare:
     """C files that should be those of a certificate.
@@ -124,7 +117,7 @@ class CodeToCompare:
     """
 
     folder: Path
-    writes: WritesCode | None = None
+    writes: Callable[..., object] | None = None
 
 
 def verify(

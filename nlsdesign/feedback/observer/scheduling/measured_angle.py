@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Protocol
 
-import casadi as ca
 import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import MeasurementError, ValueRangeError
-from ....foundation.symbolic import Expression
 from ....model import FlatModel, Plausibility, Variable
 from ....model.roles import declared_reading
 from ....simulation import Trace, simulate
@@ -48,18 +45,11 @@ def with_plausible_inputs(
     """
     angle, *others = observer.inputs
     time = float(observer.sample_time or 0.0)
-    measured = _plausible_angle(angle, model, plant, angles, time)
-    return replace(observer, inputs=(measured, *(_limited(v, model) for v in others)))
-
-
-def _plausible_angle(
-    angle: Variable, model: FlatModel, plant: AngleScheduledPlant, angles: Array, sample_time: float
-) -> Variable:
     declared = declared_reading(model, angle.name)
     width, speed = float(angles[-1] - angles[0]), float(plant.sizes[plant.moving[1]])
     usual = (float(angles[0]) - width, float(angles[-1]) + width, FASTER * speed, float("inf"))
     lowest, highest, rate, stale = declared.limits or usual
-    _check_sampling(angle.name, rate, stale, declared.quantum, sample_time)
+    _check_sampling(angle.name, rate, stale, declared.quantum, time)
     drive = next((v.name for v in plant.inputs if _command_limit(v.name, model) is not None), None)
     can = Plausibility(
         rate,
@@ -68,7 +58,8 @@ def _plausible_angle(
         drive,
         0.0 if drive is None else noticeable_change(plant, drive, angles, COUNTS * declared.quantum),
     )
-    return replace(angle, minimum=lowest, maximum=highest, plausibility=can)
+    measured = replace(angle, minimum=lowest, maximum=highest, plausibility=can)
+    return replace(observer, inputs=(measured, *(_limited(v, model) for v in others)))
 
 
 def _check_sampling(name: str, rate: float, stale: float, quantum: float, sample_time: float) -> None:
@@ -127,94 +118,6 @@ def noticeable_change(plant: AngleScheduledPlant, drive: str, angles: Array, res
         speeds = np.linspace(0.0, float(plant.sizes[speed]), 33)
         held = max(abs(float(plant.friction(s))) for s in speeds)
     return SURELY * (2.0 * held + slope * resolution) / pushed
-
-
-class StepWriter(Protocol):
-    """Writes the step of a scheduled observer with the entries read from its table."""
-
-    plant: AngleScheduledPlant
-    w: Expression
-
-    def read(self, kind: str, i: int, j: int = 0) -> Expression:
-        """Return one entry of a matrix."""
-        ...
-
-    def row(self, kind: str, i: int, of: Sequence[Expression]) -> Expression:
-        """Return one row of a matrix times a vector."""
-        ...
-
-    def prior(self, memory: Sequence[Expression]) -> list[Expression]:
-        """Return the states that are expected at a sample."""
-        ...
-
-
-class FirstReading:
-    """Begin and expectation of a scheduled observer."""
-
-    def __init__(
-        self,
-        writer: StepWriter,
-        memory: Sequence[Expression],
-        others: Sequence[Expression],
-        angle: Expression,
-    ) -> None:
-        self.writer, self.plant = writer, writer.plant
-        self.memory, self.others, self.angle = list(memory), list(others), angle
-        self.inputs = [angle, *(ca.SX.sym(v.name) for v in self.plant.inputs)]
-        self.arguments = [_column([*memory, *others]), _column(self.inputs), ca.SX(0, 1), writer.w]
-
-    def expected(self) -> ca.Function:
-        """Return what is expected of each input: of the angle what the model predicts."""
-        place, _ = self.plant.moving
-        predicted = self.writer.prior(self.memory)[place]
-        return ca.Function("expected", self.arguments, [_column([predicted, *self.inputs[1:]])])
-
-    def begin(self) -> ca.Function:
-        """Return the states of a machine that rests at the first reading, and those after a gap."""
-        plant, writer, count = self.plant, self.writer, len(self.memory)
-        angle_place, speed_place = plant.moving
-        measured = [writer.read("measured", i) for i in range(len(plant.measured))]
-        given = {angle_place: self.angle, speed_place: ca.SX(0)}
-        given |= {plant.names.index(name): y for name, y in zip(plant.measured, measured, strict=True)}
-        inner = [i for i in range(count) if i not in given]
-        known = [given.get(i, ca.SX(0)) for i in range(count)]
-        offset = [writer.row("next", i, [*known, ca.SX(1)]) + writer.read("prior", i) for i in inner]
-        carried = [[writer.read("next", i, j) for j in inner] for i in inner]
-        for i, value in zip(inner, at_rest(carried, offset), strict=True):
-            known[i] = value
-        begun = [known[i] - writer.read("prior", i) for i in range(count)]
-        resumed = list(self.memory)
-        resumed[angle_place] += self.angle - writer.prior(self.memory)[angle_place]
-        rates = [ca.SX(0)] * (len(self.others) - len(measured))
-        results = [_column([*begun, *measured, *rates]), _column([*resumed, *measured, *rates])]
-        return ca.Function("begin", self.arguments, results)
-
-
-def at_rest(carried: Sequence[Sequence[Expression]], offset: Sequence[Expression]) -> list[Expression]:
-    """Return the inner states that stay as they are: x = A·x + g.
-
-    A state that never decays, such as a permanent set, has no rest of its own and begins at zero.
-
-    ``carried``: A, shape (n, n).
-    """
-    count = len(offset)
-    shares = [carried[i][i] for i in range(count)]
-    # What is kept over a sample is below one, or varies with the angle.
-    moving = [i for i, kept in enumerate(shares) if not kept.is_constant() or float(kept) < 1.0 - 1e-12]
-    result = [ca.SX(0)] * count
-    if not moving:
-        return result
-    matrix = ca.SX.eye(len(moving)) - ca.SX(
-        ca.vertcat(*[ca.horzcat(*[carried[i][j] for j in moving]) for i in moving])
-    )
-    rest = ca.solve(matrix, _column([offset[i] for i in moving]))
-    for place, i in enumerate(moving):
-        result[i] = rest[place]
-    return result
-
-
-def _column(items: Sequence[Expression]) -> Expression:
-    return ca.SX(ca.densify(ca.vertcat(*items))) if items else ca.SX(0, 1)
 
 
 def observe(

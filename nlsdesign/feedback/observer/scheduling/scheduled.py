@@ -24,11 +24,11 @@ from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.quantity import typeset_unit
 from ....foundation.symbolic import Expression, remembered
-from ....model import FlatModel, Table, Variable
+from ....model import FlatModel, Variable
 from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
 from .angle_form import Minimal, StateForm, plant_over
-from .measured_angle import FirstReading, measured_angle, with_plausible_inputs
+from .measured_angle import measured_angle, with_plausible_inputs
 from .step import CascadeGain, FittedGain, GainRule, ObserverStep, speed_change
 from .table import Compact, Draft, FineEntries, Grid, TableTorqueError
 from .torque_grid import RESOLUTION, GridByTorqueError, TableTrial
@@ -70,7 +70,12 @@ class ObserverDesign:
             return self.compact.torque_error
         grid = self.compact.angles
         fine = FineEntries.of(self.step.entries, float(grid[0]), float(grid[-1]), RESOLUTION)
-        return TableTrial(Draft(self.step.plant, lambda c: _written(self, c)), fine).error(self.compact)
+
+        def written(compact: Compact) -> ObserverDesign:
+            model = replace(_Writer(self.step, compact).model(), bodies=self.model.bodies)
+            return ObserverDesign(model, self.step, compact)
+
+        return TableTrial(Draft(self.step.plant, written), fine).error(self.compact)
 
     def start(self, angle: float) -> dict[str, float]:
         """Return the start values of an observer that begins while the actuator rests at an angle.
@@ -100,12 +105,6 @@ class ObserverDesign:
             f"  table error of {row}: {error:.2g}" for row, error in self.compact.error.items() if error
         ]
         return "\n".join(lines)
-
-
-def _written(design: ObserverDesign, compact: Compact) -> ObserverDesign:
-    """Return the observer with another table."""
-    model = replace(_Writer(design.step, compact).model(), bodies=design.model.bodies)
-    return ObserverDesign(model, design.step, compact)
 
 
 @remembered(16)
@@ -185,61 +184,40 @@ def whole_contour(model: FlatModel) -> GridByTorqueError:
     return GridByTorqueError(-end, end)
 
 
-class ObserverVariables:
-    """Variables and table that an observer over an angle has, however it corrects itself."""
+class _Writer:
+    """Writes the step of an observer over an angle with the entries read from its table."""
 
     def __init__(self, step: ObserverStep, compact: Compact) -> None:
         self.step, self.compact, self.plant = step, compact, step.plant
+        plant = self.plant
+        self.w = ca.SX.sym("w", len(compact.columns))
+        self.n = len(plant.states)
+        self.angle_place, self.speed_place = plant.moving
+        self.filters = math.isfinite(plant.rate_bandwidth)
+        self.memory = [ca.SX.sym(f"{name}.{MEMORY}") for name in plant.names]
+        self.previous = [ca.SX.sym(f"{name}.{PREVIOUS}") for name in plant.measured]
+        self.filtered = [ca.SX.sym(f"{name}.rate") for name in plant.measured] if self.filters else []
+        self.angle = ca.SX.sym(plant.states[self.angle_place].name)
+        self.u = [ca.SX.sym(v.name) for v in plant.inputs]
 
-    def inputs(self) -> tuple[Variable, ...]:
-        """Return the measured angle and the known inputs."""
-        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
+    @property
+    def _given(self) -> list[Expression]:
+        """States, inputs, no parameters, and numbers of the table."""
+        states = _column([*self.memory, *self.previous, *self.filtered])
+        return [states, _column([self.angle, *self.u]), ca.SX(0, 1), self.w]
 
-    def tables(self) -> tuple[Table, ...]:
-        """Return the table over the angle; none where every entry is a literal."""
-        table = self.compact.table(self.plant.angle)
-        return () if table is None else (table,)
-
-    def table_in_words(self) -> str:
-        """Return size and range of the table."""
-        grid = self.compact.angles
-        return f"table of {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad"
-
-    def memory(self) -> list[Variable]:
-        """Return what each estimate carries on from sample to sample."""
-        return [
-            Variable(
-                f"{v.name}.{MEMORY}", v.unit, f"what the estimate of {v.name} carries on", nominal=float(size)
-            )
-            for v, size in zip(self.plant.states, self.plant.sizes, strict=True)
-        ]
-
-    def estimate(self) -> Variable:
-        """Return what is wanted."""
-        v, size = self.plant.estimate, float(np.max(np.abs(self.step.scales["estimate"])))
-        return Variable(v.name, v.unit, f"estimate of {v.name}", nominal=size)
-
-    def estimates(self) -> list[Variable]:
-        """Return the estimates of the states, and the innovation of each that is measured."""
-        plant, outputs = self.plant, []
+    def _outputs(self) -> tuple[Variable, ...]:
+        """Return what is wanted, the estimates of the states, and the innovation of each that is measured."""
+        plant, v = self.plant, self.plant.estimate
+        size = float(np.max(np.abs(self.step.scales["estimate"])))
+        outputs = [Variable(v.name, v.unit, f"estimate of {v.name}", nominal=size)]
         for v in plant.states:
             name = f"{v.name}.{ESTIMATE}" if v.name == plant.angle else v.name
             outputs.append(Variable(name, v.unit, f"estimate of {v.name}"))
         for name in (plant.angle, *plant.measured):
             unit = plant.states[plant.names.index(name)].unit
             outputs.append(Variable(f"{name}.{INNOVATION}", unit, f"measured minus expected {name}"))
-        return outputs
-
-
-class _Writer(ObserverVariables):
-    """Writes the step with the entries read from the table."""
-
-    def __init__(self, step: ObserverStep, compact: Compact) -> None:
-        super().__init__(step, compact)
-        self.w = ca.SX.sym("w", len(compact.columns))
-        self.n = len(self.plant.states)
-        self.angle_place, self.speed_place = self.plant.moving
-        self.angle = self.plant.states[self.angle_place]
+        return tuple(outputs)
 
     def read(self, kind: str, i: int, j: int = 0) -> Expression:
         """Return one entry; zero entries vanish from the expressions."""
@@ -253,61 +231,71 @@ class _Writer(ObserverVariables):
     def model(self) -> FlatModel:
         """Return the observer."""
         plant, n = self.plant, self.n
-        memory = [ca.SX.sym(f"{name}.{MEMORY}") for name in plant.names]
-        previous = [ca.SX.sym(f"{name}.{PREVIOUS}") for name in plant.measured]
-        filtered = [ca.SX.sym(f"{name}.rate") for name in plant.measured] if self._filters else []
-        angle, u = ca.SX.sym(self.angle.name), [ca.SX.sym(v.name) for v in plant.inputs]
-        measured = [angle, *(self.read("measured", i) for i in range(len(plant.measured)))]
-        prior = self.prior(memory)
-        first = FirstReading(self, memory, [*previous, *filtered], angle)
+        measured = [self.angle, *(self.read("measured", i) for i in range(len(plant.measured)))]
+        prior = self._prior()
         seen = [int(np.argmax(row)) for row in plant.output_matrix]
         innovation = [y - prior[i] for y, i in zip(measured, seen, strict=True)]
         state = [prior[i] + self.row("correction", i, innovation) for i in range(n)]
-        rates = self._rates(measured[1:], previous, filtered)
-        driven = ca.SX(plant.driven(ca.vertcat(*u)))
+        rates = self._rates(measured[1:])
+        driven = ca.SX(plant.driven(ca.vertcat(*self.u)))
         pushed = [*[driven[i] for i in range(driven.numel())], *(rates or [ca.SX(0)])]
         following = [self.row("next", i, [*state, ca.SX(1), *pushed]) for i in range(n)]
         estimate = self.row("estimate", 0, [*state, ca.SX(1)])
         shown = [state[i] + self.read("shift", i) for i in range(n)]
+        states, inputs, _, w = self._given
         equations = stated_equations(
-            _column([*memory, *previous, *filtered]), _column([angle, *u]),
-            derivative=_column([*following, *measured[1:], *(rates if filtered else [])]),
-            output=_column([estimate, *shown, *innovation]), table=self.w,
+            states, inputs, table=w,
+            derivative=_column([*following, *measured[1:], *(rates if self.filtered else [])]),
+            output=_column([estimate, *shown, *innovation]),
         )  # fmt: skip
+        grid, table = self.compact.angles, self.compact.table(plant.angle)
+        words = f"table of {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad"
+        # Of the angle the model predicts what is expected.
+        expected = [prior[self.angle_place], *self.u]
         return FlatModel(
             name=f"{plant.name}_observer",
-            description=f"observer of {plant.estimate.name}, {self.step.gain}, {self.table_in_words()}",
+            description=f"observer of {plant.estimate.name}, {self.step.gain}, {words}",
             states=self._states(),
-            inputs=self.inputs(),
+            inputs=(measured_angle(plant, grid), *plant.inputs),
             parameters=(),
-            outputs=(self.estimate(), *self.estimates()),
+            outputs=self._outputs(),
             signals=(),
             equations=equations,
             sample_time=self.step.sample_time,
-            tables=self.tables(),
-            begin=first.begin(),
-            expected=first.expected(),
+            tables=() if table is None else (table,),  # none where every entry is a literal
+            begin=self._begin(measured[1:], prior),
+            expected=ca.Function("expected", self._given, [_column(expected)]),
         )
 
-    @property
-    def _filters(self) -> bool:
-        return math.isfinite(self.plant.rate_bandwidth)
+    def _begin(self, measured: Sequence[Expression], prior: Sequence[Expression]) -> ca.Function:
+        """Return the states of a machine that rests at the first reading, and those after a gap."""
+        plant, count = self.plant, self.n
+        given = {self.angle_place: self.angle, self.speed_place: ca.SX(0)}
+        given |= {plant.names.index(name): y for name, y in zip(plant.measured, measured, strict=True)}
+        inner = [i for i in range(count) if i not in given]
+        known = [given.get(i, ca.SX(0)) for i in range(count)]
+        offset = [self.row("next", i, [*known, ca.SX(1)]) + self.read("prior", i) for i in inner]
+        carried = [[self.read("next", i, j) for j in inner] for i in inner]
+        for i, value in zip(inner, _at_rest(carried, offset), strict=True):
+            known[i] = value
+        begun = [known[i] - self.read("prior", i) for i in range(count)]
+        resumed = list(self.memory)
+        resumed[self.angle_place] += self.angle - prior[self.angle_place]
+        rates = [ca.SX(0)] * (len(self.previous) + len(self.filtered) - len(measured))
+        results = [_column([*begun, *measured, *rates]), _column([*resumed, *measured, *rates])]
+        return ca.Function("begin", self._given, results)
 
-    def _rates(
-        self, measured: Sequence[Expression], previous: Sequence[Expression], filtered: Sequence[Expression]
-    ) -> list[Expression]:
+    def _rates(self, measured: Sequence[Expression]) -> list[Expression]:
         time = self.step.sample_time
-        raw = [(now - before) / time for now, before in zip(measured, previous, strict=True)]
-        keep = math.exp(-2.0 * math.pi * self.plant.rate_bandwidth * time) if self._filters else 0.0
-        return (
-            [keep * old + (1.0 - keep) * new for old, new in zip(filtered, raw, strict=True)]
-            if filtered
-            else raw
-        )
+        raw = [(now - before) / time for now, before in zip(measured, self.previous, strict=True)]
+        if not self.filtered:
+            return raw
+        keep = math.exp(-2.0 * math.pi * self.plant.rate_bandwidth * time)
+        return [keep * old + (1.0 - keep) * new for old, new in zip(self.filtered, raw, strict=True)]
 
-    def prior(self, memory: Sequence[Expression]) -> list[Expression]:
+    def _prior(self) -> list[Expression]:
         """Return the states expected at a sample, after friction, half of which moves the angle too."""
-        after = [memory[i] + self.read("prior", i) for i in range(self.n)]
+        after = [self.memory[i] + self.read("prior", i) for i in range(self.n)]
         if self.plant.friction is None:
             return after
         time, speed = self.step.sample_time, ca.SX.sym("speed")
@@ -318,14 +306,44 @@ class _Writer(ObserverVariables):
         return after
 
     def _states(self) -> tuple[Variable, ...]:
-        plant, states = self.plant, self.memory()
+        """Return what each estimate carries on from sample to sample, and what the rates need."""
+        plant = self.plant
+        states = [
+            Variable(
+                f"{v.name}.{MEMORY}", v.unit, f"what the estimate of {v.name} carries on", nominal=float(size)
+            )
+            for v, size in zip(plant.states, plant.sizes, strict=True)
+        ]
         for name in plant.measured:
             v = plant.states[plant.names.index(name)]
             states.append(Variable(f"{name}.{PREVIOUS}", v.unit, f"{name} one sample ago"))
-        for name in plant.measured if self._filters else ():
+        for name in plant.measured if self.filters else ():
             v = plant.states[plant.names.index(name)]
             states.append(Variable(f"{name}.rate", f"{v.unit}/s", f"filtered rate of {name}"))
         return tuple(states)
+
+
+def _at_rest(carried: Sequence[Sequence[Expression]], offset: Sequence[Expression]) -> list[Expression]:
+    """Return the inner states that stay as they are: x = A·x + g.
+
+    A state that never decays, such as a permanent set, has no rest of its own and begins at zero.
+
+    ``carried``: A, shape (n, n).
+    """
+    count = len(offset)
+    shares = [carried[i][i] for i in range(count)]
+    # What is kept over a sample is below one, or varies with the angle.
+    moving = [i for i, kept in enumerate(shares) if not kept.is_constant() or float(kept) < 1.0 - 1e-12]
+    result = [ca.SX(0)] * count
+    if not moving:
+        return result
+    matrix = ca.SX.eye(len(moving)) - ca.SX(
+        ca.vertcat(*[ca.horzcat(*[carried[i][j] for j in moving]) for i in moving])
+    )
+    rest = ca.solve(matrix, _column([offset[i] for i in moving]))
+    for place, i in enumerate(moving):
+        result[i] = rest[place]
+    return result
 
 
 def _column(items: Sequence[Expression]) -> Expression:
@@ -408,15 +426,11 @@ def check_stability(
     matrices = np.array([error_matrices(observer, angles, speed) for speed in speeds])
     radius = np.max(np.abs(np.linalg.eigvals(matrices)), axis=(0, 2))
     every = matrices.reshape(-1, *matrices.shape[2:])
-    proved, inner = _structure(every, len(_memory(observer)[0]))
-    return ErrorStability(angles, radius, proved, inner)
-
-
-def _structure(matrices: Array, count: int) -> tuple[bool, bool]:
-    """Return whether all are block triangular with the same stable blocks, and whether the first block is."""
-    own, cross, moving = matrices[:, :count, :count], matrices[:, :count, count:], matrices[:, count:, count:]
+    count = len(_memory(observer)[0])
+    own, cross, moving = every[:, :count, :count], every[:, :count, count:], every[:, count:, count:]
     first = not np.any(cross) and _same_and_stable(own)
-    return first and _same_and_stable(moving), first
+    proved, inner = first and _same_and_stable(moving), first
+    return ErrorStability(angles, radius, proved, inner)
 
 
 def _same_and_stable(blocks: Array) -> bool:

@@ -263,9 +263,7 @@ def compacted(
     places: dict[str, ColumnPlace] = {}
     error: dict[str, float] = {}
     grid, spare = angles[::every], max(SHARE * tolerance, NOTHING)
-    for entry in fine:
-        if not (np.all(np.isfinite(entry.values)) and math.isfinite(entry.weight)):
-            raise ConvergenceError(f"table of the observer, '{entry.name}'", "is not finite at some angle")
+    for entry in _finite(fine):
         largest = float(np.max(np.abs(entry.values)))
         if largest * entry.weight <= NOTHING:
             place = ColumnPlace(0.0)

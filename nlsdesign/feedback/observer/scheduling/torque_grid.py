@@ -281,10 +281,6 @@ class GridByTorqueError(Grid):
             )
         if self.most_bytes is None or table.size(self.bytes_per_number) <= self.most_bytes:
             return table
-        return self._smaller(search, table, asked, unit)
-
-    def _smaller(self, search: _Search, table: Compact, asked: float, unit: str) -> Compact:
-        """Return a coarser table within the size, or refuse with what it would cost."""
         each, most = self.bytes_per_number, self.most_bytes or 0
         largest = MOST_SHARE * search.trial.full_scale if self.torque_error is None else self.torque_error
         coarser = search.of_size(most)
