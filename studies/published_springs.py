@@ -254,7 +254,8 @@ def rolling_pair(target: Target, coil: ExtensionCoil, elements: float) -> tuple[
     By symmetry the point of contact halves the coil. With R half its length and θ half the angle of the joint
     the contour has the support function R(θ), so its radius is √(R² + (dR/dθ)²), with dR/dθ = torque/force.
     """
-    rate, travel = _rate(coil), coil.largest_extension.number
+    assert isinstance(coil.winding, StatedRate)
+    rate, travel = coil.winding.rate.number, coil.largest_extension.number
     angles = np.linspace(0.0, target.last_angle, 400)
     tension = coil.initial_tension.number
     full = 0.5 * (2.0 * tension + rate * travel) * travel
@@ -485,11 +486,6 @@ def machine(theirs: Published, last: float, cam: Callable[..., Cam], pretension:
     spring = nls.tie(nls.through(made, pretension=pretension, coil=theirs.coil), "motor", "load")
     body = Inertia(inertia=nls.quantity(1.0, "g*m^2", source="assumed: of no account at rest"))
     return nls.assembly(theirs.key, motor=body, load=Fixed(), spring=spring)
-
-
-def _rate(coil: ExtensionCoil) -> float:
-    assert isinstance(coil.winding, StatedRate)
-    return coil.winding.rate.number
 
 
 # What is written -----------------------------------------------------------------------------------------
