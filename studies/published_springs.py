@@ -40,6 +40,7 @@ from nlsdesign.design import (
     LeastSize,
     Limit,
     MaximumPressureAngle,
+    MinimumRadiusOfCurvature,
     NumberRange,
     PowerTorque,
     SmoothContour,
@@ -58,6 +59,9 @@ POUND, INCH = 4.4482216153, 0.0254
 GOALS = (TorqueError(), SmoothContour(), LeastSize(weight=1e-4))
 """Of springs that follow the curve alike the smallest."""
 CONTOUR, PRETENSION, ANCHOR = "spring.cam.contour", "spring.pretension", "spring.cam.anchor_distance"
+EDGE = MinimumRadiusOfCurvature(
+    nls.quantity(0.5, "mm", source="assumed: they state no cable; a thin one lies on this edge")
+)
 START = nls.quantity(5.0, "mm", source="assumed: a start for the design")
 
 
@@ -410,7 +414,7 @@ def both_sides(theirs: Published, keep: Sequence[Limit]) -> dict[str, CamDesign]
 def pulleys() -> list[Ours]:
     """Answer WPI: on their anchor, and with what makes it better."""
     rising, weight = knee_pulley(), gravity_pulley()
-    nearer = AnchorDistance(nls.quantity(20.0, "mm"), nls.quantity(8.0 * INCH, "m"))
+    nearer = AnchorDistance(nls.quantity(30.0, "mm"), nls.quantity(8.0 * INCH, "m"))
     return [
         one_design(
             rising, "on_their_anchor", "cable, their anchor", with_anchor(math.hypot(50e-3, 10e-3)),
@@ -427,7 +431,7 @@ def pulleys() -> list[Ours]:
         ),
         one_design(
             weight, "nearer_anchor", "cable, anchor free", with_anchor(8.0 * INCH),
-            "Follows, and smaller, at the same force: the anchor is nearer.",
+            "Follows, and smaller, at no more force: the anchor is nearer.",
             free=(CONTOUR, PRETENSION, ANCHOR), keep=[nearer],
         ),
     ]  # fmt: skip
@@ -461,7 +465,7 @@ def designed(
         machine(theirs, theirs.targets[side].last_angle, cam, pretension),
         target=theirs.targets[side],
         free=list(free),
-        keep=keep,
+        keep=keep if cam is RollerCam else [EDGE, *keep],
         goals=GOALS,
         settings=DesignSettings(starts=2, draws=0, look_for_size_ranges=False, look_for_remedies=False),
     )
