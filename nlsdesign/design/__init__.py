@@ -36,6 +36,7 @@ from .drawing.machined_cam import (
     MachinedRollerCam,
     MachinedTwoSidedCam,
 )
+from .drawing.making import carrying_note as carrying_note
 from .drawing.making import process_of as process_of
 from .jobs.job_file import DRAWS as DRAWS
 from .jobs.job_file import DesignJob, TaskTarget, job_of, read_job

@@ -1,4 +1,4 @@
-"""How a part can be made and held: the process that its channel asks for, and what carries its torque."""
+"""How a part is made and held: the process of its channel, what carries its torque, what holds its cable."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...foundation.errors import NlsError
 from ...foundation.quantity import MM
 from ..statics.contour import Contour
 from .cam_part import CamPart
-from .machined_cam import BoltCircle, MachinedCam
+from .machined_cam import BoltCircle, ClampScrew, MachinedCam, MachinedOneSidedCam
 
 _DEEPEST = 4.0
 """Depth of a slot over its width that is milled. Source: Neptune Labs, guideline for machined parts."""
@@ -23,25 +23,98 @@ _FACTOR = 2.0
 """Torque that bolts must bear over the largest of the curve; assumed, since it alternates."""
 _COUNTS = (4, 6, 8)
 _CIRCLES = 12
+_GRIP = 2.0 * 0.1 * 500e6 / 1.6
+"""Friction of a cable between plate and washer over the stress area of their screw in Pa: on both faces, 0.1
+(assumed: wire, a little oil), preload of class 8.8, scatter of a torque wrench. Source: VDI 2230-1."""
+_YIELD, _PRESSED = 900e6, 0.9
+"""Yield strength of the strongest usual hub in Pa (assumed), and its share that a key may press. Source: DIN
+6892, method C."""
 
 
 class _Screw(NamedTuple):
-    """A screw, its hole in m and its stress area in m². Sources: ISO 273, fine; ISO 898-1."""
+    """A screw, its hole, the core hole of its thread in m, its stress area in m².
+
+    Sources: ISO 273, fine; ISO 2306; ISO 898-1.
+    """
 
     name: str
     hole: float
+    core: float
     area: float
 
 
 _SCREWS = (
-    _Screw("M1.6", 1.7e-3, 1.27e-6),
-    _Screw("M2", 2.2e-3, 2.07e-6),
-    _Screw("M2.5", 2.7e-3, 3.39e-6),
-    _Screw("M3", 3.2e-3, 5.03e-6),
-    _Screw("M4", 4.3e-3, 8.78e-6),
-    _Screw("M5", 5.3e-3, 14.2e-6),
-    _Screw("M6", 6.4e-3, 20.1e-6),
+    _Screw("M1.6", 1.7e-3, 1.25e-3, 1.27e-6),
+    _Screw("M2", 2.2e-3, 1.6e-3, 2.07e-6),
+    _Screw("M2.5", 2.7e-3, 2.05e-3, 3.39e-6),
+    _Screw("M3", 3.2e-3, 2.5e-3, 5.03e-6),
+    _Screw("M4", 4.3e-3, 3.3e-3, 8.78e-6),
+    _Screw("M5", 5.3e-3, 4.2e-3, 14.2e-6),
+    _Screw("M6", 6.4e-3, 5.0e-3, 20.1e-6),
 )
+
+
+class _Key(NamedTuple):
+    """A parallel key in mm: bores above and up to, sides, depth in the hub, height that presses it.
+
+    Source: DIN 6885-1.
+    """
+
+    above: float
+    up_to: float
+    sides: str
+    depth: float
+    height: float
+
+
+_KEYS = (
+    _Key(6.0, 8.0, "2 x 2", 1.0, 0.8),
+    _Key(8.0, 10.0, "3 x 3", 1.4, 1.2),
+    _Key(10.0, 12.0, "4 x 4", 1.8, 1.5),
+    _Key(12.0, 17.0, "5 x 5", 2.3, 2.0),
+    _Key(17.0, 22.0, "6 x 6", 2.8, 2.5),
+    _Key(22.0, 30.0, "8 x 7", 3.3, 3.0),
+)
+
+
+class BoltLoad(NamedTuple):
+    """The bolts of a part under the factor times a torque: the thickest that pass, and the shear of each."""
+
+    bolts: int
+    screw: _Screw | None
+    force: float  # in N
+
+    @property
+    def carried(self) -> bool:
+        """Whether they bear it in shear."""
+        return self.screw is not None and self.force <= _SHEAR * self.screw.area
+
+    def __str__(self) -> str:
+        most = "no screw from M1.6 on passes"
+        if self.screw is not None:
+            most = f"{self.screw.name} carries {_SHEAR * self.screw.area:.3g} N"
+        return f"{self.force:.3g} N each, {most} in shear (class 8.8, EN 1993-1-8)"
+
+
+def bolt_load(part: CamPart, torque: float) -> BoltLoad | None:
+    """Return the load of the bolts of a part under a torque in N·m; ``None`` where it has none."""
+    if "bolt_count" not in part.numbers:
+        return None
+    count, hole = int(part.number("bolt_count")), part.number("bolt_hole") * (1.0 + 1e-9)
+    screw = next((each for each in reversed(_SCREWS) if each.hole <= hole), None)
+    return BoltLoad(count, screw, _FACTOR * torque / (count * part.number("bolt_circle") / 2.0))
+
+
+def carrying_note(part: CamPart, torque: float) -> str:
+    """Return in words what carries a torque in N·m from a part to its shaft; zero where it is not known."""
+    load = bolt_load(part, torque)
+    if load is None:
+        what = f" of {torque:.3g} N·m" if torque else ""
+        return f"Nothing drawn here carries the torque{what}: no bolts, key or clamp."
+    if not torque:
+        return f"{load.bolts} bolts carry the torque."
+    verb = "carry" if load.carried else "DO NOT CARRY"
+    return f"{load.bolts} bolts {verb} {_FACTOR:g} times {torque:.3g} N·m: {load}."
 
 
 def process_of(part: CamPart) -> str:
@@ -73,22 +146,18 @@ class Mounting:
     contour: Contour
     part: CamPart  # made of both
     torque: float  # in N·m
+    tension: float = 0.0  # largest of the cable in N
 
     def remarks(self) -> Iterator[str]:
-        """Yield the process of the part, where nothing carries the torque, and bolts that would."""
+        """Yield the process of the part, what does not carry the torque or hold the cable, and what would."""
         yield f"to be made by: {process_of(self.part)}"
-        if self.machined.bolts is not None:
-            count = self.machined.bolts.count
-            hole = self.part.number("bolt_hole") * (1.0 + 1e-9)
-            screw = next((each for each in reversed(_SCREWS) if each.hole <= hole), None)
-            force = _FACTOR * self.torque / (count * self.part.number("bolt_circle") / 2.0)
-            if screw is None or force > _SHEAR * screw.area:
-                most = "no screw from M1.6 on passes"
-                if screw is not None:
-                    most = f"{screw.name} carries {_SHEAR * screw.area:.3g} N"
+        yield from self.cable_remarks()
+        load = bolt_load(self.part, self.torque)
+        if load is not None:
+            if not load.carried:
                 yield (
-                    f"{count} bolts take {_FACTOR:g} times {self.torque:.3g} N·m with {force:.3g} N each, "
-                    f"{most} in shear (class 8.8, EN 1993-1-8){self.bolts_that_do()}"
+                    f"{load.bolts} bolts take {_FACTOR:g} times {self.torque:.3g} N·m with {load}"
+                    f"{self.bolts_that_do()}"
                 )
             return
         bore = "neither bore, bolts, key nor clamp"
@@ -103,23 +172,68 @@ class Mounting:
             f"{self.bolts_that_do()}"
         )
 
+    def cable_remarks(self) -> Iterator[str]:
+        """Yield that a clamp screw does not hold the cable, and the thinnest that fits and does.
+
+        A two-sided cam is pulled alike on both sides, so its clamps bear only what the sides differ by.
+        """
+        end = self.machined.cable_end if isinstance(self.machined, MachinedOneSidedCam) else None
+        if not isinstance(end, ClampScrew):
+            return
+        hole = self.part.number("clamp_hole") * (1.0 + 1e-9)
+        screw = next((each for each in reversed(_SCREWS) if each.core <= hole), None)
+        if screw is not None and _FACTOR * self.tension <= _GRIP * screw.area:
+            return
+        most = "no thread from M1.6 on has so small a core hole"
+        if screw is not None:
+            most = f"{screw.name} holds {_GRIP * screw.area:.3g} N by friction (class 8.8, VDI 2230-1)"
+        remedy = " -> no thicker screw that holds it fits: take a FerruleSeat"
+        for thicker in _SCREWS:
+            if _FACTOR * self.tension <= _GRIP * thicker.area and self.fits(
+                cable_end=replace(end, diameter=thicker.core)
+            ):
+                sizes = f'cable_end = {{ClampScrew = {{diameter = "{MM * thicker.core:.3g} mm"}}}}'
+                remedy = f" -> {sizes} fits, and {thicker.name} holds it"
+                break
+        yield (f"the clamp of the cable has to hold {_FACTOR:g} times {self.tension:.3g} N: {most}{remedy}")
+
+    def fits(self, **changes: object) -> bool:
+        """Tell whether the part can be made with other sizes."""
+        try:
+            replace(self.machined, **changes).part(self.contour)  # type: ignore[arg-type]
+        except NlsError:
+            return False
+        return True
+
     def bolts_that_do(self) -> str:
-        """Return bolts in words that carry the torque in shear and fit the part, each tried; else nothing."""
+        """Return bolts in words that carry the torque in shear and fit the part, each tried; else a key."""
         reach = 2.0 * float(self.contour.radii.max())
         for count in _COUNTS:
             for step in range(_CIRCLES, 2, -1):
                 circle = math.floor(1e3 * reach * step / _CIRCLES) * 1e-3
                 needed = _FACTOR * self.torque / (count * circle / 2.0) / _SHEAR
                 screw = next((each for each in _SCREWS if each.area >= needed), None)
-                if screw is None:
-                    continue
-                bolts = BoltCircle(count=count, circle=circle, hole=screw.hole)
-                try:
-                    replace(self.machined, bolts=bolts).part(self.contour)
-                except NlsError:
-                    # It does not fit there.
+                if screw is None or not self.fits(
+                    bolts=BoltCircle(count=count, circle=circle, hole=screw.hole)
+                ):
                     continue
                 sizes = f'count = {count}, circle = "{MM * circle:.3g} mm", hole = "{MM * screw.hole:.3g} mm"'
                 held = f"carry {_FACTOR:g} times it in shear ({screw.name}, class 8.8)"
                 return f" -> bolts = {{{sizes}}} fit and {held}"
-        return " -> no bolts that carry it fit: leave room for a key or a clamp, or take a larger body_radius"
+        return f" -> no bolts that carry it fit: {self.key_that_does()}"
+
+    def key_that_does(self) -> str:
+        """Return the key of the bore where it fits and a hub bears it, with its strength; else what to do."""
+        bore = 0.0 if self.machined.hub_bore is None else MM * self.part.number("hub_bore")
+        key = next((each for each in _KEYS if each.above < bore <= each.up_to), None)
+        if key is not None and self.fits(hub_bore=(bore + 2.0 * key.depth) / MM):
+            length = MM * self.part.number("thickness")
+            if any(hole.name == "hub bore" and hole.base_only for hole in self.part.holes):
+                length -= MM * self.part.number("groove_depth")
+            needed = 1e6 * _FACTOR * 2e3 * self.torque / (bore * key.height * length) / _PRESSED
+            if needed <= _YIELD:
+                return (
+                    f"a key of {key.sides} mm (DIN 6885-1) over {length:.3g} mm does, in a plate whose yield "
+                    f"strength is at least {1e-6 * needed:.3g} MPa (DIN 6892 C)"
+                )
+        return "leave room for a key or a clamp, or take a larger body_radius"

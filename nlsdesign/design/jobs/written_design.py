@@ -278,4 +278,5 @@ def part_remarks(design: CamDesign, machined: MachinedCam, part: CamPart) -> Ite
         f"{1e3 * float(design.contour.radii.max()):.4g} mm: run-out and corners come on top"
     )
     torque = float(abs(design.check.torques).max())
-    yield from Mounting(machined, design.contour, part, torque).remarks()
+    tension = float(design.curves.forces.max())
+    yield from Mounting(machined, design.contour, part, torque, tension).remarks()

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from ...design import CamPart, process_of
+from ...design import CamPart, carrying_note, process_of
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, Quantity, with_unit
@@ -359,9 +359,7 @@ def _notes(page: Sheet, part: CamPart, title: TitleBlock, torque: float) -> None
         + " at zero and at the last angle.",
         *textwrap.wrap(f"6  Process: {process_of(part)}.", _NOTE, subsequent_indent="    "),
     ]
-    if "bolt_count" not in part.numbers:
-        what = f" of {torque:.3g} N·m" if torque else ""
-        lines.append(f"7  Nothing drawn here carries the torque{what}: no bolts, key or clamp.")
+    lines += textwrap.wrap(f"7  {carrying_note(part, torque)}", _NOTE, subsequent_indent="    ")
     lines.append("*  Size assumed, or without a source.")
     x = 84.0 if "mouth_width" in part.numbers else 14.0
     page.text(x, 13.0, text="\n".join(lines), va="bottom", linespacing=1.45)

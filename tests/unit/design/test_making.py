@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from nlsdesign.design import (
     BoltCircle,
+    ClampScrew,
     Contour,
     MachinedCam,
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
     contour_from_lever_arm,
 )
-from nlsdesign.design.drawing.making import Mounting, process_of
+from nlsdesign.design.drawing.making import Mounting, carrying_note, process_of
+from nlsdesign.design.jobs.written_design import part_remarks
 from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.quantity import quantity
 
@@ -32,8 +36,15 @@ def contour() -> Contour:
     return contour_from_curvature(nodes, radii, first_slope=8e-3, anchor_distance=30e-3)
 
 
-def remarks(machined: MachinedCam, contour: Contour, torque: float) -> list[str]:
-    return list(Mounting(machined, contour, machined.part(contour), torque).remarks())[1:]
+def remarks(machined: MachinedCam, contour: Contour, torque: float, tension: float = 0.0) -> list[str]:
+    return list(Mounting(machined, contour, machined.part(contour), torque, tension).remarks())[1:]
+
+
+def wound(**sizes: object) -> tuple[MachinedOneSidedCam, Contour]:
+    angles = np.linspace(0.0, 1.2, 100)
+    contour = contour_from_lever_arm(angles, 14e-3 + 3e-3 * angles**2, anchor_distance=math.inf)
+    radius = quantity(0.25, "mm")
+    return MachinedOneSidedCam(cable_radius=radius, **sizes), contour  # type: ignore[arg-type]
 
 
 def test_a_narrow_deep_channel_names_its_process(contour: Contour) -> None:
@@ -77,3 +88,64 @@ def test_where_no_bolts_fit_that_is_said() -> None:
     machined = MachinedOneSidedCam(cable_radius=quantity(0.25, "mm"), hub_bore=4e-3)
     (said,) = remarks(machined, contour, 0.5)
     assert "no bolts that carry it fit" in said
+
+
+def test_a_clamp_that_lets_the_cable_slip_is_said_with_the_screw_that_holds() -> None:
+    """M2 of class 8.8: 2 faces, 0.1, 500 MPa of 2.07 mm² over 1.6 are 129 N; M3 holds 314 N."""
+    bolts = BoltCircle(count=4, circle=16e-3, hole=3.2e-3)
+    machined, contour = wound(bolts=bolts, cable_end=ClampScrew(diameter=1.6e-3))
+    assert remarks(machined, contour, 0.5, 64.0) == []
+    (said,) = remarks(machined, contour, 0.5, 150.0)
+    assert "hold 2 times 150 N: M2 holds 129 N" in said
+    (core,) = re.findall(r'ClampScrew = {diameter = "([0-9.]+) mm"}', said)
+    assert float(core) == 2.5, "the thinnest that does"
+    thicker = replace(machined, cable_end=ClampScrew(diameter=float(core) * 1e-3))
+    assert remarks(thicker, contour, 0.5, 150.0) == []
+    (said,) = remarks(machined, contour, 0.5, 2e3)
+    assert said.endswith("no thicker screw that holds it fits: take a FerruleSeat")
+    (said,) = remarks(replace(machined, cable_end=ClampScrew(diameter=0.9e-3)), contour, 0.5, 60.0)
+    assert "no thread from M1.6 on" in said
+
+
+def test_the_tension_of_the_design_is_what_the_clamp_has_to_hold() -> None:
+    machined, contour = wound(
+        bolts=BoltCircle(count=4, circle=16e-3, hole=3.2e-3), cable_end=ClampScrew(diameter=1.6e-3)
+    )
+    design: Any = SimpleNamespace(
+        contour=contour,
+        check=SimpleNamespace(torques=np.array([0.0, 0.5])),
+        curves=SimpleNamespace(forces=np.array([20.0, 150.0, 90.0])),
+    )
+    assert "hold 2 times 150 N" in " ".join(part_remarks(design, machined, machined.part(contour)))
+
+
+def test_both_sides_of_a_cable_hold_each_other(contour: Contour) -> None:
+    clamped = replace(
+        GROOVED, cable_end=ClampScrew(diameter=1.6e-3), bolts=BoltCircle(count=4, circle=34e-3, hole=1.7e-3)
+    )
+    assert remarks(clamped, contour, 1.0, 1e4) == []
+
+
+def test_where_no_bolts_fit_the_key_of_the_bore_is_named_with_the_strength_it_asks_for() -> None:
+    """2·2·5 N·m on 9 mm are 2222 N, on 1.2 mm by 4 mm 463 MPa, which is 0.9 of 514 MPa."""
+    machined, contour = wound(hub_bore=9e-3, thickness=4e-3, minimum_wall=5e-3)
+    (said,) = remarks(machined, contour, 5.0)
+    assert "no bolts that carry it fit: a key of 3 x 3 mm (DIN 6885-1) over 4 mm does" in said
+    assert "at least 514 MPa" in said
+    (said,) = remarks(machined, contour, 10.0)
+    assert said.endswith("leave room for a key or a clamp, or take a larger body_radius"), "no steel bears it"
+    wide = replace(machined, hub_bore=quantity(16.0, "mm"))
+    (said,) = remarks(wide, contour, 5.0)
+    assert "a key of" not in said, "no wall is left beside it"
+
+
+def test_the_sheet_says_what_carries_the_torque(contour: Contour) -> None:
+    part = replace(GROOVED, bolts=BoltCircle(count=4, circle=34e-3, hole=1.7e-3)).part(contour)
+    assert carrying_note(part, 14.0).startswith(
+        "4 bolts carry 2 times 14 N·m: 412 N each, M1.6 carries 488 N"
+    )
+    assert carrying_note(part, 25.0).startswith("4 bolts DO NOT CARRY 2 times 25 N·m: 735 N each")
+    assert carrying_note(part, 0.0) == "4 bolts carry the torque."
+    assert carrying_note(GROOVED.part(contour), 5.0).startswith(
+        "Nothing drawn here carries the torque of 5 N·m"
+    )
