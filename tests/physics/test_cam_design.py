@@ -71,6 +71,7 @@ def test_where_no_limit_binds_the_optimum_is_the_closed_form() -> None:
     assert design.contour.radii_of_curvature.min() > 0.0
 
 
+@pytest.mark.slow
 def test_every_contour_is_convex_by_construction() -> None:
     """Without any limit, for a rubber that asks for a hollow contour."""
     design = design_cam(actuator(CONCAVE), target=TARGET, free=CONTOUR, keep=[], settings=ALONE)

@@ -180,6 +180,7 @@ def reversed_sharply(quantum: float) -> RecordSet:
     return RecordSet((runs[0], replace(runs[1], role="held_out")), COLUMNS)
 
 
+@pytest.mark.slow
 def test_rates_follow_sharp_reversals_as_closely_as_the_counts_of_an_encoder_allow() -> None:
     numbers = declared().quantities()
     truth = declared().with_values({name: numbers[name].with_value(v, "") for name, v in TRUE.items()})

@@ -161,6 +161,8 @@ CASES = {
 
 
 @pytest.mark.long_cases(
+    "two branches-0.3",
+    "one-sided, part-0.3",
     "a dashpot alone-0.3",
     "a dashpot alone-4.0",
     "a dashpot beside them-0.3",

@@ -67,6 +67,7 @@ def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> 
     assert left < 0.5 * total_excess(before)
 
 
+@pytest.mark.slow
 def test_a_deck_that_declares_backlash_is_looked_at_coarsely(tmp_path: Path) -> None:
     """As when a deck that a diagnosis has written is diagnosed again: a body coasts, and nothing is new."""
     actuator = ACTUATORS["wrist"]

@@ -486,6 +486,7 @@ def test_designs_are_kept_by_name_up_to_the_most(template: LiveDesign) -> None:
     template.snapshots.clear()
 
 
+@pytest.mark.slow
 def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -98,6 +98,7 @@ def force(extension: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.long_cases(
+    "two-sided, anchor 40 mm, bolts, ferrule",
     "one-sided, parallel cable",
     "one-sided, anchor 30 mm",
     "two-sided, anchor 25 mm",
