@@ -141,6 +141,7 @@ def test_breakpoints_are_read_alike_in_an_fmu_and_in_a_batch(tmp_path: Path) -> 
             assert np.array(many(at)).ravel() == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_budget_holds_for_a_controller_too(export: Run, tmp_path: Path) -> None:
     what = ("--what", "controller", "--deck", LINEAR)
     status, out, _ = export(*what)

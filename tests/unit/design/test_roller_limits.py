@@ -207,6 +207,7 @@ def test_a_cable_that_lifts_off_is_told_where_and_that_a_roller_does_not() -> No
     assert then.predicted_rms == pytest.approx(other.error, abs=1e-4 * target.largest)
 
 
+@pytest.mark.slow
 def test_a_jump_is_named_as_such() -> None:
     angles = tuple(np.radians([0.0, 0.01, 40.0, 80.0]))
     step = TabulatedTorque(angles=angles, torques=(0.0, 1.5, 2.0, 2.0))

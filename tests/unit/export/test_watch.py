@@ -62,6 +62,7 @@ def readings(plan, count):
     return table.astype(float)
 
 
+@pytest.mark.long_cases("published-float")
 @pytest.mark.parametrize("real", list(Real))
 @pytest.mark.parametrize("machine", ["published", pytest.param("joint", marks=pytest.mark.slow)])
 def test_the_c_has_the_bits_of_its_twin(machine, real, request, tmp_path):

@@ -37,6 +37,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_second_writing_has_the_same_bytes(data: Path, tmp_path: Path) -> None:
     (tmp_path / "case_999").mkdir()  # left from a larger one
     written(tmp_path)

@@ -151,7 +151,7 @@ def test_a_run_goes_on_where_it_was_interrupted(
     assert "pairs: exactly the right set | 4/4" in capsys.readouterr().out
 
 
-@pytest.mark.long_cases("cam")
+@pytest.mark.long_cases("joint", "cam")
 @pytest.mark.parametrize(
     ("case", "files", "signals"),
     [
