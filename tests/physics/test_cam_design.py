@@ -28,7 +28,7 @@ def unknowns(design: CamDesign) -> tuple[np.ndarray, np.ndarray, float]:
     return contour.directions[::8], contour.radii_of_curvature[::8], float(contour.slopes[0])
 
 
-@pytest.mark.long_cases("and pretension")
+@pytest.mark.long_cases("contour", "and pretension")
 @pytest.mark.parametrize("free", [CONTOUR, PRETENSION], ids=["contour", "and pretension"])
 def test_no_cam_nearby_is_better(free: list[str]) -> None:
     design = design_cam(actuator(CONCAVE), target=TARGET, free=free, keep=KEEP, settings=ALONE)

@@ -199,6 +199,7 @@ def test_the_torque_never_errs_by_more_than_the_bound(deck: str, share: float, f
     assert worst > bound.total / factor
 
 
+@pytest.mark.slow
 def test_a_coarser_encoder_widens_the_bound_and_the_others_stay() -> None:
     model = plant("austin2015_figure_consistent")
     design = design_observer_with_details(model)

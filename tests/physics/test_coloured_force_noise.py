@@ -65,7 +65,7 @@ def judged(declared: Assembly, records: RecordSet) -> tuple[Bench, dict[str, tup
     return bench, {name: (e.mean_square, e.open) for name, e in found.items() if name in bench.block_noise}
 
 
-@pytest.mark.long_cases("0.005-1.0", "0.02-1.0", "0.1-1.0", "0.02-3.0")
+@pytest.mark.long_cases("0.1-3.0", "0.005-1.0", "0.02-1.0", "0.1-1.0", "0.02-3.0")
 @pytest.mark.parametrize(("time", "share"), [(0.005, 1.0), (0.02, 1.0), (0.02, 3.0), (0.1, 1.0), (0.1, 3.0)])
 def test_a_clean_set_with_coloured_force_noise_is_at_its_floor(
     clean: tuple[Assembly, RecordSet], time: float, share: float

@@ -151,6 +151,8 @@ def test_nothing_is_learned_at_standstill(tmp_path: Path) -> None:
     assert np.max(np.abs(learned[:, place:])[:, : len(design.balance.terms)]) < 0.02
 
 
+# Quicker: physics/test_single_precision.py
+@pytest.mark.slow
 def test_single_precision_gives_the_same_torque(
     bench: tuple[Course, Prior, dict[str, Observer]], tmp_path: Path
 ) -> None:

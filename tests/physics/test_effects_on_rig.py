@@ -45,7 +45,11 @@ SLOW = {"drive_delay", "strain_stiffening", "permanent_set", "self_heating", "an
 
 
 @pytest.mark.long_cases(
-    "torque_constant_saturation", "cam_profile_error", "stress_softening", "cable_friction"
+    "force_sensor_drift",
+    "torque_constant_saturation",
+    "cam_profile_error",
+    "stress_softening",
+    "cable_friction",
 )
 @pytest.mark.parametrize(
     "effect",

@@ -353,6 +353,7 @@ def test_mechanism_is_to_scale_and_analyses_are_those_of_the_other_rooms(templat
         template.at(float("nan"))
 
 
+@pytest.mark.slow
 def test_a_whole_design_says_where_the_quick_one_differs(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:

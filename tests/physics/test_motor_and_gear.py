@@ -283,6 +283,7 @@ def test_the_residual_of_a_lossy_gear_is_relative_to_its_torques(size: float) ->
         assert abs(float(residual)) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_swing_through_a_lossy_gear_against_another_integrator_and_its_power_balance() -> None:
     sizes, stiffness = (ROTOR, 2e-3, 8.0), 3.0
     made = assembly("a", motor=by_current(voltage_limit=1e4), wheel=Inertia(inertia=2e-3), gear=lossy(),

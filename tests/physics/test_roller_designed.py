@@ -164,6 +164,7 @@ def test_a_circle_rolled_over_the_drawn_edge_gives_way_and_torque(
     assert np.sqrt(np.mean((torques - wanted) ** 2)) < 0.005 * design.target.largest
 
 
+@pytest.mark.slow
 def test_the_drawing_holds_the_way_the_roller_and_the_line_of_the_follower(
     signs: CamDesign, tmp_path: Path
 ) -> None:

@@ -181,6 +181,7 @@ def test_a_spring_beside_the_drive_acts_on_the_joint_beyond_its_angle(mirrored: 
     assert np.all(ours["spring.torque"][free] == 0.0), "nothing acts before the spring is engaged"
 
 
+@pytest.mark.slow
 def test_the_design_counts_from_the_angle_of_engagement() -> None:
     target, quick = PowerTorque(coefficient=2.0, exponent=1.2, angle=0.8), DesignSettings(
         draws=0, look_for_size_ranges=False, starts=2

@@ -54,6 +54,7 @@ def cost(text: str) -> float:
     return float(re.search(r"by at most ([\d.]+) mN·m", text)[1])
 
 
+@pytest.mark.slow
 def test_the_size_is_printed_and_a_budget_is_met_by_a_coarser_table(export: Run, tmp_path: Path) -> None:
     status, out, _ = export()
     total, code, tables = sizes(out)

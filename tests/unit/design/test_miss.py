@@ -201,6 +201,7 @@ def test_misspelt_names_of_stock_and_range_are_named() -> None:
         design_cam(actuator(CONCAVE), target=TARGET, free=[*RUBBER, stock], keep=KEEP)
 
 
+@pytest.mark.slow
 def test_over_travel_keeps_the_strain_beyond_the_last_angle() -> None:
     beyond = OverTravel(degrees(8.0), limits=(MaximumStrain(1.0),))
     design = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=[*KEEP, beyond], settings=QUICK)

@@ -124,6 +124,7 @@ def test_the_live_page_refuses_a_roller_with_the_next_step() -> None:
         question_of(machine(), "rolling")
 
 
+@pytest.mark.slow
 def test_what_the_guide_bears_is_said_with_its_friction() -> None:
     def remark(cam: RollerCam) -> str:
         design = design_cam(machine(cam), target=hill(), free=CONTOUR, keep=[STRAIN], settings=QUICK)

@@ -138,11 +138,13 @@ def test_a_spring_that_cannot_serve_the_task_says_why(followed: LiveQuestion) ->
         edit(follow_tasks).applied(heavy)
 
 
+@pytest.mark.slow
 def test_the_design_is_held_against_the_task_with_its_own_curve(followed: LiveQuestion) -> None:
     rows = paid(followed, LiveDesign(followed))
     assert rows["this design"].heat == pytest.approx(rows["target as drawn"].heat, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_design_that_asks_for_more_current_than_the_drive_gives_is_told(asked: LiveQuestion) -> None:
     heavy = edit(follow_tasks).applied(edit(set_task, 0, "ankle", 75.0, 0.05).applied(asked))
     view = LiveDesign(asked).answer.design

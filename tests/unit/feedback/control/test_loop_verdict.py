@@ -162,6 +162,7 @@ def test_a_load_that_is_missing_is_named(gentle: ClosedLoop) -> None:
         zero_torque(gentle, amplitude=0.1, frequencies=[1.0])
 
 
+@pytest.mark.slow
 def test_unstable_draws_are_counted() -> None:
     """Near the onset a part of the draws limit-cycles; the quantile says so instead of leaving them out."""
     from nlsdesign.components.assembly.deck_writer import declare

@@ -147,6 +147,8 @@ def test_the_error_keeps_what_is_asked_and_the_table_is_not_much_finer():
     assert sizes[2] < sizes[0] / 3
 
 
+# Quicker: test_a_table_within_size_and_error_is_taken in unit/cli/test_flash.py
+@pytest.mark.slow
 def test_a_size_is_met_by_a_coarser_table_that_says_what_it_costs(designs):
     usual = designs["diagnosed"]
     design = design_observer_with_details(diagnosed(), grid=GridByTorqueError(-END, END, most_bytes=1500))
