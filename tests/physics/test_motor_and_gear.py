@@ -113,6 +113,7 @@ def test_the_current_never_passes_the_limit_while_the_supply_can_hold_it() -> No
     assert np.max(np.abs(run["motor.voltage"])) <= SUPPLY
 
 
+@pytest.mark.slow
 def test_electrical_power_is_mechanical_power_heat_and_field() -> None:
     """∫U·I = ∫k·I·ω + ∫R·I² + ½L·I² at every moment, driven into both limits."""
     times = np.linspace(0.0, 0.3, 60_001)

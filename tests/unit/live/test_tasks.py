@@ -107,6 +107,7 @@ def test_what_the_motor_pays_is_that_of_the_library(followed: LiveQuestion) -> N
     assert rows["target as drawn"].current == pytest.approx(np.sqrt(np.mean(drawn.current**2)), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_winding_of_which_nothing_is_known_has_no_heat_and_a_ratio_is_only_tried(
     asked: LiveQuestion,
 ) -> None:
