@@ -69,7 +69,8 @@ def setup(app: Any) -> dict[str, bool]:
     @cache
     def pages(folder: str) -> str:
         everything = {"collapse": False, "titles_only": True, "maxdepth": -1, "includehidden": True}
-        return get_navigation_tree(app.builder._get_local_toctree(f"{folder}_", **everything))
+        listed: str = get_navigation_tree(app.builder._get_local_toctree(f"{folder}_", **everything))
+        return listed
 
     def before(_: Any, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
         context["toctree"] = lambda **_: ""
