@@ -15,7 +15,11 @@ from tests.unit.live.test_page_in_a_browser import ANSWERED
 pytest.importorskip("uvicorn")
 pytest.importorskip("starlette")
 pytest.importorskip("websockets")
-pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+# Quicker: test_page_in_a_browser.py drives the same page; a second server and browser take ten seconds.
+pytestmark = [
+    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
+    pytest.mark.slow,
+]
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +166,6 @@ TYPED = """(() => {{
 }})()"""
 
 
-@pytest.mark.long_cases("390")
 @pytest.mark.parametrize("width", [1400, 390])
 def test_one_light_of_three_questions_stands_at_one_place_before_the_check_and_after(
     tab: Tab, width: int
@@ -186,8 +189,6 @@ def test_one_light_of_three_questions_stands_at_one_place_before_the_check_and_a
     tab.until(CHECKED, seconds=120)
 
 
-# Quicker: the session's answers in test_session.py and the tests of the task
-@pytest.mark.slow
 def test_a_joint_is_chosen_and_what_the_motor_pays_stands_beside_the_curve(tab: Tab) -> None:
     tab.look(1400, height=850)
     assert tab.evaluate("document.querySelector('.paid').parentElement.hidden")
