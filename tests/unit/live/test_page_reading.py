@@ -16,10 +16,7 @@ pytest.importorskip("uvicorn")
 pytest.importorskip("starlette")
 pytest.importorskip("websockets")
 # Quicker: test_page_in_a_browser.py drives the same page; a second server and browser take ten seconds.
-pytestmark = [
-    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
-    pytest.mark.slow,
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")]
 
 
 @pytest.fixture(scope="module")
