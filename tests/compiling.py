@@ -17,6 +17,8 @@ from nlsdesign.export.compilation.cross_compiler import (
 def compile_program(sources: Sequence[Path], target: Path, *, flags: Sequence[str] = STRICT) -> Path:
     """Compile C files to a program for this machine; return its path."""
     where = PLATFORMS[host_platform()]
-    arguments: list[str | Path] = ["-target", where.target, *BASELINE, "-O2", "-ffp-contract=off", *flags]
+    # With -s as libraries are: without it a new machine builds the library of the compiler once more.
+    usual = (*BASELINE, "-O2", "-s", "-ffp-contract=off")
+    arguments: list[str | Path] = ["-target", where.target, *usual, *flags]
     run_compiler([*arguments, *sources, "-lm", "-o", target], about=f"{sources[0].name} for {where.name}")
     return target

@@ -47,7 +47,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if case.removesuffix("]") in mark.args:
             item.add_marker(pytest.mark.slow)
     wrong = {test: cases for test, cases in unseen.items() if cases}
-    if wrong and not any("::" in argument for argument in config.args):
+    if wrong and not config.option.lf and not any("::" in argument for argument in config.args):
         raise pytest.UsageError(f"no such cases, see the mark long_cases: {wrong}")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import cache
-from html.parser import HTMLParser
+from html import unescape
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -13,20 +13,24 @@ _LOADED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "obj
 _STYLED = re.compile(r"url\(\s*['\"]?((?:https?:)?//[^'\")]+)|@import\s+['\"]?((?:https?:)?//[^'\"\s;]+)")
 
 
-class _Page(HTMLParser):
+_TAG = re.compile(r"""<([a-zA-Z][\w-]*)((?:\s+[^\s"'>/=]+(?:\s*=\s*(?:"[^"]*"|'[^']*'|[^\s"'>]+))?)+)""")
+_ATTRIBUTE = re.compile(r"""([^\s"'>/=]+)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'>]+))""")
+
+
+class _Page:
     """Links, anchors and what is loaded of one page."""
 
     def __init__(self, text: str) -> None:
-        super().__init__()
         self.links: list[str] = []
         self.anchors: set[str] = set()
         self.loaded: list[str] = []
         self.nameless: list[str] = []
-        self.feed(text)
+        for tag, attributes in _TAG.findall(text):
+            given = {name.lower(): unescape(a or b or c) for name, a, b, c in _ATTRIBUTE.findall(attributes)}
+            self._note(tag.lower(), given)
 
-    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+    def _note(self, tag: str, given: dict[str, str]) -> None:
         """Note what a tag refers to."""
-        given = {name: value or "" for name, value in attributes}
         self.anchors |= {given[name] for name in ("id", "name") if given.get(name)}
         if tag == "a" and "href" in given:
             self.links.append(given["href"])
@@ -51,6 +55,7 @@ def problems(site: Path) -> list[str]:
         Folder with the pages.
     """
     _page.cache_clear()
+    _file.cache_clear()
     named = [
         f"{path.relative_to(site)}: {problem}"
         for path in sorted(site.rglob("*.html"))
@@ -69,7 +74,7 @@ def _of_page(site: Path, path: Path) -> Iterator[str]:
     for address in page.loaded:
         if re.match(r"(?:[a-z]+:)?//", address):
             yield f"loads {address} from elsewhere"
-        elif not address.startswith("data:") and not _file(site, path, address).is_file():
+        elif not address.startswith("data:") and not _file(site, path.parent, address).is_file():
             yield f"loads {address}, which is not there"
     for address in page.nameless:
         yield f"picture {address} has no alternative text"
@@ -77,14 +82,15 @@ def _of_page(site: Path, path: Path) -> Iterator[str]:
         if re.match(r"[a-z][a-z0-9+.-]*:", address):
             continue
         name, _, anchor = address.partition("#")
-        target = _file(site, path, name) if name else path
+        target = _file(site, path.parent, name) if name else path
         if not target.is_file():
             yield f"links to {address}, which is not there"
         elif anchor and target.suffix == ".html" and unquote(anchor) not in _page(target).anchors:
             yield f"links to {address}: no such place on that page"
 
 
-def _file(site: Path, path: Path, address: str) -> Path:
+@cache
+def _file(site: Path, folder: Path, address: str) -> Path:
     name = unquote(address.partition("#")[0].partition("?")[0])
-    target = (site / name.lstrip("/") if name.startswith("/") else path.parent / name).resolve()
+    target = (site / name.lstrip("/") if name.startswith("/") else folder / name).resolve()
     return target / "index.html" if target.is_dir() else target

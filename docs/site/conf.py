@@ -14,7 +14,13 @@ project = "nlsdesign"
 author = "the nlsdesign authors"
 copyright = "the nlsdesign authors, MIT licence"
 release = locations.version()
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "docs.site.typeset"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "docs.site.typeset",
+    "docs.site.navigation",
+]
 source_suffix = {".md": "markdown"}
 root_doc = "index"
 exclude_patterns: list[str] = []

@@ -92,7 +92,7 @@ def test_closed_form_with_the_measured_curve() -> None:
 
 # The neo-Hookean reading. Rms over the angle; an average over the contour's nodes would give 268 and 24 mN·m
 # for the first two, because near zero, where the error is largest, nodes lie closer together.
-@pytest.mark.long_cases("and rubber")
+@pytest.mark.long_cases("contour", "and rubber")
 @pytest.mark.parametrize(
     ("free", "least", "most"),
     [

@@ -70,6 +70,8 @@ def test_the_printed_parameters_miss_the_measured_points() -> None:
     assert rms(error) > 5 * MODEL_RMSE
 
 
+# Quicker: that of the other deck, below
+@pytest.mark.slow
 def test_cam_of_the_printed_deck_reproduces_its_target() -> None:
     """5 N·m·(e^θ − 1)/(e^53° − 1): 8.9 mN·m rms, 44 at most, where a knot of the sharp law lies.
 

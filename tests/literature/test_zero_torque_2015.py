@@ -72,6 +72,7 @@ def test_linear_springs_do_not_say_how_far_the_load_moved(deck: str) -> None:
     assert felt(moved(deck, halved), 10.0) == pytest.approx(PUBLISHED[deck], rel=0.10)
 
 
+@pytest.mark.long_cases("changes1", "changes2")
 @pytest.mark.parametrize(
     "changes",
     [

@@ -65,6 +65,7 @@ def test_a_linear_spring_moves_its_torque_by_its_spread(linear: FlatModel) -> No
     assert own == pytest.approx(np.log(1.05) * 1.5 / np.sqrt(2.0), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_directions_move_the_torque_at_rest_as_drawn_machines_do(cam: FlatModel) -> None:
     """So slow that nothing of the relaxing part is left: the torque at rest alone, over 150 machines."""
     duty = Duty(torque=2.8, frequencies=(1e-6,))

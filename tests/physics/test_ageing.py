@@ -128,6 +128,7 @@ def test_viscous_heat_is_the_loss_less_what_cooled_off() -> None:
     assert force == pytest.approx(K * x / (1.0 + heat), rel=1e-4, abs=1e-5)
 
 
+@pytest.mark.long_cases("1.0")
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_heat_of_the_loss_inside_softens_what_does_not_relax(share: float) -> None:
     """ϑ' = c·ẋ²·g/E − ϑ/τ with a dashpot c beside the spring; g = 1 where the dashpot does not soften."""

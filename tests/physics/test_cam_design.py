@@ -28,7 +28,7 @@ def unknowns(design: CamDesign) -> tuple[np.ndarray, np.ndarray, float]:
     return contour.directions[::8], contour.radii_of_curvature[::8], float(contour.slopes[0])
 
 
-@pytest.mark.long_cases("and pretension")
+@pytest.mark.long_cases("contour", "and pretension")
 @pytest.mark.parametrize("free", [CONTOUR, PRETENSION], ids=["contour", "and pretension"])
 def test_no_cam_nearby_is_better(free: list[str]) -> None:
     design = design_cam(actuator(CONCAVE), target=TARGET, free=free, keep=KEEP, settings=ALONE)
@@ -71,6 +71,7 @@ def test_where_no_limit_binds_the_optimum_is_the_closed_form() -> None:
     assert design.contour.radii_of_curvature.min() > 0.0
 
 
+@pytest.mark.slow
 def test_every_contour_is_convex_by_construction() -> None:
     """Without any limit, for a rubber that asks for a hollow contour."""
     design = design_cam(actuator(CONCAVE), target=TARGET, free=CONTOUR, keep=[], settings=ALONE)

@@ -85,6 +85,7 @@ def anchored() -> CamDesign:
     return design_cam(with_cam(start), target=TARGET, free=PRETENSION, keep=KEEP, settings=ALONE)
 
 
+@pytest.mark.slow
 def test_anchored_cam_against_the_law_of_the_cable() -> None:
     """The cable is the tangent through the anchor: φ − asin(p(φ)/D) = θ, length by arc and free part."""
     found = anchored()

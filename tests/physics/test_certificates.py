@@ -199,6 +199,7 @@ def test_the_torque_never_errs_by_more_than_the_bound(deck: str, share: float, f
     assert worst > bound.total / factor
 
 
+@pytest.mark.slow
 def test_a_coarser_encoder_widens_the_bound_and_the_others_stay() -> None:
     model = plant("austin2015_figure_consistent")
     design = design_observer_with_details(model)
@@ -209,6 +210,8 @@ def test_a_coarser_encoder_widens_the_bound_and_the_others_stay() -> None:
     assert coarse.motion == pytest.approx(fine.motion, rel=1e-2)
 
 
+# Quicker: of the same name in test_continuous_certificates.py
+@pytest.mark.slow
 def test_names_do_not_matter() -> None:
     machine = rn.renamed(declare(load_deck("austin2015_figure_consistent")), rn.exchanged)
     one, other = plant("austin2015_figure_consistent"), flatten(machine.assembly)
@@ -221,6 +224,8 @@ def test_names_do_not_matter() -> None:
     assert verify(found[1], model=other).holds
 
 
+# Quicker: of the same name in test_continuous_certificates.py
+@pytest.mark.slow
 def test_what_is_too_fast_is_answered_with_the_fastest() -> None:
     model = plant("austin2015_figure_consistent", 31e3)
     limit = model.values[MODULUS] / 31e3

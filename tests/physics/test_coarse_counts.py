@@ -91,7 +91,7 @@ def scores(found: Refit) -> dict[str, float]:
     return {n.name: (n.fitted - TRUE[n.name]) / n.standard_error for n in found.numbers}
 
 
-@pytest.mark.long_cases("500.0", "200.0")
+@pytest.mark.long_cases("1000.0", "500.0", "200.0")
 @pytest.mark.parametrize("rate", [1000.0, 500.0, 200.0, 100.0])
 def test_the_same_motion_gives_the_same_numbers_at_every_sampling_rate(rate: float) -> None:
     found = fitted(1, rate, 4096)
@@ -180,6 +180,7 @@ def reversed_sharply(quantum: float) -> RecordSet:
     return RecordSet((runs[0], replace(runs[1], role="held_out")), COLUMNS)
 
 
+@pytest.mark.slow
 def test_rates_follow_sharp_reversals_as_closely_as_the_counts_of_an_encoder_allow() -> None:
     numbers = declared().quantities()
     truth = declared().with_values({name: numbers[name].with_value(v, "") for name, v in TRUE.items()})

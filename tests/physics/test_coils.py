@@ -172,6 +172,7 @@ def machine(coil: Coil) -> nls.components.Assembly:
     return assembly("bench", motor=bare["motor"], load=bare["load"], spring=spring)
 
 
+@pytest.mark.slow
 def test_a_cam_and_the_wire_of_its_coil_are_designed_together() -> None:
     wire = [f"spring.coil.{name}" for name in ("wire_diameter", "mean_diameter", "active_coils")]
     design = nls.design_cam(
@@ -206,7 +207,7 @@ def test_limits_follow_from_what_a_coil_declares() -> None:
     assert stated == (MaximumTravel(0.04),)
 
 
-@pytest.mark.long_cases("length")
+@pytest.mark.long_cases("wire", "length")
 @pytest.mark.parametrize(
     ("coil", "words"),
     [

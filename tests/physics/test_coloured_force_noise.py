@@ -65,7 +65,7 @@ def judged(declared: Assembly, records: RecordSet) -> tuple[Bench, dict[str, tup
     return bench, {name: (e.mean_square, e.open) for name, e in found.items() if name in bench.block_noise}
 
 
-@pytest.mark.long_cases("0.005-1.0", "0.02-1.0", "0.1-1.0", "0.02-3.0")
+@pytest.mark.long_cases("0.1-3.0", "0.005-1.0", "0.02-1.0", "0.1-1.0", "0.02-3.0")
 @pytest.mark.parametrize(("time", "share"), [(0.005, 1.0), (0.02, 1.0), (0.02, 3.0), (0.1, 1.0), (0.1, 3.0)])
 def test_a_clean_set_with_coloured_force_noise_is_at_its_floor(
     clean: tuple[Assembly, RecordSet], time: float, share: float
@@ -79,6 +79,8 @@ def test_a_clean_set_with_coloured_force_noise_is_at_its_floor(
         assert not is_open
 
 
+# Quicker: a line is no noise in unit/bench/identification/test_coloured.py
+@pytest.mark.slow
 def test_a_periodic_disturbance_is_no_noise(disturbed: tuple[Assembly, RecordSet]) -> None:
     declared, records = disturbed
     bench, blocks = judged(declared, coloured(records, 0.02, 1.0))
@@ -87,7 +89,9 @@ def test_a_periodic_disturbance_is_no_noise(disturbed: tuple[Assembly, RecordSet
     assert bench.noise.deviation(FORCE) < 1.3 * WHITE * np.sqrt(2.0)
 
 
-@pytest.mark.long_cases("none", "second_relaxation", "rate_independent_hysteresis", "torque_ripple")
+@pytest.mark.long_cases(
+    "coulomb_friction", "none", "second_relaxation", "rate_independent_hysteresis", "torque_ripple"
+)
 @pytest.mark.parametrize(
     "effect",
     ["none", "coulomb_friction", "second_relaxation", "rate_independent_hysteresis", "torque_ripple"],

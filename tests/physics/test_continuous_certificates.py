@@ -150,6 +150,8 @@ def test_names_do_not_matter() -> None:
     assert verify(other, model=flatten(machine.assembly)).holds
 
 
+# Quicker: unit/feedback/observer/test_certificate_file.py
+@pytest.mark.slow
 def test_a_file_is_checked_again_and_forgeries_are_refuted(tmp_path: Path) -> None:
     """Each forgery is written anew with a right checksum: a faster decay, and narrower ranges of A."""
     model = plant(DECKS[1])

@@ -91,6 +91,7 @@ def test_an_offset_moves_the_working_point_not_the_fundamental() -> None:
     assert lifted.response == pytest.approx(plain.response, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_fixed_gain_and_a_stiffening_spring_lose_their_margin() -> None:
     """At 2.8 N·m the spring of the figures is several times stiffer: Kp = 32 still holds it, Kp = 70 not."""
     plant = flatten(

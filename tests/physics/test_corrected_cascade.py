@@ -71,6 +71,7 @@ def test_factors_of_a_linear_spring_tell_what_is_derived_by_hand() -> None:
     assert 0.0 <= found.unseen[0, 0] <= left * 1.001
 
 
+@pytest.mark.slow
 def test_an_exact_deck_costs_nothing_whatever_the_current_meter_does(
     bench: tuple[Course, Prior, dict[str, Observer]],
 ) -> None:
@@ -150,6 +151,8 @@ def test_nothing_is_learned_at_standstill(tmp_path: Path) -> None:
     assert np.max(np.abs(learned[:, place:])[:, : len(design.balance.terms)]) < 0.02
 
 
+# Quicker: physics/test_single_precision.py
+@pytest.mark.slow
 def test_single_precision_gives_the_same_torque(
     bench: tuple[Course, Prior, dict[str, Observer]], tmp_path: Path
 ) -> None:

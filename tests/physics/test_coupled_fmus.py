@@ -158,6 +158,7 @@ def current(time: float) -> float:
     return (4.0 + 2.0 * math.sin(2.0 * math.pi * 6.0 * time)) * (1.0 - math.exp(-((time / 0.01) ** 2)))
 
 
+@pytest.mark.long_cases("Iterated")
 @pytest.mark.parametrize("coupling", [Extrapolated(), Iterated()], ids=lambda c: type(c).__name__)
 def test_actuator_and_link_converge_at_second_order(coupling: Coupling, linked: Mapping[str, Path]) -> None:
     base = nls.declare(nls.load_deck(DECK))
@@ -205,6 +206,7 @@ def linked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 LOAD, HERTZ = 0.1, 5.0
 
 
+@pytest.mark.slow
 def test_a_closed_loop_with_a_moved_load_converges_at_second_order(tmp_path: Path) -> None:
     """Plant, observer and controller; the load of the plant is moved from outside."""
     base = nls.declare(nls.load_deck(DECK))

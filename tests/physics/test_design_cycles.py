@@ -161,6 +161,8 @@ CASES = {
 
 
 @pytest.mark.long_cases(
+    "two branches-0.3",
+    "one-sided, part-0.3",
     "a dashpot alone-0.3",
     "a dashpot alone-4.0",
     "a dashpot beside them-0.3",
@@ -226,6 +228,7 @@ def test_slow_cycles_are_the_static_law() -> None:
     assert value(problem, BothStrokes((1e-5,))) == pytest.approx(value(problem, TorqueError()), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_fast_cycles_have_the_instantaneous_modulus() -> None:
     """The branches do not move about the mean strain of a cycle, and the torque has their modulus on top."""
     problem = given(machine(SLOW))

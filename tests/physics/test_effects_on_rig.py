@@ -45,7 +45,11 @@ SLOW = {"drive_delay", "strain_stiffening", "permanent_set", "self_heating", "an
 
 
 @pytest.mark.long_cases(
-    "torque_constant_saturation", "cam_profile_error", "stress_softening", "cable_friction"
+    "force_sensor_drift",
+    "torque_constant_saturation",
+    "cam_profile_error",
+    "stress_softening",
+    "cable_friction",
 )
 @pytest.mark.parametrize(
     "effect",
@@ -67,6 +71,7 @@ def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> 
     assert left < 0.5 * total_excess(before)
 
 
+@pytest.mark.slow
 def test_a_deck_that_declares_backlash_is_looked_at_coarsely(tmp_path: Path) -> None:
     """As when a deck that a diagnosis has written is diagnosed again: a body coasts, and nothing is new."""
     actuator = ACTUATORS["wrist"]

@@ -73,6 +73,7 @@ def fitted(model: FlatModel, bench: RecordSet) -> FittedPoles:
         return fit_poles(model, bench, choice=COARSE)
 
 
+@pytest.mark.slow
 def test_fitted_poles_err_less_than_the_gain_of_the_cascade(fitted: FittedPoles) -> None:
     fit, selection, held_out = fitted.errors
     assert [e.role for e in fitted.errors] == ["fit", "selection", "held_out"]

@@ -65,6 +65,7 @@ def reference(currents: list[float], lengths: list[float]) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.long_cases("even steps-2.0", "uneven steps-3.0")
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
 @pytest.mark.parametrize("uneven", [False, True], ids=["even steps", "uneven steps"])
 def test_the_plant_agrees_with_an_independent_integration_to_1e_6(version, uneven, tmp_path):
@@ -166,6 +167,7 @@ def test_the_published_actuator_agrees_with_the_packages_own_simulation_to_1e_6(
         assert np.abs(found[name] - expected[name]).max() < 1e-6 * size, name
 
 
+@pytest.mark.long_cases("cascade")
 @pytest.mark.parametrize("gain", [CascadeGain(), None], ids=["cascade", "default"])
 def test_the_observer_in_c_agrees_with_the_observer_in_python_to_1e_12(tmp_path, gain):
     deck = load_deck("austin2015_figure_consistent")

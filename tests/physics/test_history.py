@@ -312,6 +312,7 @@ def test_a_warm_piece_pulls_less_and_beyond_half_its_modulus_the_result_says_so(
     assert found.maximum == pytest.approx(0.5 / 0.03)
 
 
+@pytest.mark.slow
 def test_heat_comes_from_fillers_dashpots_and_softening_alike() -> None:
     """A closed cycle at b = 0 without cooling: C·T' is the work that did not come back."""
     inside: dict[str, Element] = {

@@ -129,6 +129,7 @@ def loop() -> c.PositionLoop:
     )
 
 
+@pytest.mark.slow
 def test_a_limited_position_loop_follows_its_equations() -> None:
     """A goal that steps: at first the voltage is held at its limit and the memory stands still."""
     motor = c.ResistiveMotor(**MOTOR, chain=(("loop", loop()),))

@@ -77,7 +77,7 @@ def test_response_of_a_linear_loop_is_its_z_transform(gains: TorqueGains) -> Non
     assert found == pytest.approx([sampled_response(1.7, gains, f) for f in frequencies], rel=1e-6)
 
 
-@pytest.mark.long_cases("0.001")
+@pytest.mark.long_cases("0.002", "0.001")
 @pytest.mark.parametrize("sample_time", [1e-3, 2e-3])
 def test_small_motions_of_the_simulated_loop(sample_time: float) -> None:
     loop = smooth(loops(NLS, sample_time, proportional=10.0, velocity_bandwidth=0.03 / sample_time)[0])

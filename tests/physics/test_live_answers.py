@@ -354,6 +354,7 @@ def test_mechanism_is_to_scale_and_analyses_are_those_of_the_other_rooms(templat
         template.at(float("nan"))
 
 
+@pytest.mark.slow
 def test_a_whole_design_says_where_the_quick_one_differs(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -487,6 +488,7 @@ def test_designs_are_kept_by_name_up_to_the_most(template: LiveDesign) -> None:
     template.snapshots.clear()
 
 
+@pytest.mark.slow
 def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -63,7 +63,7 @@ def test_onset_against_a_dense_sweep(loop: ClosedLoop, amplitude: float) -> None
     assert found.value == pytest.approx(begins, rel=0.05)
 
 
-@pytest.mark.long_cases("1.0-61.6")
+@pytest.mark.long_cases("2.8-37.5", "1.0-61.6")
 @pytest.mark.parametrize(("amplitude", "critical"), [(1.0, 61.6), (2.8, 37.5)])
 def test_a_held_torque_begins_where_the_linear_loop_loses_its_stability(
     loop: ClosedLoop, amplitude: float, critical: float

@@ -126,6 +126,7 @@ def test_what_cannot_be_had(loops: dict[str, ClosedLoop]) -> None:
         largest_gain(loops["soft"], "controller.integal", between=(1.0, 2.0), angles=[0.0])
 
 
+@pytest.mark.slow
 def test_the_three_springs(loops: dict[str, ClosedLoop]) -> None:
     """Below crossover the impedance is 1/Kp for every spring; the stiffer one is quicker at the same gain,
     and the nonlinear one, soft where it rests, allows the largest gain there."""

@@ -64,6 +64,7 @@ def test_below_break_away_it_is_a_spring_with_a_damper() -> None:
     assert np.abs(swinging) == pytest.approx(np.full(2, math.sqrt(beat)), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_against_another_integrator_and_power_balance() -> None:
     """Slips and sticks in turn under a sine; work = ½Jω² + ½σ₀z² + ∫ of what bristles and oil lose."""
     model = flatten(assembly("rubbed", wheel=Inertia(inertia=J), rub=tie(RUB, "wheel")))

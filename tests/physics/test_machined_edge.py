@@ -98,6 +98,7 @@ def force(extension: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.long_cases(
+    "two-sided, anchor 40 mm, bolts, ferrule",
     "one-sided, parallel cable",
     "one-sided, anchor 30 mm",
     "two-sided, anchor 25 mm",
@@ -125,7 +126,7 @@ def test_a_cable_on_the_machined_edge_gives_the_claimed_torque(name: str, tmp_pa
     assert len(strings(text)) == (1 if name.startswith("one") else 2)
 
 
-@pytest.mark.long_cases("inf")
+@pytest.mark.long_cases("0.022", "inf")
 @pytest.mark.parametrize("anchor", [22e-3, math.inf])
 def test_the_arcs_keep_the_stated_distance_from_the_offset_of_the_integrated_curve(
     anchor: float, tmp_path: Path

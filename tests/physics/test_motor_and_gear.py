@@ -113,6 +113,7 @@ def test_the_current_never_passes_the_limit_while_the_supply_can_hold_it() -> No
     assert np.max(np.abs(run["motor.voltage"])) <= SUPPLY
 
 
+@pytest.mark.slow
 def test_electrical_power_is_mechanical_power_heat_and_field() -> None:
     """∫U·I = ∫k·I·ω + ∫R·I² + ½L·I² at every moment, driven into both limits."""
     times = np.linspace(0.0, 0.3, 60_001)
@@ -283,6 +284,7 @@ def test_the_residual_of_a_lossy_gear_is_relative_to_its_torques(size: float) ->
         assert abs(float(residual)) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_swing_through_a_lossy_gear_against_another_integrator_and_its_power_balance() -> None:
     sizes, stiffness = (ROTOR, 2e-3, 8.0), 3.0
     made = assembly("a", motor=by_current(voltage_limit=1e4), wheel=Inertia(inertia=2e-3), gear=lossy(),

@@ -117,7 +117,7 @@ def test_a_quantised_angle_costs_no_more_than_half_a_count(
     assert rms(found["motor.speed"] - moving["motor.speed"]) < 0.15
 
 
-@pytest.mark.long_cases("2.0-31000.0", "11.0-411.0", "11.0-31000.0")
+@pytest.mark.long_cases("2.0-411.0", "2.0-31000.0", "11.0-411.0", "11.0-31000.0")
 @pytest.mark.parametrize("viscosity", [ob.PRINTED, ob.SLOW])
 @pytest.mark.parametrize("frequency", [2.0, 11.0])
 def test_integrating_the_rate_of_the_extension_costs_accuracy(frequency: float, viscosity: float) -> None:
@@ -147,6 +147,8 @@ def test_integrating_the_rate_of_the_extension_costs_accuracy(frequency: float, 
     assert error["minimal"] < error["relaxing" if viscosity == ob.SLOW else "total"]
 
 
+# Quicker: the tests of test_corrected_cascade.py
+@pytest.mark.slow
 def test_the_correction_reduces_what_the_rubber_model_has_wrong() -> None:
     """The true rubber creeps in a way that the model does not have: a disturbance of the relaxing force.
 
@@ -239,7 +241,7 @@ def test_dry_friction_does_not_make_the_estimated_speed_chatter() -> None:
     assert np.max(np.abs(found["motor.speed"])[slow]) < 0.05
 
 
-@pytest.mark.long_cases("-60.0-441", "-1500.0-441")
+@pytest.mark.long_cases("-1500.0-111", "-60.0-441", "-1500.0-441")
 @pytest.mark.parametrize("points", [111, 441])
 @pytest.mark.parametrize("first", [-60.0, -1500.0])
 def test_pole_placement_is_unstable_between_its_grid_points(points: int, first: float) -> None:

@@ -100,6 +100,8 @@ def driven(times: np.ndarray, tolerance: float = 1e-9) -> Trace:
     return simulate(flatten(DRIVE), times, inputs={"motor.current": current}, tolerance=tolerance)
 
 
+# Quicker: the same of the other drive in test_models_by_hand.py
+@pytest.mark.slow
 def test_the_drive_agrees_with_its_equations_typed_here() -> None:
     times = np.linspace(0.0, 0.8, 161)
     wanted = solve_ivp(slope, (0.0, 0.8), [0.0] * 3, "Radau", times, rtol=1e-7, atol=1e-9).y
@@ -113,6 +115,8 @@ def test_the_drive_agrees_with_its_equations_typed_here() -> None:
     assert flowed == pytest.approx(wanted[2], abs=2e-5 * np.ptp(wanted[2]))
 
 
+# Quicker: the same of the other drive in test_models_by_hand.py
+@pytest.mark.slow
 def test_work_put_in_by_the_winding_is_stored_or_lost() -> None:
     times = np.linspace(0.0, 1.2, 6_001)
     run = driven(times, tolerance=1e-8)

@@ -218,6 +218,8 @@ def improved(design: Design, radius: float) -> Design:
     return design_at(result.x)
 
 
+# Quicker: unit/design/test_front.py
+@pytest.mark.slow
 def test_least_rubber_is_bounded_by_the_energy_it_can_hold() -> None:
     """No rubber stores more than W at its largest strain; the leanest point comes near that."""
     front = front_of(LeastRubber, LeastSize)

@@ -154,7 +154,7 @@ def account(model: FlatModel, element: Element, times: np.ndarray, run: Trace) -
     return total
 
 
-@pytest.mark.long_cases("3", "2", "0")
+@pytest.mark.long_cases("1", "3", "2", "0")
 @pytest.mark.parametrize("batch", range(4))
 def test_random_networks_with_hardening_springs_balance(batch: int) -> None:
     draw, seen = random.Random(100 + batch), 0

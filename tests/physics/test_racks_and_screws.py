@@ -67,6 +67,7 @@ def swung(made: Assembly, times: np.ndarray) -> dict[str, np.ndarray]:
     return {name: run[name] for name in (*names, "joint.force", "joint.input_torque")}
 
 
+@pytest.mark.long_cases("False-joint0-0.011", "True-joint1--0.0012732395447351628")
 @pytest.mark.parametrize(("joint", "travel"), [(RACK, RADIUS), (SCREW, LEAD / (2.0 * math.pi))])
 @pytest.mark.parametrize("from_carriage", [False, True])
 def test_a_carriage_moves_as_one_reflected_mass(

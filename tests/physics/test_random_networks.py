@@ -48,7 +48,7 @@ def stiffness(linear: LinearModel, s: complex) -> complex:
     return complex((linear.C @ inner + linear.D @ drive)[0, 0])
 
 
-@pytest.mark.long_cases("1", "2", "3", "4", "5", "6", "7", "8", "9", "11")
+@pytest.mark.long_cases("10", "1", "2", "3", "4", "5", "6", "7", "8", "9", "11")
 @pytest.mark.parametrize("batch", range(BATCHES))
 def test_network_agrees_with_complex_stiffness(batch: int) -> None:
     draw = random.Random(4000 + batch)

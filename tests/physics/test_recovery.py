@@ -246,6 +246,7 @@ def test_nothing_happens_before_a_usable_reading() -> None:
     assert outputs[0] > 0.5
 
 
+@pytest.mark.long_cases("both", "corrected")
 @pytest.mark.parametrize("which", ["cascade", "corrected", "both"])
 def test_c_does_what_the_reference_does_under_faults(which: str, tmp_path: Path) -> None:
     models = {

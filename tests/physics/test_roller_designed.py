@@ -119,6 +119,7 @@ def test_the_optimiser_sees_the_edge_that_is_drawn(signs: CamDesign) -> None:
     assert seen.radii == pytest.approx(contour.radii[at], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_smaller_pressure_angle_takes_a_larger_cam() -> None:
     def radius(degrees: float) -> float:
         keep = [MaximumStrain(2.0), MaximumPressureAngle(math.radians(degrees))]
@@ -138,6 +139,7 @@ def drawn(design: CamDesign, folder: Path) -> str:
     return (folder / "cam.dxf").read_text(encoding="utf-8")
 
 
+@pytest.mark.long_cases("signs")
 @pytest.mark.parametrize("which", ["hills", "signs"])
 def test_a_circle_rolled_over_the_drawn_edge_gives_way_and_torque(
     which: str, request: pytest.FixtureRequest, tmp_path: Path
@@ -162,6 +164,7 @@ def test_a_circle_rolled_over_the_drawn_edge_gives_way_and_torque(
     assert np.sqrt(np.mean((torques - wanted) ** 2)) < 0.005 * design.target.largest
 
 
+@pytest.mark.slow
 def test_the_drawing_holds_the_way_the_roller_and_the_line_of_the_follower(
     signs: CamDesign, tmp_path: Path
 ) -> None:

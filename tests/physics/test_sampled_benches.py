@@ -142,6 +142,7 @@ def squares(actuator: Assembly, records: RecordSet, block: str) -> dict[str, flo
     return {each.record.name: float(np.mean(each.residual({})[0] ** 2)) for each in every}
 
 
+@pytest.mark.long_cases("0.005")
 @pytest.mark.parametrize("step", [1e-3, 5e-3])
 def test_dry_friction_that_turns_over_between_samples_is_no_missing_effect(
     step: float, monkeypatch: pytest.MonkeyPatch

@@ -79,6 +79,7 @@ def test_it_follows_on_other_machines_and_with_a_coarse_encoder(loop: ClosedLoop
     assert error(changed, 5.0, 1.5 if other == "soft" else 2.8) <= GOALS[5.0]
 
 
+@pytest.mark.slow
 def test_a_disturbance_observer_in_place_of_the_integral_follows_as_well(loop: ClosedLoop) -> None:
     velocity = VelocityLoop(integral=0.0, disturbance=DisturbanceObserver())
     with_observer = loop_of(loop.plant, velocity=velocity)
@@ -128,7 +129,7 @@ def margins(stiffness: float, floor: float) -> tuple[float, float]:
     return min(beyond), min(phase)
 
 
-@pytest.mark.long_cases("0.5", "1.7", "3.4", "6.0")
+@pytest.mark.long_cases("10.4", "0.5", "1.7", "3.4", "6.0")
 @pytest.mark.parametrize("stiffness", [0.05, 0.5, 1.7, 3.4, 6.0, 10.4])
 def test_the_defaults_leave_six_decibel_and_thirty_degrees_at_every_stiffness(stiffness: float) -> None:
     gain, phase = margins(stiffness, 1.0)
@@ -216,6 +217,7 @@ def test_it_is_stable_over_a_thousand_draws_of_the_deck(loop: ClosedLoop) -> Non
     assert np.all(stable_draws(loop, 1000))
 
 
+@pytest.mark.slow
 def test_friction_between_motor_and_torque_wants_less_bandwidth() -> None:
     """The capstan of this deck makes the torque jump with the sign of the speed; the defaults limit-cycle."""
     plant = machine("one_sided_cable_drive")

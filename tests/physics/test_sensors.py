@@ -202,7 +202,7 @@ def test_a_torque_transducer_is_the_same_line_in_the_flat_model() -> None:
     assert flatten(made).evaluate([], [0.5, 0.0])["cell.reading"] == pytest.approx(1.5 * 2.0 + 0.25)
 
 
-@pytest.mark.long_cases("1.0", "8.0")
+@pytest.mark.long_cases("20.0", "1.0", "8.0")
 @pytest.mark.parametrize("frequency", [1.0, 8.0, 20.0])
 def test_a_tachometer_is_a_differentiator_with_a_first_order_roll_off(frequency: float) -> None:
     """jω·ω_c/(jω + ω_c) in the flat model and, at a high rate, in the record."""

@@ -43,7 +43,7 @@ def common(inverses: list, whole: float, most: float) -> float:
     return brentq(lambda f: sum(z(f) for z in inverses) - whole, -most, most, xtol=1e-300, rtol=1e-14)
 
 
-@pytest.mark.long_cases("6")
+@pytest.mark.long_cases("4", "6")
 @pytest.mark.parametrize("count", [3, 4, 6])
 def test_hardening_springs_share_by_the_common_force(count: int) -> None:
     draw = np.random.default_rng(count)
@@ -68,6 +68,7 @@ def test_hardening_springs_share_by_the_common_force(count: int) -> None:
             assert model.evaluate([], [whole, 0.0])["net.force"] == pytest.approx(expected, rel=1e-11)
 
 
+@pytest.mark.slow
 def test_pieces_of_rubber_with_knots_share_by_the_common_force() -> None:
     """Piecewise linear laws, where Newton's method alone may run to and fro between two pieces."""
     draw = np.random.default_rng(7)
@@ -132,6 +133,7 @@ def test_together_as_nested_two_by_two_also_where_rates_are_asked_for() -> None:
     assert one == pytest.approx(other, abs=1e-7 * np.max(np.abs(one)))
 
 
+@pytest.mark.slow
 def test_the_work_grows_with_the_number_of_members() -> None:
     """Nested roots would multiply by twenty-five with each further member."""
     counts = []

@@ -140,6 +140,7 @@ def test_cable_and_relaxing_rubber() -> None:
     assert run(chain, "net.rubber.extension") == pytest.approx(other.y[0], rel=1e-7, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_fed_solid_behind_a_cable_is_a_standard_linear_solid_behind_a_cable() -> None:
     """The same physics in two declarations: a state fed by the rate, and spring and dashpot apart."""
     fed = FedSolid(still=4e3, stiffness=6e3, damping=250.0)

@@ -65,6 +65,7 @@ def test_the_gain_of_the_studies_is_a_finding_with_the_gain_that_has_a_margin(
     assert 0.05 < reproduced.cycling < 0.4
 
 
+@pytest.mark.slow
 def test_the_gain_that_is_named_has_the_margin_and_survives_the_kick(
     loop: ClosedLoop, reproduced: SpreadMargins
 ) -> None:
@@ -90,6 +91,7 @@ def test_a_kick_is_wanted_for_ten_milliseconds_once_the_torque_is_reached(loop: 
     assert plain[struck[0] - 1] < 2.0 == plain[struck[0]]
 
 
+@pytest.mark.slow
 def test_a_linear_spring_keeps_its_margin_with_the_same_gain() -> None:
     gentle = loop_of("austin2015_soft_spring", gains=REPRODUCED_GAINS)
     found = spread_margins(gentle, GAIN, last=LAST, translate=quickest())
@@ -102,7 +104,7 @@ DECKS = ("austin2015_soft_spring", "austin2015_stiff_spring", "austin2015_figure
          "austin2015_as_printed", "test_rig")  # fmt: skip
 
 
-@pytest.mark.long_cases(
+@pytest.mark.long_cases("law1-austin2015_stiff_spring",
     *(f"law{law}-{deck}" for law in (0, 1) for deck in ("austin2015_as_printed", "test_rig")),
     "law0-austin2015_figure_consistent", "law0-austin2015_soft_spring", "law1-austin2015_soft_spring",
     "law1-austin2015_figure_consistent",
@@ -125,7 +127,7 @@ def test_the_gain_by_default_closes_the_loop_of_a_linear_spring_at_twelve_hertz(
     assert values["controller.integral"] == pytest.approx(3.125 * values[GAIN])
 
 
-@pytest.mark.long_cases("test_rig")
+@pytest.mark.long_cases("austin2015_figure_consistent", "test_rig")
 @pytest.mark.parametrize("deck", ["austin2015_figure_consistent", "test_rig"])
 def test_the_default_loses_to_no_pid_over_the_spread(deck: str) -> None:
     """Half of what the drive can hold at 2 Hz; seeds that no figure in docs is from."""

@@ -151,6 +151,7 @@ def beside(engaged: float = ENGAGED, *, mirrored: bool = False) -> Assembly:
     )
 
 
+@pytest.mark.long_cases("True")
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_spring_beside_the_drive_acts_on_the_joint_beyond_its_angle(mirrored: bool) -> None:
     """The joint is pushed through the angle of engagement into the stop and comes back; no clutch."""
@@ -180,6 +181,7 @@ def test_a_spring_beside_the_drive_acts_on_the_joint_beyond_its_angle(mirrored: 
     assert np.all(ours["spring.torque"][free] == 0.0), "nothing acts before the spring is engaged"
 
 
+@pytest.mark.slow
 def test_the_design_counts_from_the_angle_of_engagement() -> None:
     target, quick = PowerTorque(coefficient=2.0, exponent=1.2, angle=0.8), DesignSettings(
         draws=0, look_for_size_ranges=False, starts=2
@@ -211,6 +213,7 @@ SIDES = (
 )  # fmt: skip
 
 
+@pytest.mark.long_cases("back works harder")
 @pytest.mark.parametrize("turned", [False, True], ids=["front works harder", "back works harder"])
 def test_both_sides_of_a_cam_meet_their_own_curve_on_one_element(turned: bool) -> None:
     targets = (SIDES[1], SIDES[0]) if turned else SIDES

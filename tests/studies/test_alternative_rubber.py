@@ -136,6 +136,7 @@ def ran(bench: Bench) -> Measured:
     return bench.run([Run(Rubber(0.1), gain, torque, f) for gain, torque, f in asked], stop=4.0)
 
 
+@pytest.mark.slow
 def test_a_gain_that_is_too_high_is_called_a_limit_cycle(ran: Measured) -> None:
     assert list(ran.cycling[:2]) == [False, True]
 
@@ -167,6 +168,7 @@ def test_a_weighed_spring_is_known_whatever_its_modulus(bench: Bench) -> None:
     assert np.abs(ran.response) == pytest.approx(np.ones(3), abs=0.2)
 
 
+@pytest.mark.slow
 def test_stiffer_rubber_bears_less_gain(bench: Bench) -> None:
     """At zero torque the stiffness is as the modulus; stretched less for a torque, it is less."""
     soft, stiff = largest_gains(bench, [Rubber(0.1, 0.8), Rubber(0.1, 1.25)])

@@ -94,6 +94,9 @@ def test_a_name_that_does_not_exist_is_noticed() -> None:
 
 
 @pytest.mark.long_cases(
+    "how_to/sweep_designs.md",
+    "how_to/use_the_fmus.md",
+    "how_to/run_many_at_once.md",
     "asked_elsewhere.md",
     "certificates.md",
     "how_to/both_strokes_and_losses.md",

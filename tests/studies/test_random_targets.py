@@ -24,7 +24,7 @@ def line(request: pytest.FixtureRequest) -> Line:
     return next(iter(lines([deck], [seed])))
 
 
-@pytest.mark.long_cases("austin2015_figure_consistent-4")
+@pytest.mark.long_cases("austin2015_as_printed-2", "austin2015_figure_consistent-4")
 def test_a_target_is_met_at_once_or_after_the_first_advice(line: Line) -> None:
     assert line.verdict != "not met", line
 

@@ -243,12 +243,14 @@ def benches(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return Bench(deck, records, machine, load_records(folder / "renamed", flatten(machine.assembly)))
 
 
+@pytest.mark.long_cases("joint")
 def test_simulate_a_record(benches: Bench) -> None:
     machine = benches.machine
     predicted = [predict(deck, seen, seen.records[0].name).signals for deck, seen in benches.both]
     equal(machine.keys(predicted[0]), predicted[1], tolerance=1e-9)
 
 
+@pytest.mark.long_cases("joint")
 def test_fit(benches: Bench, tmp_path: Path) -> None:
     deck, _, machine, _ = benches
     fits = [refit(*each) for each in benches.both]

@@ -32,6 +32,8 @@ def test_the_controller_is_written_as_c(run: Run, tmp_path: Path, law: str, told
     assert "sliding_effort" in header
 
 
+# Quicker: unit/cli/test_export_fmu.py
+@pytest.mark.slow
 def test_an_fmu_stands_beside_it(run: Run, tmp_path: Path) -> None:
     status, _, err = run("export", "controller", "--deck", "austin2015_soft_spring", "--out", "c", "--fmu")
     assert status == 0, err

@@ -51,7 +51,7 @@ def test_all_that_the_deck_allows_is_written_with_its_author_and_date(run: Run, 
 
 
 # The default in C: test_controller.py; in an FMU: the test above.
-@pytest.mark.long_cases("default")
+@pytest.mark.long_cases("pid", "default")
 @pytest.mark.parametrize(
     ("law", "words"),
     [((), "speed by tangent stiffness"), (("--law", "pid"), "PID on the")],

@@ -121,6 +121,7 @@ def test_the_deck_that_is_written_is_accepted_and_says_where_its_numbers_come_fr
     assert errors[1] ** 2 - errors[0] ** 2 > 0.2 * noise**2
 
 
+@pytest.mark.slow
 def test_a_number_at_the_end_of_its_range_is_not_passed_over(bench: Path) -> None:
     deck = assembly_of(bench / "deck.toml")
     inertia = deck.quantities()["motor.inertia"]

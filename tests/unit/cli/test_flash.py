@@ -54,6 +54,7 @@ def cost(text: str) -> float:
     return float(re.search(r"by at most ([\d.]+) mN·m", text)[1])
 
 
+@pytest.mark.slow
 def test_the_size_is_printed_and_a_budget_is_met_by_a_coarser_table(export: Run, tmp_path: Path) -> None:
     status, out, _ = export()
     total, code, tables = sizes(out)
@@ -141,6 +142,7 @@ def test_breakpoints_are_read_alike_in_an_fmu_and_in_a_batch(tmp_path: Path) -> 
             assert np.array(many(at)).ravel() == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_budget_holds_for_a_controller_too(export: Run, tmp_path: Path) -> None:
     what = ("--what", "controller", "--deck", LINEAR)
     status, out, _ = export(*what)

@@ -112,7 +112,7 @@ NOT_NEEDED = {
 
 
 # What the rooms load that analyse uses: test_a_room_loads_sympy_and_python_control_only_when_it_uses_them.
-@pytest.mark.long_cases("analyse --deck")
+@pytest.mark.long_cases("deck show", "analyse --deck")
 @pytest.mark.parametrize("words", NOT_NEEDED, ids=lambda words: " ".join(words[:2]))
 def test_a_command_does_not_load_what_it_does_not_use(loaded: Loaded, words: tuple[str, ...]) -> None:
     modules, shown = loaded(COMMAND.format(words=words))

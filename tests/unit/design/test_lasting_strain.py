@@ -43,6 +43,7 @@ def test_a_design_keeps_no_rubber_stretched_to_more_than_twice_its_length() -> N
     assert state.bound == 1.0
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_same_kind_takes_its_place_and_a_looser_one_is_remarked() -> None:
     assert at_rest(designed(MaximumLastingStrain(0.6))) <= 0.6 + 1e-6
     loose = designed(MaximumLastingStrain(1.5))

@@ -82,6 +82,7 @@ def test_bolts_that_are_too_weak_are_said(contour: Contour) -> None:
     assert remarks(weak, contour, 14.0) == []
 
 
+@pytest.mark.slow
 def test_where_no_bolts_fit_that_is_said() -> None:
     angles = np.linspace(0.0, 1.2, 100)
     contour = contour_from_lever_arm(angles, 6e-3 + 3e-3 * angles**2, anchor_distance=math.inf)

@@ -124,6 +124,7 @@ def test_declared_strength_and_cable_are_limits_unless_others_are_asked_for() ->
     assert any("MaximumCableTension" in remark for remark in unlimited.remarks)
 
 
+@pytest.mark.slow
 def test_starts_are_reproducible_by_seed() -> None:
     def run(seed: int) -> list[float]:
         settings = DesignSettings(starts=2, seed=seed, look_for_size_ranges=False, draws=0)
@@ -200,6 +201,7 @@ def test_misspelt_names_of_stock_and_range_are_named() -> None:
         design_cam(actuator(CONCAVE), target=TARGET, free=[*RUBBER, stock], keep=KEEP)
 
 
+@pytest.mark.slow
 def test_over_travel_keeps_the_strain_beyond_the_last_angle() -> None:
     beyond = OverTravel(degrees(8.0), limits=(MaximumStrain(1.0),))
     design = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=[*KEEP, beyond], settings=QUICK)
@@ -231,6 +233,8 @@ def test_what_a_goal_measures_may_be_a_limit() -> None:
         design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=[AtMost(mass, quantity(3.0, "mm"))])
 
 
+# Quicker: each limit says what it bounds, in test_limits.py
+@pytest.mark.slow
 def test_a_torque_band_is_a_limit() -> None:
     """The least mean square error peaks at 47 mN·m; a band of 40 mN·m cuts it off, at the nodes."""
     angles = np.linspace(0.0, TARGET.last_angle, 60)

@@ -124,6 +124,7 @@ def test_the_live_page_refuses_a_roller_with_the_next_step() -> None:
         question_of(machine(), "rolling")
 
 
+@pytest.mark.slow
 def test_what_the_guide_bears_is_said_with_its_friction() -> None:
     def remark(cam: RollerCam) -> str:
         design = design_cam(machine(cam), target=hill(), free=CONTOUR, keep=[STRAIN], settings=QUICK)
@@ -207,6 +208,7 @@ def test_a_cable_that_lifts_off_is_told_where_and_that_a_roller_does_not() -> No
     assert then.predicted_rms == pytest.approx(other.error, abs=1e-4 * target.largest)
 
 
+@pytest.mark.slow
 def test_a_jump_is_named_as_such() -> None:
     angles = tuple(np.radians([0.0, 0.01, 40.0, 80.0]))
     step = TabulatedTorque(angles=angles, torques=(0.0, 1.5, 2.0, 2.0))

@@ -65,6 +65,7 @@ def test_the_block_of_the_design_changes_nothing(joint, tmp_path):
     assert np.array_equal(np.vstack([rows, running.steps(motion(200, 100))]), wanted)
 
 
+@pytest.mark.slow
 def test_both_halves_of_a_joined_step_get_the_numbers(joint):
     """A weaker motor gets more current, and the observer expects the same motion of it.
 

@@ -48,7 +48,7 @@ def test_a_library_for_this_machine_runs(source, tmp_path):
 
 
 # The first library for a platform takes as long as its C library takes to build.
-@pytest.mark.long_cases("aarch64-linux", "x86_64-darwin")
+@pytest.mark.long_cases("aarch64-linux", "x86_64-darwin", "aarch64-darwin")
 @pytest.mark.parametrize("name", ALL_PLATFORMS)
 def test_a_library_is_built_for_each_platform(name, source, tmp_path):
     where = PLATFORMS[name]

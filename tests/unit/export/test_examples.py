@@ -20,6 +20,7 @@ from nlsdesign.export.c.guarded_step import (
     index_bit,
 )
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library, run_compiler
+from tests.compiling import compile_program
 from tests.hand_built import observer
 
 ADAPTER = """
@@ -62,10 +63,9 @@ def supervisor(source: CSource, tmp_path):
 
 
 def test_the_program_on_a_posix_timer_runs(source: CSource, tmp_path) -> None:
-    program, folder = tmp_path / "program", source.header.parent
-    run_compiler(
-        [*STRICT, "-I", folder, source.source, folder / "loop_example_posix.c", "-lm", "-o", program],
-        about="the example",
+    folder = source.header.parent
+    program = compile_program(
+        [source.source, folder / "loop_example_posix.c"], tmp_path / "program", flags=[*STRICT, f"-I{folder}"]
     )
     done = subprocess.run([program, "3"], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr

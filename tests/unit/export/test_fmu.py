@@ -101,7 +101,7 @@ def test_the_sources_in_the_archive_compile_without_a_warning(name, version, uni
         main = Path(folder) / "sources" / ("fmi2.c" if version == "2.0" else "fmi3.c")
         target = ["-target", PLATFORMS[host_platform()].target, *BASELINE]
         common = [*STRICT, "-O2", "-fPIC", "-shared", "-isystem", str(fmi_headers()), str(main)]
-        run_compiler([*target, *common, "-o", str(tmp_path / "zig.so")], about=name)
+        run_compiler([*target, "-s", *common, "-o", str(tmp_path / "zig.so")], about=name)
         if shutil.which("gcc"):
             done = subprocess.run(
                 ["gcc", *common, "-o", tmp_path / "gcc.so", "-lm"], capture_output=True, check=False

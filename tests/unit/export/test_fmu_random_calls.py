@@ -36,6 +36,7 @@ def struck() -> FlatModel:
 MODELS = {"plant": plant, "struck": struck, "controller": controller}
 
 
+@pytest.mark.long_cases("struck")
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="the sanitizers are those of gcc")
 @pytest.mark.parametrize("name", quick_only(MODELS, ["struck"]))
 def test_no_call_is_beyond_bounds_undefined_or_silently_not_finite(name, tmp_path):

@@ -109,7 +109,7 @@ def test_the_description_is_valid_and_counts_states_and_indicators(name, version
         assert exchange.get("completedIntegratorStepNotNeeded") == ("false" if located else "true")
 
 
-@pytest.mark.long_cases("2.0")
+@pytest.mark.long_cases("3.0", "2.0")
 @both
 def test_the_sources_of_a_model_with_switches_compile_without_a_warning(version, units, tmp_path):
     with unpacked(units["geared", version]) as folder:

@@ -119,6 +119,7 @@ def loop_difference(written: MujocoModel, module: ModuleType, stop: float) -> fl
     return difference(angles, own)
 
 
+@pytest.mark.slow
 def test_a_closed_torque_loop_follows_our_own(exported: tuple[MujocoModel, ModuleType]) -> None:
     assert loop_difference(*exported, 2.0) < CLOSE
 
@@ -188,7 +189,7 @@ STEPS = {
 """Steps of MuJoCo in 1 ms, by effect: explicit steps of 1 ms are unstable on the stiff side of a gap."""
 
 
-@pytest.mark.long_cases("stribeck_friction", "load_dependent_friction")
+@pytest.mark.long_cases("backlash", "stribeck_friction", "load_dependent_friction")
 @pytest.mark.parametrize("effect", STEPS)
 def test_a_deck_with_an_effect_added_follows_our_own(effect: str, tmp_path: Path) -> None:
     """As a diagnosis adds it: friction that sticks, a gap, hysteresis, friction by the load."""

@@ -61,6 +61,7 @@ BROKEN = [
 ]
 
 
+@pytest.mark.slow
 @needs_prover
 def test_what_guards_keep_off_is_found_without_them(controller: CSource, tmp_path: Path) -> None:
     faults = [BROKEN[i] for i in (0, 1, 2, 4)]

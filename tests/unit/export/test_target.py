@@ -92,6 +92,7 @@ def test_every_processor_computes_the_bits_of_this_machine(model, real, processo
     assert measure_on_target(export_c(model, tmp_path, real=real), processor).run.same
 
 
+@pytest.mark.slow
 @needs_emulator
 def test_the_comparison_notices_one_unit_of_the_last_place(source, tmp_path):
     there = r"\n#ifdef __arm__\n\1(\2) * (1.0f + FLT_EPSILON);\n#else\n\1\2;\n#endif"

@@ -33,7 +33,7 @@ def chosen(name, plant):
 
 
 @needs_emulator
-@pytest.mark.long_cases("corrected observer", "cascade observer")
+@pytest.mark.long_cases("cascade observer and controller", "corrected observer", "cascade observer")
 @pytest.mark.parametrize("name", targets.GOALS)
 def test_the_goals_are_met_and_the_page_says_what_is_measured(name, plant, root):
     cost = targets.measured(chosen(name, plant), "float", CORTEX_M4F)

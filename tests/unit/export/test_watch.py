@@ -62,6 +62,7 @@ def readings(plan, count):
     return table.astype(float)
 
 
+@pytest.mark.long_cases("published-float")
 @pytest.mark.parametrize("real", list(Real))
 @pytest.mark.parametrize("machine", ["published", pytest.param("joint", marks=pytest.mark.slow)])
 def test_the_c_has_the_bits_of_its_twin(machine, real, request, tmp_path):
@@ -87,6 +88,7 @@ def test_the_c_has_the_bits_of_its_twin(machine, real, request, tmp_path):
     assert (twin.record["bins"]["count"] > 0).sum() >= 2
 
 
+@pytest.mark.long_cases("float")
 @pytest.mark.parametrize("real", [Real.FLOAT, pytest.param(Real.DOUBLE, marks=pytest.mark.slow)])
 def test_the_self_test_passes_and_notices_a_wrong_sum(published, real, tmp_path):
     source = export_watch(published, tmp_path, real=real)

@@ -15,7 +15,8 @@ from tests.unit.live.test_page_in_a_browser import ANSWERED
 pytest.importorskip("uvicorn")
 pytest.importorskip("starlette")
 pytest.importorskip("websockets")
-pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+# Quicker: test_page_in_a_browser.py drives the same page; a second server and browser take ten seconds.
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")]
 
 
 @pytest.fixture(scope="module")

@@ -263,6 +263,7 @@ def _lives(number: int) -> bool:
         return False
 
 
+@pytest.mark.slow
 def test_start_is_refused_to_a_module_that_needs_the_server_before_it_is_asked_for() -> None:
     code = "import nlsdesign.cli.main, sys; assert not {'uvicorn', 'starlette', 'asyncio'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -107,6 +107,7 @@ def test_what_the_motor_pays_is_that_of_the_library(followed: LiveQuestion) -> N
     assert rows["target as drawn"].current == pytest.approx(np.sqrt(np.mean(drawn.current**2)), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_winding_of_which_nothing_is_known_has_no_heat_and_a_ratio_is_only_tried(
     asked: LiveQuestion,
 ) -> None:
@@ -138,11 +139,13 @@ def test_a_spring_that_cannot_serve_the_task_says_why(followed: LiveQuestion) ->
         edit(follow_tasks).applied(heavy)
 
 
+@pytest.mark.slow
 def test_the_design_is_held_against_the_task_with_its_own_curve(followed: LiveQuestion) -> None:
     rows = paid(followed, LiveDesign(followed))
     assert rows["this design"].heat == pytest.approx(rows["target as drawn"].heat, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_design_that_asks_for_more_current_than_the_drive_gives_is_told(asked: LiveQuestion) -> None:
     heavy = edit(follow_tasks).applied(edit(set_task, 0, "ankle", 75.0, 0.05).applied(asked))
     view = LiveDesign(asked).answer.design

@@ -86,7 +86,7 @@ def evaluated(model: FlatModel, view: Equations, state: list[float], inputs: lis
     return known | {f"der({name})": value(e) for name, e in view.derivatives.items()}
 
 
-@pytest.mark.long_cases("True")
+@pytest.mark.long_cases("False", "True")
 @pytest.mark.parametrize("smooth", [False, True])
 def test_view_and_model_give_the_same_numbers(smooth: bool) -> None:
     model = flatten(drive(Pulley(radius=0.01), smooth=smooth))

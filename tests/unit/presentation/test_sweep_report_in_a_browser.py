@@ -133,6 +133,8 @@ def test_the_page_is_no_wider_than_its_screen_also_with_a_row_open(
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
 
 
+# Quicker: the printed page in test_report_in_a_browser.py
+@pytest.mark.slow
 def test_paper_has_the_figures_and_no_controls(opened: Tab) -> None:
     opened.evaluate("document.querySelector('svg a').dispatchEvent(new MouseEvent('click', {bubbles: true}))")
     opened.ask("Emulation.setEmulatedMedia", media="print")

@@ -107,6 +107,7 @@ def test_a_chart_as_frame_and_data_set() -> None:
     assert data[chart.argument.name].attrs["units"] == "rad"
 
 
+@pytest.mark.slow
 def test_a_design_and_its_tolerance_as_frames() -> None:
     pytest.importorskip("pandas")
     design = design_cam(

@@ -166,6 +166,8 @@ def test_the_pdf_is_one_page_a4_without_a_date_and_holds_the_text_as_fonts(tmp_p
     assert any(b" Tj" in item or b" TJ" in item for item in streams)
 
 
+# Quicker: the same in unit/design/test_machined_cam.py
+@pytest.mark.slow
 def test_the_same_part_gives_the_same_bytes(tmp_path: Path) -> None:
     for suffix in (".svg", ".pdf"):
         first, second = (written(tmp_path / folder, "groove", suffix).read_bytes() for folder in ("a", "b"))

@@ -37,6 +37,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_second_writing_has_the_same_bytes(data: Path, tmp_path: Path) -> None:
     (tmp_path / "case_999").mkdir()  # left from a larger one
     written(tmp_path)
@@ -163,6 +164,7 @@ def test_wrong_words_write_nothing(
     assert not (tmp_path / "set").exists()
 
 
+@pytest.mark.slow
 def test_plain_least_squares_names_what_is_hidden_in_a_carriage(data: Path, tmp_path: Path) -> None:
     """Seed 1 is none of those by which the method was set, nor of those that are counted."""
     assert hidden_effects.main(

@@ -97,6 +97,7 @@ def test_built_numbers_lie_within_the_declared_spread_and_use_it(actuator: Actua
 # --- rubber and cable -------------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("wrist")
 def test_static_hold_has_the_force_of_the_closed_form(actuator: Actuator) -> None:
     time = np.arange(round(2 * HOLD_TIME / STEP)) * STEP
     history = run(actuator, hold(time))
@@ -108,6 +109,7 @@ def test_static_hold_has_the_force_of_the_closed_form(actuator: Actuator) -> Non
     np.testing.assert_allclose(torque, lever_arm * force, rtol=1e-5)
 
 
+@pytest.mark.long_cases("wrist")
 def test_smooth_motion_equals_a_variable_step_integration(actuator: Actuator) -> None:
     servo, drive, rubber = Servo.for_actuator(actuator), actuator.drivetrain, actuator.rubber
     command = hold(np.arange(round(0.4 / STEP)) * STEP)
@@ -179,6 +181,7 @@ def test_rubber_that_buckles_follows_the_cam_and_never_pushes(
     assert np.mean(history.force == 0.0) > 0.05, "the swing is meant to buckle"
 
 
+@pytest.mark.long_cases("wrist")
 def test_cable_in_series_follows_from_its_own_stiffness(actuator: Actuator) -> None:
     stiffness = 5.0 * scale_of(actuator).stiffness
     time = np.arange(round(HOLD_TIME / STEP)) * STEP
@@ -250,6 +253,7 @@ def test_work_of_the_motor_is_stored_or_lost(actuator: Actuator, level: float) -
         assert lost[-1] > 0.3 * np.max(spring), "friction is meant to matter here"
 
 
+@pytest.mark.long_cases("wrist")
 def test_coulomb_friction_moves_the_current_by_twice_its_level(actuator: Actuator) -> None:
     level, per_ampere = 0.12 * scale_of(actuator).torque, actuator.drivetrain.torque_per_ampere
     history = run(actuator, swing(25.0, 0.5, 2.6), friction=level)
@@ -298,6 +302,7 @@ def test_backlash_of_no_width_is_a_rigid_gear(actuator: Actuator) -> None:
     np.testing.assert_allclose(tight.force, rigid.force, atol=1e-2)
 
 
+@pytest.mark.long_cases("wrist")
 def test_ripple_and_disturbance_appear_in_the_current_they_cost(actuator: Actuator) -> None:
     per_ampere, size = actuator.drivetrain.torque_per_ampere, 0.1
     time = np.arange(round(2.0 / STEP)) * STEP

@@ -91,7 +91,7 @@ def test_set_moves_the_rubber_and_heat_makes_it_soft(actuator: Actuator) -> None
     assert warm.softness == pytest.approx(1.0 / (1.0 + 0.5 * power * 2.0 * (1.0 - exp(-2.0))), rel=1e-3)
 
 
-@pytest.mark.long_cases("wrist")
+@pytest.mark.long_cases("arm", "wrist")
 def test_profile_drift_and_eccentric_disc_have_the_size_they_claim(actuator: Actuator) -> None:
     def run(**effects: float) -> np.ndarray:
         return make_records(actuator, effects, 4, noise=False, only=["hold"])["hold"]

@@ -140,7 +140,7 @@ def test_a_delay_is_one_of_the_drive_beyond_the_hold() -> None:
     assert ticks.place == pytest.approx(place[:-1:10], abs=1e-9)
 
 
-@pytest.mark.long_cases("elastic_joint", "belt_axis", "screw_carriage", "rack_carriage")
+@pytest.mark.long_cases("direct_drive", "elastic_joint", "belt_axis", "screw_carriage", "rack_carriage")
 @pytest.mark.parametrize("kind", OWN, ids=lambda kind: kind.name)
 def test_a_cascade_goes_where_it_is_told_and_its_current_lags(kind: Kind) -> None:
     plant, missing = built(kind, (), 1.0, 5)
@@ -215,7 +215,9 @@ def test_every_effect_changes_its_machine_and_scales_with_its_strength() -> None
         built(KINDS["belt_axis"], ("no_such",), 1.0, 1)
 
 
-@pytest.mark.long_cases("elastic_joint", "direct_drive", "belt_axis", "screw_carriage", "rack_carriage")
+@pytest.mark.long_cases(
+    "geared_joint", "elastic_joint", "direct_drive", "belt_axis", "screw_carriage", "rack_carriage"
+)
 @pytest.mark.parametrize("kind", [name for name in ALL_KINDS if not name.startswith("mujoco")])
 def test_the_files_of_a_case_are_what_the_package_reads(kind: str, tmp_path: Path) -> None:
     condition = CONDITIONS[ALL_KINDS.index(kind) % len(CONDITIONS)]
@@ -243,6 +245,7 @@ def test_conditions_change_the_log_and_not_the_machine() -> None:
         assert conditioned(kind, "plain") == kind.logger
 
 
+@pytest.mark.long_cases("mujoco_tendon", "mujoco_motor")
 @needs_mujoco
 @pytest.mark.parametrize("name", ["mujoco_motor", "mujoco_tendon", "mujoco_gear"])
 def test_mujoco_moves_as_the_own_simulator_does(name: str) -> None:

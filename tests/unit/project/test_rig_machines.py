@@ -135,6 +135,7 @@ def test_built_numbers_lie_within_the_declared_spread(machine: Machine) -> None:
     assert 1.3 < np.max(np.maximum(factors, 1.0 / factors)) <= 1.6
 
 
+@pytest.mark.long_cases("shaft", "spindle")
 def test_the_seed_fixes_a_set_and_what_is_hidden_changes_no_number(machine: Machine) -> None:
     short = short_machine(machine)
     one, again, other = (make_machine_records(short, {"coulomb_friction": 1.0}, seed) for seed in (3, 3, 4))
@@ -173,6 +174,7 @@ def short_machine(machine: Machine) -> Machine:
     return replace(machine, motions=motions)
 
 
+@pytest.mark.long_cases("shaft", "spindle")
 def test_files_hold_what_was_declared_and_measured(tmp_path: Path, machine: Machine) -> None:
     short = short_machine(machine)
     write_machine_set(tmp_path, short, {}, 5, conditions=Conditions(counts=512))

@@ -105,6 +105,7 @@ def clean_swing() -> np.ndarray:
 ADDED = [name for name in (*EFFECTS, *LATER_EFFECTS, *OUTSIDE_ANY_CATALOGUE) if name != "none"]
 
 
+@pytest.mark.long_cases("torque_constant_saturation", "winding_heat")
 @pytest.mark.parametrize("effect", quick_only(ADDED, ADDED[::16]))
 def test_every_effect_shows_above_the_noise(clean_swing: np.ndarray, effect: str) -> None:
     wrist = ACTUATORS["wrist"]

@@ -26,6 +26,7 @@ from docs.site import (
     landing,
     markup,
     materials,
+    navigation,
     parts,
     stage,
 )
@@ -260,3 +261,21 @@ def test_parts_are_drawn() -> None:
     assert "force of BoucWen over extension" in svg
     assert parts.drawing("Encoder", INSTANCES["Encoder"]) == ""
     assert tomllib.loads(parts.deck_example(part))["part"]["component"] == "BoucWen"
+
+
+def test_the_list_of_pages_marks_the_page_and_what_it_hangs_from() -> None:
+    box = '<input aria-label="more" class="toctree-checkbox"/>'
+    above = '<li class="toctree-l1 has-children"><a class="reference internal" href="{}">A</a>' + box
+    other = '<li class="toctree-l2"><a class="reference internal" href="c.html">C</a></li></ul></li>'
+    page = '<li class="toctree-l2"><a class="reference internal" href="b.html">B</a></li>'
+    beside = above.format("d.html") + "<ul>" + page.replace("b.html", "e.html") + "</ul></li></ul>"
+    tree = "<ul>" + beside[:-5] + above.format("a.html") + "<ul>" + page + other + "</ul>"
+    marked = navigation.marked(tree, "b.html")
+    here = page.replace("toctree-l2", "toctree-l2 current current-page")
+    here = here.replace('"reference', '"current reference').replace("b.html", "#")
+    opened = '<li class="toctree-l1 current has-children"><a class="reference internal" href="a.html">A</a>'
+    assert marked == (
+        '<ul class="current">' + beside[:-5] + opened + box.replace(" class", ' checked="" class')
+        + '<ul class="current">' + here + other + "</ul>"
+    )  # fmt: skip
+    assert navigation.marked(tree, "nowhere.html") == tree

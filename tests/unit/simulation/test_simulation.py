@@ -130,6 +130,8 @@ def test_a_jump_between_two_samples_is_found() -> None:
     assert run["wheel.angle"] == pytest.approx(0.75 * after**2, abs=1e-8)
 
 
+# Quicker: physics/test_dry_friction.py
+@pytest.mark.slow
 def test_dry_friction_against_another_integrator() -> None:
     """Narrow corners: tanh(ω/ω_s) with ω_s = 0.01 rad/s, Radau with tolerances of 1e-11 beside it."""
     made = assembly(

@@ -194,6 +194,7 @@ class Noted:
         self.texts.append(text)
 
 
+@pytest.mark.slow
 def test_a_driver_without_workers_says_so_and_since_when_before_it_ends(tmp_path: Path) -> None:
     port, noted = free_port(), Noted()
     axes = [Listed({sweeping.AREA: [1e-5, 2e-5]})]

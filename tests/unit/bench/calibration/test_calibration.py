@@ -89,6 +89,7 @@ def test_the_balance_of_a_linear_spring_is_that_of_newton() -> None:
     assert shown.value[1] == pytest.approx(np.full(50, 0.22 / 5.97e-4), rel=1e-9)
 
 
+@pytest.mark.long_cases("austin2015_as_printed")
 @pytest.mark.parametrize("name", [CAM, "austin2015_as_printed"])
 def test_slow_samples_show_the_same_relaxation(name: str) -> None:
     """As printed the rubber relaxes within a fifth of the slow step."""
@@ -140,7 +141,7 @@ def test_friction_turns_at_once_on_the_bench() -> None:
     assert rub is not None
 
 
-@pytest.mark.long_cases("kind1-one_sided_cable_drive")
+@pytest.mark.long_cases("kind0-one_sided_cable_drive", "kind1-one_sided_cable_drive")
 @pytest.mark.parametrize("name", [CAM, "test_rig", "one_sided_cable_drive"])
 @pytest.mark.parametrize("kind", [HungWeightTest(), LoadCellTest()])
 def test_slopes_are_those_of_differences(name: str, kind: CalibrationTest) -> None:
@@ -208,6 +209,7 @@ def test_a_free_run_knows_ratios_alone(tmp_path: Path) -> None:
     assert "motor.inertia over motor.torque_constant is known to" in words
 
 
+@pytest.mark.slow
 def test_records_that_are_given_twice_do_not_move_what_they_told(weighed: Estimate, tmp_path: Path) -> None:
     result = calibrated(deck(LINEAR), weighed, day=date(2026, 1, 2))
     paths = write_calibration(result, tmp_path / "out")
@@ -262,6 +264,8 @@ def test_nothing_becomes_less_known(weighed: Estimate) -> None:
     assert left.min() > -1e-12
 
 
+# Quicker: spikes in unit/bench/identification/test_shooting.py and test_faulty_samples.py
+@pytest.mark.slow
 def test_spikes_do_not_decide(tmp_path: Path) -> None:
     folder = recorded("hung_weight", tmp_path, TRUE, logger=Logger(spikes=4))
     found = estimate(deck(LINEAR), [read("hung_weight", folder, deck(LINEAR))])

@@ -45,6 +45,7 @@ def test_every_effect_is_offered_on_two_machines(effect: object) -> None:
     )
 
 
+@pytest.mark.long_cases("rig")
 @pytest.mark.parametrize("name", quick_only(MACHINES, ["rig"]))
 def test_each_candidate_is_a_deck_and_begins_within_its_bounds(name: str) -> None:
     machine = bare(MACHINES[name]())

@@ -233,6 +233,7 @@ def test_words_say_what_to_record_and_what_it_would_show() -> None:
     assert experiment.to_dict()["separations"][0]["one"] == "coulomb_friction"
 
 
+@pytest.mark.slow
 def test_an_open_loop_drive_is_commanded_through_the_model() -> None:
     """The motor alone with its current commanded: the motion that is expected is that of a simulation."""
     bench, hypotheses = undecided()

@@ -136,6 +136,7 @@ def ringing(record: Record) -> Array:
     return error
 
 
+@pytest.mark.long_cases("30.0")
 @pytest.mark.parametrize("loud", [1.0, 30.0])
 def test_ringing_with_a_phase_of_its_own_is_called_a_resonance_however_loud_one_record_is(
     loud: float,

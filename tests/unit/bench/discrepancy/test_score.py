@@ -122,6 +122,7 @@ def test_intervals_of_shares_are_those_of_wilson() -> None:
     assert wilson(0, 20) == pytest.approx((0.0, 0.1611), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_case_that_fails_gives_the_reason() -> None:
     broken = run(replace(SINGLE, effects=("no_such_effect",)))
     assert "no_such_effect" in broken["error"]
@@ -151,7 +152,7 @@ def test_a_run_goes_on_where_it_was_interrupted(
     assert "pairs: exactly the right set | 4/4" in capsys.readouterr().out
 
 
-@pytest.mark.long_cases("cam")
+@pytest.mark.long_cases("joint", "cam")
 @pytest.mark.parametrize(
     ("case", "files", "signals"),
     [

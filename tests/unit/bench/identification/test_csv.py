@@ -179,6 +179,7 @@ def test_a_mapping_names_the_heads_as_they_stand(tmp_path: Path, model: FlatMode
     assert len(record.trace) == len(table())
 
 
+@pytest.mark.slow
 def test_a_long_text_file_is_read_in_bounded_memory(tmp_path: Path) -> None:
     tracemalloc = pytest.importorskip("tracemalloc")
     count = 200_000

@@ -172,6 +172,7 @@ def test_the_last_four_answers_of_a_record_are_remembered(monkeypatch: pytest.Mo
         np.testing.assert_array_equal(now, then)
 
 
+@pytest.mark.slow
 def test_a_stretchy_cable_answers_like_the_implicit_equation_solved_by_bisection() -> None:
     declared, stiffness = puller(), 6e4
     piece = declared.element("spring.piece")

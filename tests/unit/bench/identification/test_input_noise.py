@@ -88,6 +88,7 @@ def test_another_record_of_the_bench_has_the_mean_of_the_colours() -> None:
     )
 
 
+@pytest.mark.long_cases("with the angle")
 @pytest.mark.parametrize(
     ("clause", "no_clause", "what"),
     [

@@ -157,7 +157,7 @@ CHAINS = {
 }
 
 
-@pytest.mark.long_cases("two latches")
+@pytest.mark.long_cases("delay", "two latches")
 @pytest.mark.parametrize(("sensors", "late"), CHAINS.values(), ids=list(CHAINS))
 def test_a_window_begins_at_the_state_behind_the_chain(sensors: dict[str, Sensor], late: float) -> None:
     found = refit(slide(**sensors), slide_records("log.reading", late), window=2.0)

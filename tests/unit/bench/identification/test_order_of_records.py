@@ -50,7 +50,7 @@ def loose() -> Assembly:
 SMALL, LARGE = record("small", 0.1 * GAP, 1e-3), record("large", 10.0 * GAP, 1.0)
 
 
-@pytest.mark.long_cases("large first")
+@pytest.mark.long_cases("small first", "large first")
 @pytest.mark.parametrize("order", [(SMALL, LARGE), (LARGE, SMALL)], ids=["small first", "large first"])
 def test_a_block_is_stiff_if_any_record_closes_the_gap(loose: Assembly, order: tuple[Record, ...]) -> None:
     bench = Bench(RecordSet(order, COLUMNS), blocks_of(flatten(loose), tuple(SIGNALS)))

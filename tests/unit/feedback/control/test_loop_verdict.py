@@ -136,6 +136,7 @@ def test_one_count_is_worth_the_tangent_stiffness(gentle: ClosedLoop) -> None:
     assert found[1] > 0.5 * (values[1] - values[0])
 
 
+@pytest.mark.slow
 def test_half_the_sample_rate_costs_the_loop_its_margin() -> None:
     gains = TorqueGains(proportional=60.0, velocity_bandwidth=45.0)
     slow, quick = stiffening(gains, sample_time=2e-3), stiffening(gains)
@@ -161,6 +162,7 @@ def test_a_load_that_is_missing_is_named(gentle: ClosedLoop) -> None:
         zero_torque(gentle, amplitude=0.1, frequencies=[1.0])
 
 
+@pytest.mark.slow
 def test_unstable_draws_are_counted() -> None:
     """Near the onset a part of the draws limit-cycles; the quantile says so instead of leaving them out."""
     from nlsdesign.components.assembly.deck_writer import declare

@@ -75,6 +75,7 @@ def test_forged_c_with_a_hash_written_anew_fails(run: Run, tmp_path: Path, writt
         assert "is not what the deck gives" in failing[0]["detail"]
 
 
+@pytest.mark.slow
 def test_code_is_verified_a_year_later_in_another_time_zone(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: Path
 ) -> None:

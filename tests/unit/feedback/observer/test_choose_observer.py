@@ -77,6 +77,7 @@ def test_without_an_encoder_the_cascade_is_taken(linear: FlatModel) -> None:
     assert "no encoder" in found.reason
 
 
+@pytest.mark.slow
 def test_a_machine_with_other_names_gets_the_same_observer(corrected: CorrectedDesign) -> None:
     other = renamed(declare(load_deck("austin2015_soft_spring")), nested)
     found = design_corrected_observer(flatten(other.assembly), duty=DUTY)

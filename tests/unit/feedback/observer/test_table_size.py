@@ -133,6 +133,7 @@ def test_other_motions_find_the_torque_error_that_is_stated(name, designs):
     assert 0.2 * stated.largest < largest < 1.3 * stated.largest
 
 
+@pytest.mark.slow
 def test_the_error_keeps_what_is_asked_and_the_table_is_not_much_finer():
     model = of_deck("austin2015_figure_consistent")
     sizes = []
@@ -146,6 +147,8 @@ def test_the_error_keeps_what_is_asked_and_the_table_is_not_much_finer():
     assert sizes[2] < sizes[0] / 3
 
 
+# Quicker: test_a_table_within_size_and_error_is_taken in unit/cli/test_flash.py
+@pytest.mark.slow
 def test_a_size_is_met_by_a_coarser_table_that_says_what_it_costs(designs):
     usual = designs["diagnosed"]
     design = design_observer_with_details(diagnosed(), grid=GridByTorqueError(-END, END, most_bytes=1500))
@@ -210,6 +213,7 @@ def test_the_cascade_is_stable_between_breakpoints(designs):
     assert found.worst[1] < 1.0
 
 
+@pytest.mark.slow
 def test_a_fixed_grid_says_its_torque_error_too():
     model = of_deck("austin2015_as_printed")
     ends = whole_contour(model)
