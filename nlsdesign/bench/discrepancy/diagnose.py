@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
@@ -122,17 +122,17 @@ def diagnose(
     case, base = case.read_as_declared(case.comparison.base(actuator))
     effects = known_effects() if catalogue is None else catalogue
     answer = _Answer(case, base, *_decided(case, base, effects, progress))
-    other = case.read_as_inferred_beside(answer.outcome, answer.decision)
+    other = answer.case.read_as_inferred_beside(answer.outcome, answer.decision)
     if other is not None:
         progress("reading inputs between their samples as they run beside what was found")
         anew = _answer_anew(other, effects, progress)
         answer = anew if answer.outcome.steps or anew.outcome.steps else answer
-    if answer.decision.verdict in ("named", "unknown", "undecidable") and not answer.outcome.complete:
-        other = answer.case.read_in_turn(effects, progress)
-        anew = _answer_anew(other, effects, progress) if other is not None else answer
-        answer = anew if anew.outcome.complete else answer
+    if answer.leaves_something:
+        turned = answer.case.read_in_turn(effects, progress)
+        anew = _answer_anew(turned, effects, progress) if turned is not None else answer
+        answer = answer if anew.leaves_something else anew
     progress("reading the held-out records")
-    return _verdict(*answer, records)
+    return _verdict(answer, records)
 
 
 _EARLY = 1.2
@@ -164,14 +164,23 @@ class _Case:
         before = self.excesses(base)
         if _leaves_nothing(before):
             return self, base
+        for other in self._readings_of_declared():
+            again = other.comparison.base(self.actuator)
+            after = other.excesses(again)
+            least = min(Change(self.criteria, before, after).shares.values(), default=1.0)
+            if _leaves_nothing(after) and least >= self.criteria.closed_share:
+                return other, again
+        return self, base
+
+    def _readings_of_declared(self) -> Iterator[_Case]:
+        """Yield the case as the declared machine asks, and with a motion shifted if that leaves nothing."""
         other = self._read_as(self.bench.inferred(self._blocks(self.actuator), no_terms), 0.0)
-        if other is None:
-            return self, base
-        again = other.comparison.base(self.actuator)
-        after = other.excesses(again)
-        least = min(Change(self.criteria, before, after).shares.values(), default=1.0)
-        explains = _leaves_nothing(after) and least >= self.criteria.closed_share
-        return (other, again) if explains else (self, base)
+        if other is not None:
+            yield other
+        for signal, early, beside in self._delayed():
+            closes = _leaves_nothing(early.excesses(beside))
+            if closes and (shifted := self._shifted(signal, early, beside)) is not None:
+                yield shifted
 
     def read_as_inferred_beside(self, outcome: Outcome, decision: _Decision) -> _Case | None:
         """Return the case with inputs read between their samples as records tell it beside what was found.
@@ -193,24 +202,42 @@ class _Case:
     def read_in_turn(
         self, effects: Sequence[EffectFunction], progress: Callable[[str], None]
     ) -> _Case | None:
-        """Return the case with a motion read as much earlier or later as leaves nothing beside some effect.
+        """Return the case with a motion read as much earlier or later as leaves nothing, if there is one.
 
-        Effects are searched for beside a delay of that motion, from as early on as two channels of one
-        recorder can be shifted. Nothing is returned where effects and shift leave something.
+        Effects are searched for beside a delay of that motion.
+        """
+        for signal, early, beside in self._delayed():
+            progress(f"looking for effects beside a shift of {signal}")
+            outcome = search(early.comparison, beside, effects, self.criteria, progress)
+            if outcome.complete:
+                return self._shifted(signal, early, outcome.last)
+        return None
+
+    def _delayed(self) -> Iterator[tuple[str, _Case, Hypothesis]]:
+        """Yield each motion that may be shifted, the case in which it is read too early, and its delay.
+
+        It is read earlier than two channels of one recorder can be shifted, so that what is left is a delay.
+        The hold of an input is told beside it: alone each would take from the other.
         """
         for signal in self.bench.shiftable:
-            progress(f"looking for effects beside a shift of {signal}")
-            early = self._with_records(self.bench.shifted(signal, _EARLY))
             delay = next((c for c in delays(self.actuator) if f"{c.location}.reading" == signal), None)
-            beside = delay and early.comparison.with_effect(early.comparison.base(self.actuator), delay)
-            if not (beside and delay):
+            early = self._with_records(self.bench.shifted(signal, _EARLY))
+            beside = early._beginning_with(delay) if delay else None
+            if not (delay and beside):
                 continue
-            outcome = search(early.comparison, beside, effects, self.criteria, progress)
-            step = min(record.step for record in self.bench.records.records)
-            late = _EARLY - outcome.last.values[delay.unknowns[0].name] / step
-            if outcome.complete and outcome.steps and abs(late) > _SAME_SAMPLING:
-                return self._with_records(self.bench.shifted(signal, late))
-        return None
+            read = early.bench.inferred(self._blocks(sourced(beside)), no_terms)
+            other = early._read_as(read, _SAME_SAMPLING)
+            again = other._beginning_with(delay) if other else None
+            yield (signal, other, again) if other and again else (signal, early, beside)
+
+    def _beginning_with(self, candidate: Candidate) -> Hypothesis | None:
+        return self.comparison.with_effect(self.comparison.base(self.actuator), candidate)
+
+    def _shifted(self, signal: str, early: _Case, beside: Hypothesis) -> _Case | None:
+        """Return the case with a motion read as late as its delay says, beyond how early it was read."""
+        step = min(record.step for record in self.bench.records.records)
+        late = _EARLY - beside.values[beside.added[0].unknowns[0].name] / step
+        return self._with_records(early.bench.shifted(signal, late)) if abs(late) > _SAME_SAMPLING else None
 
     def is_read_otherwise_beside(self, hypothesis: Hypothesis) -> bool:
         """Tell whether inputs run otherwise beside what is named so far than they were read.
@@ -252,6 +279,11 @@ class _Answer(NamedTuple):
     base: Hypothesis
     outcome: Outcome
     decision: _Decision
+
+    @property
+    def leaves_something(self) -> bool:
+        """Whether some block stays open for which no declared number or record is to blame."""
+        return not self.outcome.complete and self.decision.verdict in ("named", "unknown", "undecidable")
 
 
 def _answer_anew(
@@ -352,9 +384,8 @@ def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     return _Decision("data_suspect" if other.decides else verdict, (other.words,) if other.words else ())
 
 
-def _verdict(
-    case: _Case, base: Hypothesis, outcome: Outcome, decision: _Decision, records: RecordSet
-) -> Verdict:
+def _verdict(answer: _Answer, records: RecordSet) -> Verdict:
+    case, base, outcome, decision = answer
     verdict = decision.verdict
     base = base.as_written()
     better = outcome.last if verdict == "named" or outcome.last.released else base

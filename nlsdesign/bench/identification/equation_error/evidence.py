@@ -295,8 +295,9 @@ class Bench:
         """Return the records as measured, inputs read as here, and one motion earlier, with a remark."""
         known = {c.signal: c.sampling for c in self.records.columns if c.sampling}
         remark = remark_on_shift(self.records.column(signal), samples)
+        others = tuple(each for each in self.records.remarks if each.place != remark.place)
         read = self._as_measured[0].read_as({**known, signal: shifted(SAMPLED, samples)})
-        return replace(read, remarks=(*self.records.remarks, remark))
+        return replace(read, remarks=(*others, remark))
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None

@@ -31,7 +31,6 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
-from ....foundation.symbolic import dependence
 from ..filters import derivative
 from ..records.mapping import Column
 from ..records.measurement import Record, RecordSet
@@ -101,13 +100,10 @@ def _clock(motions: set[str], seen: Sequence[BlockNoise]) -> str:
     motions are shifted against it.
     """
     for each in seen:
-        model, s, drives = each.block.model, each.block.model.symbols(), each.block.drives
-        acts = dependence(ca.vertcat(s.output, s.derivative), s.input)
-        acting = [
-            drives[v.name]
-            for v, does in zip(model.inputs, acts.T, strict=True)
-            if does.any() and v.name in drives
-        ]
+        inputs, s, drives = each.block.model.inputs, each.block.model.symbols(), each.block.drives
+        column, driven = ca.vertcat(s.output, s.derivative), [v.name in drives for v in inputs]
+        acts = [d and ca.depends_on(column, s.input[i]) for i, d in enumerate(driven)]
+        acting = [drives[v.name] for v, does in zip(inputs, acts, strict=True) if does]
         accelerated = [d.signal for d in acting if d.order == 2]
         if accelerated and not motions >= {d.signal for d in acting}:
             return accelerated[0]
