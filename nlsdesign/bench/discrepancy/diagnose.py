@@ -29,6 +29,7 @@ from ..identification.equation_error.evidence import Bench
 from ..identification.equation_error.inferred_sampling import Missing, no_terms, plain_terms
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
+from ..identification.records.sampling import FORMS
 from .effects import Candidate
 from .effects import catalogue as known_effects
 from .effects.effect import EffectFunction
@@ -221,10 +222,12 @@ class _Case:
         """
         for signal in self.bench.shiftable:
             delay = next((c for c in delays(self.actuator) if f"{c.location}.reading" == signal), None)
-            early = self._with_records(self.bench.shifted(signal, _EARLY))
-            beside = early._beginning_with(delay) if delay else None
-            if not (delay and beside):
+            cases = (self._with_records(self.bench.shifted(signal, _EARLY, form)) for form in FORMS)
+            begun = [(case, case._beginning_with(delay)) for case in cases if delay]
+            fitted = [(case, beside) for case, beside in begun if beside is not None]
+            if not (delay and fitted):
                 continue
+            early, beside = min(fitted, key=lambda each: _chi2(each[0].excesses(each[1])))
             read = early.bench.inferred(self._blocks(sourced(beside)), no_terms)
             other = early._read_as(read, _SAME_SAMPLING)
             again = other._beginning_with(delay) if other else None
@@ -293,6 +296,10 @@ def _answer_anew(
     case = replace(case, settled=True)
     base = case.comparison.base(case.actuator)
     return _Answer(case, base, *_decided(case, base, catalogue, progress))
+
+
+def _chi2(left: Excesses) -> float:
+    return sum(each.chi2 for each in left.values())
 
 
 def _leaves_nothing(left: Excesses) -> bool:

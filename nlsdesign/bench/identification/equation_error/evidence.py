@@ -291,13 +291,22 @@ class Bench:
         records, read = self._as_measured
         return [c.signal for c in shiftable(records, list(read.values())) if c.sampling is SAMPLED]
 
-    def shifted(self, signal: str, samples: float) -> RecordSet:
-        """Return the records as measured, inputs read as here, and one motion earlier, with a remark."""
+    def shifted(self, signal: str, samples: float, form: Sampling | None = None) -> RecordSet:
+        """Return the records as measured, inputs read as here, and one motion earlier, with remarks.
+
+        ``form``: of the inputs of which nothing is said.
+        """
         known = {c.signal: c.sampling for c in self.records.columns if c.sampling}
-        remark = remark_on_shift(self.records.column(signal), samples)
-        others = tuple(each for each in self.records.remarks if each.place != remark.place)
+        asked = [c for c in self._as_measured[0].columns if form and c.sampling is None]
+        remarks = [remark_on_shift(self.records.column(signal), samples)]
+        for column in asked:
+            known[column.signal] = form or SAMPLED
+            text = f"is taken as {known[column.signal].name}: so it fits best beside the shift of {signal}"
+            remarks.append(Finding(f"column '{column.name}'", text))
+        places = [each.place for each in remarks]
+        others = [each for each in self.records.remarks if each.place not in places]
         read = self._as_measured[0].read_as({**known, signal: shifted(SAMPLED, samples)})
-        return replace(read, remarks=(*others, remark))
+        return replace(read, remarks=(*others, *remarks))
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None

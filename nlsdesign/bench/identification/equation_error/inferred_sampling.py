@@ -50,10 +50,6 @@ _LEAST = 0.05
 _WEIGHINGS = 2
 _EITHER_WAY = (0.5, -0.5)
 """Samples by which a signal is read later and earlier, for the slope of the residuals with a shift."""
-_SEARCHES = 2
-"""How often a shift of a motion is looked for around the last."""
-_SMALLEST = 0.1
-"""Samples from which a motion is shifted: less lies within what its shift and that of an input share."""
 _MOST = 1.1
 """Samples by which two channels can be shifted against each other: half a sample of each. A delay that is so
 little longer stands at the least one of its search, so no effect could be named for it."""
@@ -66,24 +62,25 @@ Missing: TypeAlias = Callable[[Block, Record, float], Iterator[Array]]
 
 
 def with_inferred_sampling(records: RecordSet, seen: Sequence[BlockNoise], missing: Missing) -> RecordSet:
-    """Return the records in which every channel runs between its samples as they tell best, with remarks.
+    """Return the records in which every input runs between its samples as they tell best, with remarks.
 
-    ``records``: inputs of which nothing is said have columns without a sampling. Of the motions of which
-    nothing is said the first is the clock of all others. ``missing``: what the blocks may lack.
+    ``records``: inputs of which nothing is said have columns without a sampling. ``missing``: what the blocks
+    may lack.
     """
     # What is declared to be what it was at its stamp, a load cell for instance, is not asked, nor is what was
     # inferred before.
     inputs = [c for c in records.columns if c.sampling is None or (c.declared and c.sampling in FORMS[1:])]
-    others = [c for c in shiftable(records, seen) if c.sampling is SAMPLED]
-    read, remarks = _inputs_read(records, inputs, seen, missing)
-    of_motions: list[Finding] = []
-    if missing is not plain_terms:
-        read, of_motions = _motions_read(read, others, seen, missing)
-    if of_motions:
-        unread = read.read_as({c.signal: c.sampling for c in inputs if c.sampling})
-        # As the motions were read as if nothing else were missing, plain terms have no say any more.
-        read, remarks = _inputs_read(unread, inputs, seen, missing, gated=False)
-    return replace(read, remarks=(*records.remarks, *remarks, *of_motions))
+    remarks = list(records.remarks)
+    for column in inputs:
+        declared = column.sampling
+        likelihood = _asked(records, seen, column.signal, missing, declared)
+        form, remark = declared or SAMPLED, ""
+        if likelihood:
+            form, remark = likelihood.beside(declared) if declared else likelihood.taken()
+        records = records.read_as({column.signal: form})
+        if remark:
+            remarks.append(Finding(f"column '{column.name}'", remark))
+    return replace(records, remarks=tuple(remarks))
 
 
 def shiftable(records: RecordSet, seen: Sequence[BlockNoise]) -> list[Column]:
@@ -108,58 +105,6 @@ def _clock(motions: set[str], seen: Sequence[BlockNoise]) -> str:
         if accelerated and not motions >= {d.signal for d in acting}:
             return accelerated[0]
     return min(motions, default="")
-
-
-def _inputs_read(
-    records: RecordSet,
-    columns: Sequence[Column],
-    seen: Sequence[BlockNoise],
-    missing: Missing,
-    *,
-    gated: bool = True,
-) -> tuple[RecordSet, list[Finding]]:
-    """Return the records with some columns read as they tell best, one after the other, and the remarks.
-
-    ``gated``: see :func:`_likelihood_of`.
-    """
-    remarks = []
-    for column in columns:
-        declared = column.sampling
-        likelihood = _asked(records, seen, column.signal, missing, declared, gated=gated)
-        form, remark = declared or SAMPLED, ""
-        if likelihood:
-            form, remark = likelihood.beside(declared) if declared else likelihood.taken()
-        records = records.read_as({column.signal: form})
-        if remark:
-            remarks.append(Finding(f"column '{column.name}'", remark))
-    return records, remarks
-
-
-def _motions_read(
-    records: RecordSet, columns: Sequence[Column], seen: Sequence[BlockNoise], missing: Missing
-) -> tuple[RecordSet, list[Finding]]:
-    """Return the records with some motions shifted against the first as they tell best, and the remarks.
-
-    Plain terms take all that tells it, so nothing is asked beside them.
-    """
-    remarks = []
-    for column in columns:
-        shift, error, asked = 0.0, math.inf, _asking(seen, column.signal)
-        for _ in range(_SEARCHES):
-            around = [shifted(SAMPLED, shift + by) for by in (0.0, *_EITHER_WAY)]
-            likelihood = _likelihood_of(
-                around, asked, records, signal=column.signal, missing=missing, gated=False
-            )
-            if likelihood is None:
-                break
-            shift, error = shift + likelihood.shift, likelihood.error
-            if abs(shift) > _MOST:
-                break
-        if not _SMALLEST <= abs(shift) <= _MOST or 0.5 * (shift / error) ** 2 < _NO_FORM:
-            continue
-        records = records.read_as({column.signal: shifted(SAMPLED, shift)})
-        remarks.append(remark_on_shift(column, shift))
-    return records, remarks
 
 
 def remark_on_shift(column: Column, shift: float) -> Finding:
@@ -262,20 +207,18 @@ def _asked(
     signal: str,
     missing: Missing,
     declared: Sampling | None,
-    *,
-    gated: bool,
 ) -> _Likelihood | None:
     """Return how likely each form of a signal is by the blocks that it drives; nothing where none tells.
 
     ``declared``: the form, where one is.
     """
     asked = _asking(seen, signal)
-    likelihood = _likelihood_of(_FORMS, asked, records, signal=signal, missing=missing, gated=gated)
+    likelihood = _likelihood_of(_FORMS, asked, records, signal=signal, missing=missing)
     if likelihood is None or likelihood.loss(form := likelihood.likeliest) < _NO_FORM:
         return likelihood
     # The residuals are no straight line over half a sample: a shift is looked for anew around itself.
     around = [shifted(declared or form, likelihood.shift + by) for by in (0.0, *_EITHER_WAY)]
-    again = _likelihood_of(around, asked, records, signal=signal, missing=missing, gated=gated)
+    again = _likelihood_of(around, asked, records, signal=signal, missing=missing)
     return again and likelihood.moved(again)
 
 
@@ -286,19 +229,18 @@ def _likelihood_of(
     *,
     signal: str,
     missing: Missing,
-    gated: bool,
 ) -> _Likelihood | None:
     """Return how likely three forms of a signal are, of which two are half a sample off the first.
 
-    ``gated``: whether an answer without plain terms counts only if the one with them allows it.
+    An answer without plain terms counts only if the one with them allows it.
     """
-    ways, plainly = [{signal: form} for form in forms], plain_terms if gated else missing
+    ways = [{signal: form} for form in forms]
     try:
-        rows = [rows_of(each, records.deciding, ways, plainly) for each in asked]
+        rows = [rows_of(each, records.deciding, ways, plain_terms) for each in asked]
     except ConvergenceError:
         return None  # a fit tells that the declared numbers give no response
     first = _likelihood(rows) if rows else None
-    if first is None or missing is plainly:
+    if first is None or missing is plain_terms:
         return first
     others = zip(asked, rows, strict=True)
     sharper = _likelihood(
