@@ -77,7 +77,7 @@ _STEP = 2.0**0.25
 _BLURRED = 0.05
 """Mean square of what the span of a rate takes from a residual, in that of its noise, up to which it is let
 pass: a block is open from a mean square of about 1.2 on."""
-_LACKED = 0.2
+_LACKED = 0.05
 """Share of the effort of springs and inertias that a damping or drag may have that is not declared."""
 _WIDTHS = 60
 """Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""

@@ -16,7 +16,9 @@ is held within a part of a sample. Such a lag is inferred too.
 
 Channels of one recorder can also be shifted against each other by a part of a sample, as where they are
 sampled in turn. Up to half a sample of each of the two, such a shift is a number without a meaning of its
-own: it is inferred in the same way, and stated. A delay beyond that is left for effects to explain.
+own. That of an input is inferred in the same way, and stated; that of a motion, which moves all numbers of a
+machine, is fitted with them (:mod:`nlsdesign.bench.discrepancy.diagnose`). A delay beyond that is left for
+effects to explain.
 """
 
 from __future__ import annotations

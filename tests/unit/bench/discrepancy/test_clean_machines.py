@@ -79,6 +79,16 @@ def test_a_span_of_rates_leaves_what_a_damped_mode_does(
     assert filters["axis_1"].span > 0.15, "behind the noise of the current nothing of it is seen"
 
 
+def test_a_span_of_rates_leaves_what_a_damping_does_that_nobody_declared(tmp_path: Path) -> None:
+    """A span of a third of a period took a hundredth of the rate: 2.4 times the noise was left of the load."""
+    write_kind_case(tmp_path, "elastic_joint", ("spring_damping",), 1.0, 1286)
+    verdict = diagnose(*opened(tmp_path), catalogue=(effects.spring_damping, effects.second_relaxation))
+    assert [(each.name, verdict.complete) for each in verdict.effects] == [("spring_damping", True)]
+    gaps = [each for each in verdict.gaps if each.block == "table_side"]
+    assert gaps
+    assert max(each.after / each.noise_floor for each in gaps) < 1.1
+
+
 def test_a_shift_that_explains_a_third_is_no_answer(tmp_path: Path) -> None:
     """Behind coarse counts friction is little beyond noise; a shift takes a third of it, and hid the name."""
     write_kind_case(tmp_path, "belt_axis", ("load_dependent_friction",), 1.0, 1120, condition="coarse")

@@ -15,7 +15,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.linalg import expm
 
-from nlsdesign.bench.discrepancy import Verdict, diagnose
+from nlsdesign.bench.discrepancy import Verdict, diagnose, effects
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
 from nlsdesign.bench.identification.equation_error.evidence import Bench
@@ -277,16 +277,36 @@ def test_a_hold_declared_beside_a_lag_of_a_whole_sample_stays_declared(tmp_path:
     assert forms(deck, records)["ammeter"] is HELD
 
 
-@pytest.mark.parametrize("backward", [False, True])
-def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path, backward: bool) -> None:
-    """The load's encoder is read 0.4 of a sample after the motor's; the machine lacks nothing."""
-    deck, tables = _AXIS.replace("2e-5", "5e-4"), [axis(seed, late=0.4, count=5e-4) for seed in range(5)]
+@pytest.mark.parametrize(("count", "backward"), [(5e-4, False), (5e-4, True), (1e-4, False), (2e-5, False)])
+def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path, count: float, backward: bool) -> None:
+    """The load's encoder is read 0.4 of a sample after the motor's; the machine lacks nothing.
+
+    With fine counts a second relaxation was named, or nothing could be decided; with the load's encoder in
+    front of the motor's too.
+    """
+    deck, tables = (
+        _AXIS.replace("2e-5", f"{count:g}"),
+        [axis(seed, late=0.4, count=count) for seed in range(5)],
+    )
     found = diagnose(*bench(tmp_path, deck, tables, backward=backward))
     assert found.verdict == "none"
     remark = next(text for text in found.remarks if "load_encoder" in text)
     late = re.search(r"is read about (0\.\d+) of a sample later", remark)
     assert late, remark
     assert float(late[1]) == pytest.approx(0.4, abs=0.02)
+
+
+def test_encoders_that_are_sampled_in_turn_hide_no_damping(tmp_path: Path) -> None:
+    """The belt's damping is missing, and the load's encoder is read 0.6 of a sample before the motor's."""
+    whole = _AXIS.replace("2e-5", "1e-4")
+    deck = whole[: whole.index("[loss]")] + whole[whole.index("[encoder]") :]
+    rivals = (effects.spring_damping, effects.quadratic_drag, effects.second_relaxation)
+    tables = [axis(seed, late=-0.6, count=1e-4) for seed in range(5)]
+    found = diagnose(*bench(tmp_path, deck, tables), catalogue=rivals)
+    assert [(each.name, found.complete) for each in found.effects] == [("spring_damping", True)]
+    (damping,) = (value for value, *_ in found.effects[0].parameters.values())
+    assert damping == pytest.approx(0.03, rel=0.02)
+    assert any("of a sample earlier, as where channels are sampled in turn" in text for text in found.remarks)
 
 
 @pytest.mark.parametrize("late", [-0.6, 0.0, 0.3, 0.9])
