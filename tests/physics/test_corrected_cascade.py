@@ -71,7 +71,6 @@ def test_factors_of_a_linear_spring_tell_what_is_derived_by_hand() -> None:
     assert 0.0 <= found.unseen[0, 0] <= left * 1.001
 
 
-@pytest.mark.slow
 def test_an_exact_deck_costs_nothing_whatever_the_current_meter_does(
     bench: tuple[Course, Prior, dict[str, Observer]],
 ) -> None:

@@ -501,6 +501,8 @@ def _blur(block: Block, record: Record, noise: Noise, filters: Filters) -> Array
     """
     step, span, course = record.step, filters.span, _course(block, record, filters)
     floor = noise_floor(block, record, noise, filters, course)
+    if not len(floor.sigma):
+        return np.zeros((3, 0))
     of_noise = float(np.linalg.norm(blur_weights(filters.width, step, span)))
     efforts = np.zeros((3, len(record.trace)))
     rates, taken, own = np.zeros_like(efforts), np.zeros_like(efforts), np.zeros((3, len(floor.sigma)))

@@ -102,7 +102,6 @@ def clipped(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
-@pytest.mark.slow
 def test_files_of_an_earlier_run_do_not_stay_beside_a_verdict_that_has_none(
     rig: Assembly, clean: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

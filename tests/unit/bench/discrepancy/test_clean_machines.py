@@ -80,7 +80,7 @@ def test_a_span_of_rates_leaves_what_a_damped_mode_does(
 
 
 def test_a_span_of_rates_leaves_what_a_damping_does_that_nobody_declared(tmp_path: Path) -> None:
-    """A span of a third of a period took a hundredth of the rate: 2.4 times the noise was left of the load."""
+    """A span of a third of a period took a hundredth of the rate, and 2.4 times the noise was left."""
     write_kind_case(tmp_path, "elastic_joint", ("spring_damping",), 1.0, 1286)
     verdict = diagnose(*opened(tmp_path), catalogue=(effects.spring_damping, effects.second_relaxation))
     assert [(each.name, verdict.complete) for each in verdict.effects] == [("spring_damping", True)]

@@ -41,7 +41,6 @@ def test_an_eccentric_disc_is_told_at_its_own_encoder(seed: int, condition: str,
     assert condition == "coarse" or disc.aliases == ()
 
 
-@pytest.mark.slow
 def test_an_eccentric_disc_shows_in_the_balance_of_a_direct_drive(tmp_path: Path) -> None:
     rivals = effects.angle_sensor_eccentricity, effects.torque_ripple
     verdict = diagnosed(tmp_path, "direct_drive", "angle_sensor_eccentricity", 1195, "coarse", *rivals)
@@ -49,8 +48,6 @@ def test_an_eccentric_disc_shows_in_the_balance_of_a_direct_drive(tmp_path: Path
     assert verdict.complete
 
 
-# Quicker: one class of several places in test_which_friction.py
-@pytest.mark.slow
 def test_the_zero_of_either_of_two_encoders_is_one_class(tmp_path: Path) -> None:
     rivals = (effects.angle_sensor_bias,)
     verdict = diagnosed(tmp_path, "belt_axis", "angle_sensor_bias", 1196, "plain", *rivals)

@@ -44,7 +44,6 @@ def test_sharp_friction_in_slow_motion_is_coulombs(body: str, tmp_path: Path) ->
     assert found.complete
 
 
-@pytest.mark.slow
 def test_friction_that_falls_with_speed_keeps_its_numbers(tmp_path: Path) -> None:
     found = named(Machine(friction=falling, size=0.25, quickest=0.5), tmp_path)
     (effect,) = found.effects

@@ -277,7 +277,15 @@ def test_a_hold_declared_beside_a_lag_of_a_whole_sample_stays_declared(tmp_path:
     assert forms(deck, records)["ammeter"] is HELD
 
 
-@pytest.mark.parametrize(("count", "backward"), [(5e-4, False), (5e-4, True), (1e-4, False), (2e-5, False)])
+@pytest.mark.parametrize(
+    ("count", "backward"),
+    [
+        pytest.param(5e-4, False, marks=pytest.mark.slow),
+        (5e-4, True),
+        (1e-4, False),
+        pytest.param(2e-5, False, marks=pytest.mark.slow),
+    ],
+)
 def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path, count: float, backward: bool) -> None:
     """The load's encoder is read 0.4 of a sample after the motor's; the machine lacks nothing.
 
