@@ -13,9 +13,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 from ...components import Assembly
 from ...components.assembly.deck_writer import write_deck
@@ -29,7 +29,6 @@ from ..identification.equation_error.evidence import Bench
 from ..identification.equation_error.inferred_sampling import Missing, no_terms, plain_terms
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
-from ..identification.records.sampling import FORMS
 from .effects import Candidate
 from .effects import catalogue as known_effects
 from .effects.effect import EffectFunction
@@ -142,6 +141,10 @@ _SAME_SAMPLING = 0.1
 """Samples by which an input may be read otherwise without a second look at everything."""
 
 
+_Delayed: TypeAlias = "tuple[str, _Case, Hypothesis]"
+"""A motion, the case in which it is read too early, and its delay fitted."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Case:
     """What a decision rests on: the declared assembly, the records that choose, and the rule."""
@@ -151,6 +154,7 @@ class _Case:
     comparison: Comparison
     criteria: Criteria
     settled: bool = False  # whether inputs are read as they run beside what was found already
+    begun: list[_Delayed] = field(default_factory=list, repr=False)  # what _delayed gives, once it was asked
 
     def excesses(self, hypothesis: Hypothesis) -> Excesses:
         """Return the excess of each block on all samples."""
@@ -214,15 +218,17 @@ class _Case:
                 return self._shifted(signal, early, outcome.last)
         return None
 
-    def _delayed(self) -> Iterator[tuple[str, _Case, Hypothesis]]:
-        """Yield each motion that may be shifted, the case in which it is read too early, and its delay.
+    def _delayed(self) -> list[_Delayed]:
+        """Return each motion that may be shifted, the case in which it is read too early, and its delay.
 
         It is read earlier than two channels of one recorder can be shifted, so that what is left is a delay.
         The hold of an input is told beside it: alone each would take from the other.
         """
-        for signal in self.bench.shiftable:
+        for signal in () if self.begun else self.bench.shiftable:
             delay = next((c for c in delays(self.actuator) if f"{c.location}.reading" == signal), None)
-            cases = (self._with_records(self.bench.shifted(signal, _EARLY, form)) for form in FORMS)
+            cases = (
+                self._with_records(self.bench.shifted(signal, _EARLY, form)) for form in self.bench.forms
+            )
             begun = [(case, case._beginning_with(delay)) for case in cases if delay]
             fitted = [(case, beside) for case, beside in begun if beside is not None]
             if not (delay and fitted):
@@ -231,7 +237,8 @@ class _Case:
             read = early.bench.inferred(self._blocks(sourced(beside)), no_terms)
             other = early._read_as(read, _SAME_SAMPLING)
             again = other._beginning_with(delay) if other else None
-            yield (signal, other, again) if other and again else (signal, early, beside)
+            self.begun.append((signal, other, again) if other and again else (signal, early, beside))
+        return self.begun
 
     def _beginning_with(self, candidate: Candidate) -> Hypothesis | None:
         return self.comparison.with_effect(self.comparison.base(self.actuator), candidate)

@@ -30,7 +30,7 @@ from ....simulation import Trace
 from ..filters import Smoothing, derivative, every, kernel
 from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
-from ..records.sampling import SAMPLED, Sampling, shifted
+from ..records.sampling import FORMS, SAMPLED, Sampling, shifted
 from .block import Block, BlockNoise, Filters, NoiseFloor
 from .block_noise import noise_of_blocks, slowest_rate
 from .block_response import DrivenBlock, Samples
@@ -290,6 +290,11 @@ class Bench:
         """Measured motions that may be sampled earlier or later than the one that the inputs drive."""
         records, read = self._as_measured
         return [c.signal for c in shiftable(records, list(read.values())) if c.sampling is SAMPLED]
+
+    @property
+    def forms(self) -> Sequence[Sampling]:
+        """Ways in which inputs of which nothing is said may run; a single one where all is said."""
+        return FORMS if any(c.sampling is None for c in self._as_measured[0].columns) else FORMS[:1]
 
     def shifted(self, signal: str, samples: float, form: Sampling | None = None) -> RecordSet:
         """Return the records as measured, inputs read as here, and one motion earlier, with remarks.
