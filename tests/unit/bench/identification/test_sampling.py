@@ -278,15 +278,18 @@ def test_a_hold_declared_beside_a_lag_of_a_whole_sample_stays_declared(tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("count", "backward"),
+    ("count", "backward", "between"),
     [
-        pytest.param(5e-4, False, marks=pytest.mark.slow),
-        (5e-4, True),
-        (1e-4, False),
-        pytest.param(2e-5, False, marks=pytest.mark.slow),
+        pytest.param(5e-4, False, None, marks=pytest.mark.slow),
+        (5e-4, True, None),
+        (1e-4, False, "held"),
+        pytest.param(1e-4, False, None, marks=pytest.mark.slow),
+        pytest.param(2e-5, False, None, marks=pytest.mark.slow),
     ],
 )
-def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path, count: float, backward: bool) -> None:
+def test_encoders_that_are_sampled_in_turn_are_no_fault(
+    tmp_path: Path, count: float, backward: bool, between: str | None
+) -> None:
     """The load's encoder is read 0.4 of a sample after the motor's; the machine lacks nothing.
 
     With fine counts a second relaxation was named, or nothing could be decided; with the load's encoder in
@@ -296,7 +299,7 @@ def test_encoders_that_are_sampled_in_turn_are_no_fault(tmp_path: Path, count: f
         _AXIS.replace("2e-5", f"{count:g}"),
         [axis(seed, late=0.4, count=count) for seed in range(5)],
     )
-    found = diagnose(*bench(tmp_path, deck, tables, backward=backward))
+    found = diagnose(*bench(tmp_path, deck, tables, between, backward=backward))
     assert found.verdict == "none"
     remark = next(text for text in found.remarks if "load_encoder" in text)
     late = re.search(r"is read about (0\.\d+) of a sample later", remark)
