@@ -388,8 +388,18 @@ def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     if wrong:
         other = other_numbers(case.comparison, base, base, case.criteria)
         return _Decision("data_suspect", (other.words if other.decides else wrong,))
-    if not any(e.open for e in case.excesses(base).values()):
+    open_blocks = {name for name, each in case.excesses(base).items() if each.open}
+    if not open_blocks:
         verdict = "none"
+    elif open_blocks == {DECLARED} and not outcome.steps:
+        far = ", ".join(_far_numbers(base)) or "together, none of them alone"
+        return _Decision(
+            "data_suspect",
+            (
+                f"declared numbers are probably wrong, for with others nothing is "
+                f"left: {far}; measure one of them, or widen its spread in the deck",
+            ),
+        )
     else:
         undecided = any(each.undecided for each in outcome.tried)
         verdict = "named" if outcome.steps else "undecidable" if undecided else "unknown"
@@ -425,7 +435,7 @@ def _verdict(answer: _Answer, records: RecordSet) -> Verdict:
     return Verdict(
         verdict,
         tuple(_named(judged, better, step, place, left) for place, step in enumerate(steps)),
-        ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
+        _strained(before[DECLARED], after[DECLARED], better)
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
         gaps_of(base, better, every),
@@ -510,15 +520,23 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     return (*sentences, *more_excitation(fits))
 
 
-def _strained(before: Excess, after: Excess, better: Hypothesis) -> str:
-    scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
-    far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
-    sides = (f"{n} {abs(scores[n]):.1f} {'above' if scores[n] > 0.0 else 'below'}" for n in far)
-    which = f": {', '.join(sides)}" if far else ""
+def _strained(before: Excess, after: Excess, better: Hypothesis) -> tuple[str, ...]:
+    """Return how far refitted numbers lie from their declaration, where all are far together or one is."""
+    far = _far_numbers(better)
+    if not (before.open or far):
+        return ()
+    which = f": {', '.join(far)}" if far else ""
     return (
         f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
-        f"{after.fit:.1f} after{which}"
+        f"{after.fit:.1f} after{which}",
     )
+
+
+def _far_numbers(hypothesis: Hypothesis) -> list[str]:
+    """Return the refitted numbers that are far from what is declared, and how many standard deviations."""
+    scores = {n: z for f in hypothesis.fits.values() for n, z in f.prior_z_scores().items()}
+    far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
+    return [f"{n} {abs(scores[n]):.1f} {'above' if scores[n] > 0.0 else 'below'}" for n in far]
 
 
 def _not_predicted(key: Key) -> str:
