@@ -36,13 +36,14 @@ from .effects.sensing import delays
 from .fitting import Key
 from .planning.experiment import Experiment, next_experiment, write_command
 from .reporting.advice import advice, more_excitation, where_they_differ
-from .reporting.named_effect import EffectEvidence
+from .reporting.named_effect import STRAINED, EffectEvidence
 from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
 from .screening.causality import lagging_forces, modes_too_quick
 from .screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from .screening.wrong_numbers import (
+    far_numbers,
     is_explained_by_numbers,
     other_numbers,
     out_of_reach,
@@ -61,8 +62,6 @@ from .tearing import blocks_of
 _CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
 """So many of each are shown; a longer list is not read."""
-_FAR, _MOST_FAR = 2.0, 4
-"""Standard deviations of its spread from which a refitted number is called by its name, and how many are."""
 
 
 @dataclass(frozen=True)
@@ -392,14 +391,9 @@ def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     if not open_blocks:
         verdict = "none"
     elif open_blocks == {DECLARED} and not outcome.steps:
-        far = ", ".join(_far_numbers(base)) or "together, none of them alone"
-        return _Decision(
-            "data_suspect",
-            (
-                f"declared numbers are probably wrong, for with others nothing is "
-                f"left: {far}; measure one of them, or widen its spread in the deck",
-            ),
-        )
+        far = ", ".join(far_numbers(base)) or "together, none of them alone"
+        why = f"{STRAINED}: {far}; measure one of them, or widen its spread in the deck"
+        return _Decision("data_suspect", (why,))
     else:
         undecided = any(each.undecided for each in outcome.tried)
         verdict = "named" if outcome.steps else "undecidable" if undecided else "unknown"
@@ -522,7 +516,7 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
 
 def _strained(before: Excess, after: Excess, better: Hypothesis) -> tuple[str, ...]:
     """Return how far refitted numbers lie from their declaration, where all are far together or one is."""
-    far = _far_numbers(better)
+    far = far_numbers(better)
     if not (before.open or far):
         return ()
     which = f": {', '.join(far)}" if far else ""
@@ -530,13 +524,6 @@ def _strained(before: Excess, after: Excess, better: Hypothesis) -> tuple[str, .
         f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
         f"{after.fit:.1f} after{which}",
     )
-
-
-def _far_numbers(hypothesis: Hypothesis) -> list[str]:
-    """Return the refitted numbers that are far from what is declared, and how many standard deviations."""
-    scores = {n: z for f in hypothesis.fits.values() for n, z in f.prior_z_scores().items()}
-    far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
-    return [f"{n} {abs(scores[n]):.1f} {'above' if scores[n] > 0.0 else 'below'}" for n in far]
 
 
 def _not_predicted(key: Key) -> str:

@@ -151,6 +151,7 @@ def test_a_wrong_number_that_a_refit_takes_is_mentioned(tmp_path: Path) -> None:
         wrong = declared.with_values({inertia: factor * declared.quantities()[inertia].number})
         verdict = diagnose(wrong, records, catalogue=())
         assert verdict.verdict == expected
+        assert (verdict.headline() == "Deck and records contradict each other") == (factor > 1.0)
         assert any(f"{inertia} 2." in words and "below" in words for words in verdict.findings) == (
             factor > 1.0
         )
