@@ -210,7 +210,7 @@ def bench(
             f'signal = "{name}.reading"',
             f'unit = "{"A" if name == "ammeter" else "rad"}"',
         ]
-    lines += [f'between_samples = "{between}"'] if between else []
+        lines += [f'between_samples = "{between}"'] if between and name == "ammeter" else []
     (folder / "records.toml").write_text("\n".join(lines), encoding="utf-8")
     for k, table in enumerate(tables):
         np.savetxt(
