@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import erf, exp, pi, sin, sqrt
 
-from .bench import prox
+from .bench import plain, prox
 
 STEP = 1.0e-4  # s
 
@@ -83,8 +83,8 @@ class TwoBodies:
     """The plant in time: `advance` takes the effort of each step, and the state is there to be read."""
 
     def __init__(self, plant: Plant, missing: Missing, step: float = STEP) -> None:
-        self.plant, self.missing, self.step = plant, missing, step
-        self.place = self.load_place = plant.hanging_angle
+        self.plant, self.missing, self.step = plain(plant), plain(missing), step
+        self.place = self.load_place = self.plant.hanging_angle
         self.speed = self.load_speed = 0.0
         self.tail_place, self.tail_speed = self.load_place, 0.0
 

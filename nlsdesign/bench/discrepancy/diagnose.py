@@ -277,7 +277,7 @@ class _Case:
         sizes = typical_sizes(self.actuator, bench.records)
         return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
 
-    def _blocks(self, assembly: Assembly) -> list[Block]:
+    def _blocks(self, assembly: Assembly) -> Sequence[Block]:
         return blocks_of(flatten(assembly), self.bench.records.signals)
 
 

@@ -455,10 +455,13 @@ def _quiet(record: Record, motions: Mapping[str, float]) -> tuple[list[slice], l
     least = max(_LEAST_SAMPLES, n // _MOST_STRETCHES)
     result, first = [], 0
     while first < n - least:
-        behind = min(
-            first + int(np.argmax(np.append(np.abs(each[first:] - each[first]) > _STILL, True)))
-            for each in counts
-        )
+        for end in (first + least, n):  # most stretches are left soon
+            behind = min(
+                first + int(np.argmax(np.append(np.abs(each[first:end] - each[first]) > _STILL, True)))
+                for each in counts
+            )
+            if behind < end:
+                break
         if behind - first >= least:
             result.append(slice(first + (behind - first) // 3, behind))
             first = behind
