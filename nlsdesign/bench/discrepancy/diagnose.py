@@ -273,7 +273,7 @@ class _Case:
         return self._with_records(records)
 
     def _with_records(self, records: RecordSet) -> _Case:
-        bench = Bench(records, self._blocks(self.actuator))
+        bench = self.bench.read_otherwise(records)
         sizes = typical_sizes(self.actuator, bench.records)
         return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
 
