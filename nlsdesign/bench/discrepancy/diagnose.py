@@ -232,7 +232,9 @@ class _Case:
             fitted = [(case, beside) for case, beside in begun if beside is not None]
             if not (delay and fitted):
                 continue
-            early, beside = min(fitted, key=lambda each: _chi2(each[0].excesses(each[1])))
+            early, beside = min(
+                fitted, key=lambda each: sum(e.chi2 for e in each[0].excesses(each[1]).values())
+            )
             read = early.bench.inferred(self._blocks(sourced(beside)), no_terms)
             other = early._read_as(read, _SAME_SAMPLING)
             again = other._beginning_with(delay) if other else None
@@ -302,10 +304,6 @@ def _answer_anew(
     case = replace(case, settled=True)
     base = case.comparison.base(case.actuator)
     return _Answer(case, base, *_decided(case, base, catalogue, progress))
-
-
-def _chi2(left: Excesses) -> float:
-    return sum(each.chi2 for each in left.values())
 
 
 def _leaves_nothing(left: Excesses) -> bool:

@@ -84,7 +84,7 @@ def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
 def compiler() -> list[str]:
     """Return the command of the C compiler."""
     # The program itself: ``python -m ziglang`` would start Python only to find it.
-    return [str(_compilers_folder() / "zig"), "cc"]
+    return [str(_compilers_folder() / ("zig.exe" if sys.platform == "win32" else "zig")), "cc"]
 
 
 def _compilers_folder() -> Path:
