@@ -83,11 +83,6 @@ def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
 
 def compiler() -> list[str]:
     """Return the command of the C compiler."""
-    # The program itself: ``python -m ziglang`` would start Python only to find it.
-    return [str(_compilers_folder() / "zig"), "cc"]
-
-
-def _compilers_folder() -> Path:
     wheel = find_spec("ziglang")
     if wheel is None or wheel.origin is None:
         raise ExportError(
@@ -95,7 +90,8 @@ def _compilers_folder() -> Path:
             "is not installed",
             next_step="pip install 'nlsdesign[export]' (the wheel ziglang)",
         )
-    return Path(wheel.origin).parent
+    # The program itself: ``python -m ziglang`` would start Python only to find it.
+    return [str(Path(wheel.origin).with_name("zig")), "cc"]
 
 
 def cache_folder() -> Path:
@@ -161,7 +157,7 @@ def compile_library(
         # Arguments that omit the start-up code of Windows libraries, see the template for the reason.
         start = target.parent / "windows.c"
         start.write_text(template("windows.c"), encoding="utf-8")
-        headers = _compilers_folder() / "lib" / "libc" / "include" / "any-windows-any"
+        headers = Path(compiler()[0]).parent / "lib" / "libc" / "include" / "any-windows-any"
         arguments += ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]
     for folder in include:
         arguments += ["-isystem", folder]
