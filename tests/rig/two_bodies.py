@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, pi, sin
+from math import erf, exp, pi, sin, sqrt
 
 from .bench import plain, prox
 
@@ -97,8 +97,9 @@ class TwoBodies:
                 return 0.0, 0.0
             lead = lead - half if lead > 0.0 else lead + half
         stiffness = plant.stiffness
-        if missing.soft_centre:
-            stiffness *= 1.0 - missing.soft_centre * exp(-((lead / missing.soft_width) ** 2))
+        if missing.soft_centre:  # the integral of a stiffness that lacks a share s·exp(−(x/w)²)
+            width = missing.soft_width
+            lead -= missing.soft_centre * 0.5 * sqrt(pi) * width * erf(lead / width)
         if missing.stiffness_wave:
             stiffness *= 1.0 + missing.stiffness_wave * sin(2.0 * place + missing.wave_phase)
         return stiffness * lead, plant.spring_damping

@@ -83,6 +83,11 @@ def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
 
 def compiler() -> list[str]:
     """Return the command of the C compiler."""
+    # The program itself: ``python -m ziglang`` would start Python only to find it.
+    return [str(_compilers_folder() / ("zig.exe" if sys.platform == "win32" else "zig")), "cc"]
+
+
+def _compilers_folder() -> Path:
     wheel = find_spec("ziglang")
     if wheel is None or wheel.origin is None:
         raise ExportError(
@@ -90,8 +95,7 @@ def compiler() -> list[str]:
             "is not installed",
             next_step="pip install 'nlsdesign[export]' (the wheel ziglang)",
         )
-    # The program itself: ``python -m ziglang`` would start Python only to find it.
-    return [str(Path(wheel.origin).with_name("zig")), "cc"]
+    return Path(wheel.origin).parent
 
 
 def cache_folder() -> Path:
@@ -157,7 +161,7 @@ def compile_library(
         # Arguments that omit the start-up code of Windows libraries, see the template for the reason.
         start = target.parent / "windows.c"
         start.write_text(template("windows.c"), encoding="utf-8")
-        headers = Path(compiler()[0]).parent / "lib" / "libc" / "include" / "any-windows-any"
+        headers = _compilers_folder() / "lib" / "libc" / "include" / "any-windows-any"
         arguments += ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]
     for folder in include:
         arguments += ["-isystem", folder]

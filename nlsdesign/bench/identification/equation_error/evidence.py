@@ -276,6 +276,11 @@ class Bench:
             sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
         )
 
+    def read_otherwise(self, records: RecordSet) -> Bench:
+        """Return the same records, read otherwise between their samples, behind the filters chosen here."""
+        filters = {name: each.filters for name, each in self._as_measured[1].items()}
+        return Bench(records, self._blocks, filters=filters)
+
     def inferred(self, blocks: Sequence[Block], missing: Missing = plain_terms) -> RecordSet:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.
 
