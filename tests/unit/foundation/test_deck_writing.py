@@ -94,6 +94,8 @@ def test_decks_of_the_project_come_back_equal(name: str) -> None:
     assert round_trip(made) == made
 
 
+ANY = st.characters(exclude_categories=["Cs"])
+"""What UTF-8 can write, as characters are by default; but that takes three seconds to list."""
 units = st.sampled_from(["N/m", "kN/m", "N/mm", "mN/m", "N/cm", "kg/s^2", "MN/m"])
 
 
@@ -101,13 +103,10 @@ units = st.sampled_from(["N/m", "kN/m", "N/mm", "mN/m", "N/cm", "kg/s^2", "MN/m"
     st.floats(min_value=1e-5, max_value=1e11),
     units,
     st.floats(0.0, 2.0),
-    st.text(min_size=1).filter(str.strip),
+    st.text(ANY, min_size=1).filter(str.strip),
 )
 def test_any_number_comes_back_bit_for_bit(value: float, unit: str, spread: float, source: str) -> None:
     """Also where no float times the factor of the unit is the value: then more digits are written."""
-    source = source.encode("utf-8", "ignore").decode() or "bench"
-    if not source.strip():
-        source = "bench"
     given_number = Quantity(value, unit, source, spread)
     made = assembly(
         "one", point=Driven(domain=TRANSLATION), spring=tie(Spring(stiffness=given_number), "point")
