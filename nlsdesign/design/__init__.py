@@ -33,6 +33,7 @@ from .drawing.machined_cam import (
     FerruleSeat,
     MachinedCam,
     MachinedOneSidedCam,
+    MachinedPair,
     MachinedRollerCam,
     MachinedTwoSidedCam,
 )
@@ -136,6 +137,7 @@ __all__ = [
     "LimitState",
     "MachinedCam",
     "MachinedOneSidedCam",
+    "MachinedPair",
     "MachinedRollerCam",
     "MachinedTwoSidedCam",
     "MaximumCableTension",

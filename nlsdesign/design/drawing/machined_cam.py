@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import MM, Quantity, quantity
 from ..curves.numbers import in_si, plain
-from ..statics.contour import STRAIGHT, Contour, RollerContour
+from ..statics.contour import STRAIGHT, Contour, PairContour, RollerContour, RollingContour
 from .arc_path import ArcPath, biarc, joined
 from .cam_outline import (
     Contours,
@@ -159,12 +159,13 @@ class ClampScrew:
 
 
 class DrawnCam(NamedTuple):
-    """What is drawn of one kind of cam: outlines, holes but those of the bolts, cables or ways, rollers."""
+    """What is drawn of a cam: outlines, holes but those of the bolts, cables or ways, rollers, partners."""
 
     outlines: list[ArcPath]
     holes: list[Hole]
     cables: list[ArcPath]
     rollers: tuple[Hole, ...] = ()
+    partners: tuple[ArcPath, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,7 +274,7 @@ class MachinedCam(ABC):
         if back is not None:
             end = quantity(math.degrees(back.angles[-1]), "deg", source="contour for negative angles")
             numbers["back_last_angle"] = end
-        outlines, holes, cables, rollers = self._drawn(contours, (lips[0], lips[1]), numbers)
+        outlines, holes, cables, *rolling = self._drawn(contours, (lips[0], lips[1]), numbers)
         if self.bolts is not None:
             holes += [
                 Hole(f"bolt hole {k}", c, plain(self.bolts.hole)) for k, c in enumerate(self.bolts.centres, 1)
@@ -285,7 +286,7 @@ class MachinedCam(ABC):
             base = math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
             numbers["base_radius"] = derived_size(base, "lips, holes and the least wall around them")
         line = contour.centre_line
-        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), line, numbers, rollers)
+        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), line, numbers, *rolling)
         numbers["reach"] = derived_size(made.reach, "largest distance of an edge from the axis")
         check_machinable(made)
         return made
@@ -525,7 +526,88 @@ _RUN_OUT = 9
 
 
 @dataclass(frozen=True, kw_only=True)
-class MachinedRollerCam(MachinedCam):
+class MachinedRollingCam(MachinedCam):
+    """Base of cams on which something rolls: one piece, cut through, with a bore on the axis."""
+
+    def _one_piece(self, made: RollingContour, lip: LipEdge, numbers: dict[str, Quantity]) -> DrawnCam:
+        """Return the piece, with the way of the centre of what rolls, and lines to it at both ends."""
+        self._body_radius(min(lip.last_support, float(made.radii.min())), numbers)
+        outline = joined(lip.path, back_of((lip, lip), numbers), lip.path.mirrored(), closed=True)
+        holes = []
+        if self.hub_bore is not None:
+            holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore)))
+        way = np.vstack([made.centre_line[:0:-1] * [-1.0, 1.0], made.centre_line])
+        last = made.centre_line[-1]
+        lines = [
+            way,
+            *(np.array([[0.0, 0.0], end]) for end in (made.centre_line[0], last, last * [-1.0, 1.0])),
+        ]
+        return DrawnCam([outline], holes, [ArcPath(points, np.zeros(len(points))) for points in lines])
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachinedPair(MachinedRollingCam):
+    """Sizes of a cam that rolls on an equal one; other parameters are those of :class:`MachinedCam`.
+
+    Two are cut. ``hub_bore`` is the hole of the pivot to which the element is fixed. Beyond the last angle
+    the distance of the pivots goes on with the last lever arm. Teeth or bands along the edge are not drawn.
+
+    Examples
+    --------
+    >>> MachinedPair().given()["thickness"].shown
+    4.0
+    """
+
+    def given(self) -> dict[str, Quantity]:
+        """Return the numbers by name, with those derived that need no contour."""
+        usual = {
+            "tool_radius": derived_size(5e-3, "any tool, as no edge is hollow"),
+            "thickness": derived_size(4e-3, "usual plate"),
+        }
+        return usual | super().given()
+
+    def _edge(self, contour: Contour, numbers: dict[str, Quantity]) -> LipEdge:
+        if not isinstance(contour, PairContour):
+            raise ArrangementError(
+                "contour under a cable or a roller", "does not roll on its mirror image",
+                next_step="draw it as a MachinedTwoSidedCam, MachinedOneSidedCam or MachinedRollerCam",
+            )  # fmt: skip
+        rho = contour.radii_of_curvature
+        least = int(np.argmin(rho))
+        if rho[least] <= 0.0:
+            raise ValueRangeError(
+                f"edge at {math.degrees(contour.angles[least]):.3g}°",
+                f"is hollow, with a radius of {MM * -rho[least]:.4g} mm: both cams would meet there",
+                next_step=f"take a base_distance larger by {2.0 * MM * -rho[least]:.3g} mm",
+            )
+        numbers["sharpest_edge"] = derived_size(float(rho[least]), "smallest radius of curvature of the edge")
+        numbers["pivot_distance"] = derived_size(
+            float(contour.centre_radii[0]), "base distance of the contour"
+        )
+        over, edge = plain(self.over_travel) / 2.0, contour.edge
+        lip = lip_edge(edge, 0.0, over_travel=0.0)
+        if over == 0.0:
+            return lip
+        # With a constant lever arm p' the support function grows evenly, and ρ = p.
+        turned = np.linspace(0.0, over, _RUN_OUT)
+        p = edge.lever_arms[-1] + edge.slopes[-1] * turned
+        slopes = np.full(_RUN_OUT, edge.slopes[-1])
+        beyond = lip_edge(Contour(edge.directions[-1] + turned, p, slopes, p, math.inf), 0.0, over_travel=0.0)
+        path, deviation = joined(lip.path, beyond.path), max(lip.deviation, beyond.deviation)
+        return LipEdge(path, deviation, 0.0, beyond.last_direction, beyond.last_support)
+
+    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
+        made = cast(PairContour, contours[0])
+        drawn = self._one_piece(made, lips[0], numbers)
+        half = drawn.outlines[0].turned(math.pi)
+        at_rest = made.centre_line[0]
+        bores = tuple(Hole("pivot of the other cam", at_rest, hole.diameter) for hole in drawn.holes)
+        partner = ArcPath(half.points + at_rest, half.bulges, closed=True)
+        return drawn._replace(rollers=bores, partners=(partner,))
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachinedRollerCam(MachinedRollingCam):
     """Sizes of a cam on which a roller runs; other parameters are those of :class:`MachinedCam`.
 
     Beyond the last angle the roller's centre goes on with the last lever arm.
@@ -580,21 +662,18 @@ class MachinedRollerCam(MachinedCam):
         return roller_edge(contour, over_travel=numbers["over_travel"].number)
 
     def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
-        made, lip = cast(RollerContour, contours[0]), lips[0]
-        self._body_radius(min(lip.last_support, float(made.radii.min())), numbers)
-        outline = joined(lip.path, back_of(lips, numbers), lip.path.mirrored(), closed=True)
-        holes = []
-        if self.hub_bore is not None:
-            holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore)))
-        way = np.vstack([made.centre_line[:0:-1] * [-1.0, 1.0], made.centre_line])
+        made = cast(RollerContour, contours[0])
+        drawn = self._one_piece(made, lips[0], numbers)
         last = made.centre_line[-1]
         centres = (made.centre_line[0], last, last * [-1.0, 1.0])
         # From the axis through the centre of the roller, and as far again as the roller is wide.
-        ends = [c * (1.0 + 2.0 * made.roller_radius / float(np.hypot(*c))) for c in centres]
-        lines = [way, *(np.array([[0.0, 0.0], end]) for end in ends)]
+        beyond = [1.0 + 2.0 * made.roller_radius / float(np.hypot(*c)) for c in centres]
+        lines = [
+            replace(each, points=each.points * more)
+            for each, more in zip(drawn.cables[1:], beyond, strict=True)
+        ]
         rollers = tuple(Hole("roller", centre, 2.0 * made.roller_radius) for centre in centres)
-        cables = [ArcPath(points, np.zeros(len(points))) for points in lines]
-        return DrawnCam([outline], holes, cables, rollers)
+        return drawn._replace(cables=[drawn.cables[0], *lines], rollers=rollers)
 
 
 def roller_edge(contour: RollerContour, *, over_travel: float) -> LipEdge:

@@ -174,7 +174,7 @@ class GoodmanSafety(Limit):
 def _edge(limit: Limit, design: DesignPoint) -> RollerEdge:
     if not isinstance(design.edge, RollerEdge):
         raise ArrangementError(
-            f"{type(limit).__name__} of '{design.cam.name}'", "is of a cam with a roller, not a cable",
+            f"{type(limit).__name__} of '{design.cam.name}'", "is of a cam with a roller, which this is not",
             next_step="leave the limit out, or give the spring a RollerCam",
         )  # fmt: skip
     return design.edge
@@ -189,14 +189,14 @@ def side_forces(design: DesignPoint, value: Callable[[Expression], Array]) -> It
 
     ``value``: gives the numbers of an expression at the design.
     """
-    roller = design.cam.roller
-    if roller is None or not isinstance(design.edge, RollerEdge):
+    rolling = design.cam.rolling
+    if rolling is None or not isinstance(design.edge, RollerEdge):
         return
     slopes = np.tan(value(design.edge.pressure_angles))
     force = float(np.max(value(design.elements * design.forces) * slopes))
     friction, of = _FRICTION, "that is not declared (SlidingGuide),"
-    if roller.guide_friction is not None:
-        friction, of = (design.model.values[roller.guide_friction],) * 2, "as declared,"
+    if rolling.guide_friction is not None:
+        friction, of = (design.model.values[rolling.guide_friction],) * 2, "as declared,"
     shares = [100.0 * each * float(slopes.max()) / (1.0 - each * float(slopes.max())) for each in friction]
     least, most = (f"at {each:.3g} up to {share:.2g} %" for each, share in zip(friction, shares, strict=True))
     yield (
