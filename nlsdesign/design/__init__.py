@@ -60,6 +60,7 @@ from .optimisation.coil_limits import (
     MaximumTravel,
     MinimumHollowRadius,
     MinimumSpringIndex,
+    RoomBetweenPivots,
 )
 from .optimisation.defaults import DesignSettings, safe_limits
 from .optimisation.goals import (
@@ -166,6 +167,7 @@ __all__ = [
     "PowerTorque",
     "PretensionRange",
     "RestLengthRange",
+    "RoomBetweenPivots",
     "RubberStock",
     "SmoothContour",
     "Spread",

@@ -7,6 +7,8 @@ equal arcs and opposite tangents; splines of scipy; moments about the contact; e
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,8 +16,10 @@ from scipy.integrate import cumulative_simpson
 
 from nlsdesign.components import Driven, RollingPair, Spring, through, tie
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.design import MachinedPair, contour_of_cam
 from nlsdesign.foundation.arrays import Array
-from nlsdesign.foundation.errors import NlsError
+from nlsdesign.foundation.errors import NlsError, ValueRangeError
+from nlsdesign.foundation.quantity import quantity
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 from tests.rolled import rolled_on, through_points, way_of
@@ -76,10 +80,6 @@ def test_both_sides_are_mirror_images_and_the_work_is_that_of_the_element() -> N
     [
         ({"lever_arm": (0.0, 0.001, 0.002)}, "a contour needs at least 5"),
         ({"base_distance": 1e-3}, "distance of the two pivots at angle zero must lie in"),
-        (
-            {"base_distance": 0.05},
-            r"makes both profiles hollow at .*°, where they would meet -> take at least",
-        ),
     ],
 )
 def test_what_is_no_pair_is_refused(change: dict[str, object], words: str) -> None:
@@ -87,15 +87,23 @@ def test_what_is_no_pair_is_refused(change: dict[str, object], words: str) -> No
         RollingPair(**{**NUMBERS, **change})  # type: ignore[arg-type]
 
 
-def test_the_least_distance_that_is_advised_is_the_least() -> None:
+def test_a_hollow_profile_is_refused_with_its_place_and_the_least_distance_that_mends_it() -> None:
     """By the second differences of the distance: mirror images are convex while d/2 + 2·d″ is positive."""
     law = way_of(PAIR)
     angles = np.linspace(0.0, END, 2001)
     taken = np.array([law.integrate(0.0, angle) for angle in angles])
-    bend = np.diff(taken, 2) / (angles[1] - angles[0]) ** 2
-    least = -float(np.min(taken[1:-1] + 4.0 * bend))
-    with pytest.raises(NlsError) as refused:
-        RollingPair(**{**NUMBERS, "base_distance": 0.8 * least})  # type: ignore[arg-type]
-    advised = float(str(refused.value).split("take at least ")[1].split(" mm")[0])
-    assert advised == pytest.approx(1e3 * least, rel=1e-3)
-    RollingPair(**{**NUMBERS, "base_distance": 1e-3 * advised})  # type: ignore[arg-type]
+    needed = -taken[1:-1] - 4.0 * np.diff(taken, 2) / (angles[1] - angles[0]) ** 2
+
+    def part(base: float) -> None:
+        made = replace(PAIR, base_distance=quantity(base, "m"))
+        MachinedPair(edge_tolerance=1e-6).part(contour_of_cam(made, points=1001))
+
+    with pytest.raises(
+        ValueRangeError, match=r"is hollow, with a radius of .* both cams would meet"
+    ) as refused:
+        part(0.8 * float(needed.max()))
+    (place,) = re.findall(r"edge at ([0-9.]+)°", str(refused.value))
+    (more,) = re.findall(r"larger by ([0-9.]+) mm", str(refused.value))
+    assert math.radians(float(place)) == pytest.approx(angles[1 + int(np.argmax(needed))], abs=3e-3)
+    assert 1e-3 * float(more) == pytest.approx(0.2 * float(needed.max()), rel=0.01)
+    part(1.05 * float(needed.max()))

@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import MM, Quantity
+from ...foundation.quantity import Quantity
 from ..core.part import parameter
 from .cam_shapes import MirroredCam
-
-_CHECKED = 401
-"""Angles at which a profile is checked."""
-_RIPPLE = 0.1
-"""Share by which a fitted lever arm may fall short of a convex profile between the knots of its spline."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,8 +28,7 @@ class RollingPair(MirroredCam):
     Raises
     ------
     ValueRangeError
-        If a profile would be hollow, which names where and the least distance of the pivots that mends it, or
-        there are fewer than five control values.
+        If there are fewer than five control values.
 
     Examples
     --------
@@ -50,20 +40,3 @@ class RollingPair(MirroredCam):
     base_distance: Quantity = parameter(
         "m", "distance of the two pivots at angle zero", minimum=2e-3, maximum=4.0
     )
-
-    def __post_init__(self) -> None:
-        from scipy.interpolate import BSpline  # a list of parts needs no SciPy
-
-        super().__post_init__()
-        row, end = np.array(self.lever_arm.values), self.last_angle.number
-        spline = BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
-        angles = np.linspace(0.0, end, _CHECKED)
-        # ρ = d₀/2 + δ/2 + 2·dh/dθ
-        needed = -spline.antiderivative()(angles) + spline.antiderivative()(0.0) - 4.0 * spline(angles, 1)
-        worst = int(np.argmax(needed))
-        if self.base_distance.number < (1.0 - _RIPPLE) * needed[worst]:
-            raise ValueRangeError(
-                f"base_distance = {self.base_distance}",
-                f"makes both profiles hollow at {math.degrees(angles[worst]):.3g}°, where they would meet",
-                next_step=f"take at least {MM * needed[worst]:.4g} mm, or a lever arm that falls more slowly",
-            )

@@ -274,7 +274,7 @@ class MachinedCam(ABC):
         if back is not None:
             end = quantity(math.degrees(back.angles[-1]), "deg", source="contour for negative angles")
             numbers["back_last_angle"] = end
-        outlines, holes, cables, *rolling = self._drawn(contours, (lips[0], lips[1]), numbers)
+        outlines, holes, cables, rollers, partners = self._drawn(contours, (lips[0], lips[1]), numbers)
         if self.bolts is not None:
             holes += [
                 Hole(f"bolt hole {k}", c, plain(self.bolts.hole)) for k, c in enumerate(self.bolts.centres, 1)
@@ -286,7 +286,7 @@ class MachinedCam(ABC):
             base = math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
             numbers["base_radius"] = derived_size(base, "lips, holes and the least wall around them")
         line = contour.centre_line
-        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), line, numbers, *rolling)
+        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), line, numbers, rollers, partners)
         numbers["reach"] = derived_size(made.reach, "largest distance of an edge from the axis")
         check_machinable(made)
         return made

@@ -24,6 +24,7 @@ from .coil_limits import (
     MaximumTravel,
     MinimumHollowRadius,
     MinimumSpringIndex,
+    RoomBetweenPivots,
 )
 from .limits import (
     Limit,
@@ -171,7 +172,8 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
         yield MaximumCableTension(values[cam.cable.breaking_force] / CABLE_FACTOR)
     if cam.rolling is not None and cam.rolling.radius is None:
         yield MinimumRadiusOfCurvature(TOOTH_RADIUS)
-    elif cam.rolling is not None:
+        yield RoomBetweenPivots()
+    elif cam.rolling is not None and cam.rolling.radius is not None:
         radius = values[cam.rolling.radius]
         yield MaximumPressureAngle(PRESSURE_ANGLE)
         # The roller's centre turns on twice the radius of the roller at least: Norton 2009, ch. 7.

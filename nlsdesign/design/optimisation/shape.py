@@ -6,7 +6,7 @@ import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -210,22 +210,16 @@ class PairVariables(FreeContour):
 
     def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
         """Return a lever arm that rises and falls as the torque does, where the profile stays convex."""
-        bends = 2.0 * np.gradient(sizes.profile) * start.contour_size * start.slope_share
-        bends *= self.per_interval
-        radii = np.maximum(sizes.base / sizes.arm / 2.0 + bends, 0.1)
+        arms = 2.0 * start.contour_size * start.slope_share * sizes.profile
+        # A curve that begins with a jump needs a facet.
+        arms[0] = max(0.0, 2.0 * arms[1] - arms[2])
+        radii = np.maximum(sizes.base / sizes.arm / 2.0 + 2.0 * np.gradient(arms) * self.per_interval, 0.1)
         values = {v.name: each for v, each in zip(self.radii_of_curvature, radii.tolist(), strict=True)}
-        return values | {self.first_slope.name: 0.0}
+        return values | {self.first_slope.name: arms[0]}
 
     def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
-        """Return that the profile is convex, and that the element pulls and has room between the pivots."""
-        rolling = design.cam.rolling
-        bounds = [] if curved else [held(CONVEX, "radius of curvature", design.radii_of_curvature, arm)]
-        bounds.append(held("PulledPair", "extension of the element", design.extensions, arm))
-        for name in design.cam.lengths:
-            room = design.parameters[rolling.base] - design.parameters[name]  # type: ignore[union-attr]
-            what = f"room between the pivots beyond {name} and its stretch"
-            bounds.append(held("RoomForElement", what, room - design.parameters[design.cam.pretension], arm))
-        return bounds
+        """Return that the profile is convex."""
+        return [] if curved else [held(CONVEX, "radius of curvature", design.radii_of_curvature, arm)]
 
     def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
         """Return the contour at a solution."""
@@ -333,21 +327,23 @@ def rolled(
 def paired(last_angle: float, arm: float, *, end: Expression, base: Expression) -> tuple[FreeContour, Shape]:
     """Return a cam that rolls on its mirror image; ``base``: distance of the pivots at angle zero."""
     variables = PairVariables(_radii(arm), _length("first_slope", arm, start=0.0), INTERVALS / last_angle)
-    p, arms, _, directions, held, *states = _support(variables, base / 2.0, end / 2.0, arm)
+    support = _support(variables, base / 2.0, end / 2.0, arm)
+    p, arms, _, directions, held = support[:5]
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
+    clear = Rows(p / arm, 0.01, ca.inf)
+    edge = PairEdge(directions, p, rho, 4)
+    return variables, _pair(edge, arms, 2.0 * (p - p[0]), (held, clear))._replace(
+        states=support.states, state_values=support.state_values
+    )
+
+
+def _pair(edge: PairEdge, arms: Expression, taken: Expression, rows: tuple[Rows, ...] = ()) -> Shape:
+    p, rho = edge.supports, edge.radii_of_curvature
     # At angle zero the two sides meet: whatever facet the profile begins with, the lever arm is zero.
     arms = ca.vertcat(0, arms[1:])
-    clear = Rows(p / arm, 0.01, ca.inf)
-    return variables, _pair(PairEdge(directions, p, rho, 4), arms, 2.0 * (p - p[0]), (held, clear), states)
-
-
-def _pair(
-    edge: PairEdge, arms: Expression, taken: Expression, rows: tuple[Rows, ...], states: Sequence[Any]
-) -> Shape:
-    p, rho = edge.supports, edge.radii_of_curvature
     return Shape(
         edge.directions, 2.0 * edge.directions, arms, _distance(p, arms), rho, taken, (rho - p) / 2.0,
-        rows, True, *states, edge,
+        rows, True, (), ca.SX(0, 1), edge,
     )  # fmt: skip
 
 
@@ -404,9 +400,9 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
         edge = RollerEdge(ca.SX(contour.bearings), centre, arms, slopes, contour.roller_radius)
         return _rolling(edge, ca.SX(extensions), (), ((), ca.SX(0, 1)))
     if isinstance(contour, PairContour):
-        columns = contour.directions, contour.centre_radii / 2.0, contour.radii_of_curvature
-        edge = PairEdge(*(ca.SX(column) for column in columns), 4)
-        return _pair(edge, ca.SX(contour.lever_arms), ca.SX(extensions), (), ((), ca.SX(0, 1)))
+        phi, p, rho = contour.directions, contour.centre_radii / 2.0, contour.radii_of_curvature
+        pair = PairEdge(ca.SX(phi), ca.SX(p), ca.SX(rho), 4)
+        return _pair(pair, ca.SX(contour.lever_arms), ca.SX(extensions))
     # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
     root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
     rho, phi, p = (ca.SX(c) for c in (contour.radii_of_curvature, contour.directions, contour.lever_arms))

@@ -128,7 +128,7 @@ def _two_sides(width: float, angles: Array, lever_arms: Array, count: int) -> tu
 
 
 class _Rolling(DeclaredCam[Made]):
-    """A cam without a cable; with its change of sides, which what rolls on it follows too."""
+    """A cam without a cable."""
 
     @property
     def through_centre(self) -> bool:
@@ -140,18 +140,12 @@ class _Rolling(DeclaredCam[Made]):
         """Infinite: there is no cable."""
         return math.inf
 
-    def way(self, last_angle: float | None, points: int) -> tuple[Array, tuple[Array, Array, Array]]:
-        """Return angles, and there the extension, the lever arm and its slope."""
+    def law(self, last_angle: float | None, points: int) -> tuple[Array, BSpline]:
+        """Return angles, and the lever arm on its side as a spline."""
         part: Any = self.part
-        width, end, row = part.changeover.number, part.last_angle.number, np.array(part.lever_arm.values)
+        end, row = part.last_angle.number, np.array(part.lever_arm.values)
         angles = np.linspace(0.0, _end(end, last_angle), points)
-        root = np.hypot(angles, width)
-        q, slope = angles**2 / (root + width), angles / root
-        spline = BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
-        taken, arm = spline.antiderivative(), spline(q)
-        return angles, (
-            taken(q) - taken(0.0), arm * slope, spline(q, 1) * slope**2 + arm * width**2 / root**3
-        )  # fmt: skip
+        return angles, BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
 
     def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, fitted through the law of this kind."""
@@ -164,16 +158,25 @@ class _Rolling(DeclaredCam[Made]):
 class _Roller(_Rolling[RollerCam]):
     def contour(self, last_angle: float | None, points: int) -> RollerContour:
         """Return the edge under the roller."""
+        angles, spline = self.law(last_angle, points)
+        width, root = self.part.changeover.number, np.hypot(angles, self.part.changeover.number)
+        # A roller follows the change of sides too.
+        q, slope = angles**2 / (root + width), angles / root
+        taken, arm = spline.antiderivative(), spline(q)
+        way = (taken(q) - taken(0.0), arm * slope, spline(q, 1) * slope**2 + arm * width**2 / root**3)
         base, radius = self.part.base_radius.number, self.part.roller_radius.number
-        return roller_contour(*self.way(last_angle, points), base_radius=base, roller_radius=radius)
+        return roller_contour(angles, way, base_radius=base, roller_radius=radius)
 
 
 class _Pair(_Rolling[RollingPair]):
     def contour(self, last_angle: float | None, points: int) -> PairContour:
         """Return the edge that rolls on its mirror image."""
-        angles, (taken, arms, slopes) = self.way(last_angle, points)
-        p = (self.part.base_distance.number + taken) / 2.0
-        return pair_contour(Contour(angles / 2.0, p, arms, p + 2.0 * slopes, math.inf))
+        angles, spline = self.law(last_angle, points)
+        # Where the lever arm begins with a jump the profile begins with a facet, in place of the change of
+        # sides: beyond that the lever arm is H(θ − w).
+        at, taken = angles - self.part.changeover.number, spline.antiderivative()
+        p = (self.part.base_distance.number + taken(at) - taken(0.0)) / 2.0
+        return pair_contour(Contour(angles / 2.0, p, spline(at), p + 2.0 * spline(at, 1), math.inf))
 
 
 @dataclass(frozen=True)

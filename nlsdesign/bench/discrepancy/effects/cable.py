@@ -37,7 +37,8 @@ _CREEP_SPEED = 2e-4
 
 def _by_cable(assembly: Assembly) -> list[str]:
     """Return what cams stretch by a cable; between the pivots of a rolling pair there is none."""
-    return [path for path in stretched(assembly) if not _of_pair(assembly[path.rpartition(".")[0]])]
+    pairs = [path for path, element in laws(assembly) if _of_pair(element)]
+    return [path for path in stretched(assembly) if not any(path.startswith(f"{pair}.") for pair in pairs)]
 
 
 def _of_pair(part: Part) -> bool:
