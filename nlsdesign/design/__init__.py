@@ -33,12 +33,11 @@ from .drawing.machined_cam import (
     FerruleSeat,
     MachinedCam,
     MachinedOneSidedCam,
-    MachinedPair,
-    MachinedRollerCam,
     MachinedTwoSidedCam,
 )
 from .drawing.making import carrying_note as carrying_note
 from .drawing.making import process_of as process_of
+from .drawing.rolling_cam import MachinedPair, MachinedRollerCam
 from .jobs.job_file import DRAWS as DRAWS
 from .jobs.job_file import DesignJob, TaskTarget, job_of, read_job
 from .jobs.job_file import kinds as kinds

@@ -33,7 +33,7 @@ from tests.cam_cases import CONTOUR, PRETENSION, actuator
 from tests.dxf_reading import header_of, polylines_of
 from tests.rolled import along_edge, rolled_on, way_of
 
-QUICK = DesignSettings(starts=2, draws=0, look_for_size_ranges=False, look_for_remedies=False)
+QUICK = DesignSettings(starts=4, draws=0, look_for_size_ranges=False, look_for_remedies=False)
 RATE, LENGTH, TRAVEL = 1186.0, 14.4e-3, 15.87e-3
 """Of one coil 5/1/1; Wu and Mintchev 2024, README.md."""
 HILLS = TabulatedTorque(
@@ -101,7 +101,9 @@ def test_a_curve_that_falls_to_zero_is_met_with_its_jump() -> None:
     machine = nls.declare(nls.load_deck("rolling_pair_drive")).with_values(coil)
     design = design_cam(machine, target=FALL, free=PRETENSION, settings=QUICK)
     assert design.met
-    assert design.rms < 0.005 * FALL.largest
+    # The jump itself has the angle over which the lever arm changes sides.
+    behind = design.check.angles > math.radians(1.0)
+    assert np.abs(design.check.errors[behind]).max() < 0.005 * FALL.largest
     arms = design.contour.lever_arms
     assert arms[0] > 0.9 * arms.max() > 0.0
     assert arms[-1] == pytest.approx(0.0, abs=0.01 * arms.max())
@@ -156,8 +158,16 @@ def test_the_drawn_edge_rolls_on_itself_and_gives_distance_and_torque(
     stiffness = RATE if which == "hills" else 1e6 * 1e-4 / 12.5e-3
     stretched = design.values["spring.pretension"].number + 1e-3 * (rolled.distances - rolled.distances[0])
     torques = -2.0 * stiffness * stretched * 1e-3 * rolled.arms
-    wanted = design.target.torque(-rolled.angles)
-    assert np.sqrt(np.mean((torques - wanted)[1:] ** 2)) < 0.005 * design.target.largest
+    # While the cams lie on their facets the torque is whatever turns them off.
+    wanted, beyond = design.target.torque(-rolled.angles), -rolled.angles > math.radians(0.3)
+    assert np.sqrt(np.mean((torques - wanted)[beyond] ** 2)) < 0.005 * design.target.largest
+    # By virtual work: what the element has stored since the first node is the area below the curve.
+    first = int(np.argmax(-rolled.angles > math.radians(3.0)))
+    stored, work = stiffness * stretched**2, design.target.energy(-rolled.angles)
+    assert (stored - stored[first])[first:] == pytest.approx(
+        (work - work[first])[first:], abs=1e-3 * float(work.max())
+    )
+    assert np.all(np.abs(torques[~beyond]) < torques[beyond][0] + 1e-6)
     # The other cam is the same edge turned by half a turn about the middle between the pivots.
     assert partner[:, :2] == pytest.approx([0.0, rolled.distances[0]] - edge[:, :2], abs=2e-5)
 

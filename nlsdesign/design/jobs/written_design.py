@@ -17,14 +17,9 @@ from ...model.structure import CamNames
 from ..curves.numbers import in_unit
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
-from ..drawing.machined_cam import (
-    MachinedCam,
-    MachinedOneSidedCam,
-    MachinedPair,
-    MachinedRollerCam,
-    MachinedTwoSidedCam,
-)
+from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
 from ..drawing.making import Mounting
+from ..drawing.rolling_cam import MachinedPair, MachinedRollerCam
 from ..optimisation.result import CamDesign
 from ..optimisation.solve import SidesDesign
 from ..statics.declared_cam import declared_cam

@@ -86,8 +86,11 @@ class PairEdge(CableEdge):
 
     @property
     def roughness(self) -> Expression:
-        """That of the contour, and half the distance of the pivots squared, relative to 10 mm."""
-        return super().roughness + self.supports[0] ** 2 / _LENGTH**2
+        """That of the contour, and half the distance of the pivots squared, relative to 2 mm.
+
+        A pair is convex by itself, so it is sooner to be small than smooth.
+        """
+        return super().roughness + self.supports[0] ** 2 / (0.2 * _LENGTH) ** 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -400,8 +400,8 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
         edge = RollerEdge(ca.SX(contour.bearings), centre, arms, slopes, contour.roller_radius)
         return _rolling(edge, ca.SX(extensions), (), ((), ca.SX(0, 1)))
     if isinstance(contour, PairContour):
-        phi, p, rho = contour.directions, contour.centre_radii / 2.0, contour.radii_of_curvature
-        pair = PairEdge(ca.SX(phi), ca.SX(p), ca.SX(rho), 4)
+        on = contour.edge
+        pair = PairEdge(ca.SX(on.directions), ca.SX(on.lever_arms), ca.SX(on.radii_of_curvature), 4)
         return _pair(pair, ca.SX(contour.lever_arms), ca.SX(extensions))
     # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
     root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
