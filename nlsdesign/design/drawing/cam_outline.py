@@ -12,6 +12,7 @@ from scipy.interpolate import BPoly
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import MM, Quantity
+from ...foundation.symbolic import remembered
 from ..statics.contour import Contour
 from .arc_path import ArcPath, biarc, clockwise_arc, joined, line
 
@@ -40,6 +41,7 @@ Lips = tuple[LipEdge, LipEdge]
 """Edges under the cable at positive and at negative angles."""
 
 
+@remembered(8)
 def lip_edge(
     contour: Contour, cable_radius: float, *, over_travel: float, accuracy: float = ACCURACY
 ) -> LipEdge:
