@@ -96,6 +96,7 @@ def test_the_published_joint_comes_out_with_its_own_coil(hills: CamDesign) -> No
     assert max(away) < 5e-5
 
 
+@pytest.mark.slow
 def test_a_curve_that_falls_to_zero_is_met_with_its_jump() -> None:
     coil = {"spring.coil.free_length": 19.47e-3, "spring.coil.largest_extension": 20e-3}
     machine = nls.declare(nls.load_deck("rolling_pair_drive")).with_values(coil)
@@ -136,6 +137,7 @@ def drawn(design: CamDesign, folder: Path) -> str:
     return (folder / "cam.dxf").read_text(encoding="utf-8")
 
 
+@pytest.mark.long_cases("hills")
 @pytest.mark.parametrize("which", ["hills", "signs"])
 def test_the_drawn_edge_rolls_on_itself_and_gives_distance_and_torque(
     which: str, request: pytest.FixtureRequest, tmp_path: Path
@@ -186,6 +188,7 @@ def test_what_does_not_fit_a_pair_is_named(signs: CamDesign) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_pair_that_is_too_small_for_its_curve_says_what_binds() -> None:
     keep = [MaximumStrain(2.0), MaximumCamRadius(12e-3)]
     missed = design_cam(rubber_pair(), target=wave(1.3), free=CONTOUR, keep=keep, settings=QUICK)
