@@ -173,8 +173,6 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
         f"for {part.size_of_counterpart}, plate {MM * part.number('thickness'):.4g} mm",
         f"arcs within {1e6 * part.number('edge_deviation'):.2g} um of the exact edge",
     ]
-    if part.partners:
-        lines.append("cut two")
     if "groove_depth" in part.numbers:
         lines.append(f"edges milled {MM * part.number('groove_depth'):.4g} mm deep, base disc below")
     _add_text(document, [*lines, note] if note else lines, below=part.outermost)

@@ -76,7 +76,7 @@ class CamPart:
     def size_of_counterpart(self) -> str:
         """What the edge is for, in words with its size."""
         if self.partners:
-            return f"an equal cam, pivots {MM * self.number('pivot_distance'):.4g} mm apart"
+            return f"two equal cams, pivots {MM * self.number('pivot_distance'):.4g} mm apart"
         return f"a {self.counterpart} of radius {MM * self.number(f'{self.counterpart}_radius'):.4g} mm"
 
     @cached_property
